@@ -1,0 +1,1 @@
+"""Acquisition functions: from a posterior and candidate ISIs to scores."""

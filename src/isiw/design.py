@@ -1,0 +1,98 @@
+"""The design space: which ISIs may be asked, and from which event they are counted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from isiw.errors import InvalidValueError, OutOfSpaceError
+from isiw.types import FloatArray, Reference
+
+__all__ = ["IMPACT_SPACE", "VALVE_SPACE", "DesignSpace"]
+
+
+@dataclass(frozen=True)
+class DesignSpace:
+    """The ISIs that may be asked: a grid from `low_ms` to `high_ms`, both included.
+
+    Args:
+        low_ms: first ISI [ms].
+        high_ms: last ISI [ms].
+        step_ms: distance between two ISIs [ms]; the range must hold a whole number of steps.
+        reference: the event that an ISI is counted from, the `"impact"` of the hammer or the `"valve"` command.
+        tolerance_ms: how far beyond the range a *realised* ISI may lie before it is an error [ms].
+
+    Raises:
+        InvalidValueError: a bound that is not finite, an empty range, a step that does not fit, an unknown reference.
+    """
+
+    low_ms: float
+    high_ms: float
+    step_ms: float = 1.0
+    reference: Reference = "impact"
+    tolerance_ms: float = 10.0
+
+    def __post_init__(self) -> None:
+        for name in ("low_ms", "high_ms", "step_ms", "tolerance_ms"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise InvalidValueError(f"DesignSpace.{name} must be a finite number", got=value)
+            object.__setattr__(self, name, float(value))
+        if self.reference not in {"impact", "valve"}:
+            raise InvalidValueError(
+                "DesignSpace.reference is unknown", got=self.reference, expected='"impact" or "valve"'
+            )
+        if self.high_ms <= self.low_ms:
+            raise InvalidValueError("the design space is empty", got=(self.low_ms, self.high_ms), expected="low < high")
+        if self.step_ms <= 0 or self.tolerance_ms < 0:
+            raise InvalidValueError(
+                "step_ms must be positive and tolerance_ms not negative", got=(self.step_ms, self.tolerance_ms)
+            )
+        steps = (self.high_ms - self.low_ms) / self.step_ms
+        if abs(steps - round(steps)) > 1e-6:
+            raise InvalidValueError(
+                "the range is not a whole number of steps",
+                got=steps,
+                remedy="Choose high_ms = low_ms + k * step_ms with a whole k.",
+            )
+
+    @cached_property
+    def grid_ms(self) -> FloatArray:
+        """All ISIs that may be asked [ms], shape (t,)."""
+        steps = np.arange(round((self.high_ms - self.low_ms) / self.step_ms) + 1, dtype=np.float64)
+        grid: FloatArray = self.low_ms + self.step_ms * steps
+        grid.setflags(write=False)
+        return grid
+
+    def snap(self, isi_ms: float) -> float:
+        """The nearest ISI on the grid [ms]."""
+        steps = round((min(max(isi_ms, self.low_ms), self.high_ms) - self.low_ms) / self.step_ms)
+        return float(self.grid_ms[steps])
+
+    def check_realised(self, isi_ms: float) -> float:
+        """Return a realised ISI [ms] if it can have come from this space.
+
+        Raises:
+            InvalidValueError: not a finite number.
+            OutOfSpaceError: more than `tolerance_ms` beyond the range.
+        """
+        if not math.isfinite(isi_ms):
+            raise InvalidValueError("a realised ISI must be a finite number of milliseconds", got=isi_ms)
+        if not self.low_ms - self.tolerance_ms <= isi_ms <= self.high_ms + self.tolerance_ms:
+            raise OutOfSpaceError(
+                "the realised ISI is beyond the design space",
+                got=isi_ms,
+                expected=f"{self.low_ms:g} to {self.high_ms:g} ms, give or take {self.tolerance_ms:g} ms",
+                remedy=f"ISIs count from the {self.reference}; check the reference, or log the trial as a mistrial.",
+            )
+        return float(isi_ms)
+
+
+VALVE_SPACE = DesignSpace(0, 500, reference="valve")
+"""500 ms after the valve command: what can be searched without an accelerometer (dissertation, 4.2)."""
+
+IMPACT_SPACE = DesignSpace(0, 320, reference="impact")
+"""From the impact on: what can be searched with an accelerometer (dissertation, 4.2)."""

@@ -1,0 +1,76 @@
+"""The exception tree.
+
+Every message says what is wrong, what was got, what was expected, and the way out.
+
+    IsiwError
+    ├── InvalidValueError (ValueError)    a value that cannot be: NaN, negative, not finite, wrong shape
+    │   └── OutOfSpaceError               an ISI beyond the design space and its tolerance
+    ├── ConfigError (ValueError)          a configuration file, key or value that cannot be used
+    ├── StrategyError                     a strategy that cannot be built, or not from these parts
+    ├── DeviceError                       a device that failed, refused, or did not answer
+    │   ├── LimitExceededError            a stimulus refused by a limit, before anything was delivered
+    │   └── DeviceTimeoutError            no answer within the time allowed
+    └── LogError                          a log that cannot be written or read
+        └── DamagedLogError               a log that ends too early or fails its checksums
+"""
+
+from __future__ import annotations
+
+
+class IsiwError(Exception):
+    """The root of everything that isiw raises on purpose.
+
+    Args:
+        what: what is wrong, as a sentence without a full stop.
+        got: the offending value, if there is one.
+        expected: what would have been accepted.
+        remedy: the way out.
+    """
+
+    def __init__(
+        self, what: str, *, got: object = None, expected: str | None = None, remedy: str | None = None
+    ) -> None:
+        self.what, self.got, self.expected, self.remedy = what, got, expected, remedy
+        parts = [what]
+        if got is not None:
+            parts.append(f"got {got!r}")
+        if expected is not None:
+            parts.append(f"expected {expected}")
+        message = "; ".join(parts)
+        super().__init__(f"{message}. {remedy}" if remedy else message)
+
+
+class InvalidValueError(IsiwError, ValueError):
+    """A value that cannot be: NaN, negative, not finite, of the wrong shape or unit."""
+
+
+class OutOfSpaceError(InvalidValueError):
+    """An ISI beyond the design space and its tolerance."""
+
+
+class ConfigError(IsiwError, ValueError):
+    """A configuration file, key or value that cannot be used."""
+
+
+class StrategyError(IsiwError):
+    """A strategy that cannot be built, or not from these parts."""
+
+
+class DeviceError(IsiwError):
+    """A device that failed, refused, or did not answer."""
+
+
+class LimitExceededError(DeviceError):
+    """A stimulus that a limit refused before anything was delivered."""
+
+
+class DeviceTimeoutError(DeviceError):
+    """A device that did not answer within the time allowed."""
+
+
+class LogError(IsiwError):
+    """A log that cannot be written or read."""
+
+
+class DamagedLogError(LogError):
+    """A log that ends too early or fails its checksums."""

@@ -1,0 +1,1 @@
+"""Models of a person's responses, behind the protocol of `isiw.models.protocol`."""

@@ -1,0 +1,1 @@
+"""From waveforms to numbers: impact, MEP, background, and the judgement of a trial."""

@@ -1,0 +1,280 @@
+"""One pair of stimuli and what came of it: stimulus, sweep or measurement, trial, and the table of all trials."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+import pandas as pd
+
+from isiw.errors import InvalidValueError
+from isiw.types import FloatArray
+
+__all__ = ["Channel", "Measurement", "MistrialReason", "Status", "Stimulus", "Sweep", "Trial", "TrialTable"]
+
+
+class Status(StrEnum):
+    """Whether a trial is told to the strategy."""
+
+    ACCEPTED = "accepted"
+    MISTRIAL = "mistrial"
+
+
+class MistrialReason(StrEnum):
+    """Why a delivered trial is not told. The list is closed."""
+
+    NO_IMPACT = "no impact"
+    NO_PULSE = "no pulse"
+    TMS_BEFORE_IMPACT = "TMS before impact"
+    BACKGROUND_ACTIVITY = "background activity"
+    SATURATION = "saturation"
+    MISSING_CHANNEL = "missing channel"
+    ISI_OFF = "ISI off by more than the tolerance"
+    OUTCOME_UNKNOWN = "outcome unknown"
+
+
+def _require_finite(owner: str, **values: float | None) -> None:
+    for name, value in values.items():
+        if value is not None and not math.isfinite(value):
+            raise InvalidValueError(f"{owner}.{name} must be finite", got=value)
+
+
+def _require_amplitude(owner: str, **values: float | None) -> None:
+    _require_finite(owner, **values)
+    for name, value in values.items():
+        if value is not None and value < 0:
+            raise InvalidValueError(
+                f"{owner}.{name} must not be negative", got=value, remedy="An amplitude is peak-to-peak, from 0 up."
+            )
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """One pair of stimuli to deliver.
+
+    Args:
+        trial: number of the trial, from 0.
+        isi_ms: inter-stimulus interval on the design space's reference [ms]; None for TMS alone (a baseline trial).
+
+    Raises:
+        InvalidValueError: a negative trial number, or an ISI that is not finite.
+    """
+
+    trial: int
+    isi_ms: float | None
+
+    def __post_init__(self) -> None:
+        if self.trial < 0:
+            raise InvalidValueError("Stimulus.trial counts from 0", got=self.trial)
+        _require_finite("Stimulus", isi_ms=self.isi_ms)
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One recorded waveform.
+
+    Args:
+        values: samples in `unit`, shape (w,).
+        rate_hz: sampling rate [Hz].
+        unit: unit of the samples, such as "mV" or "m/s^2".
+        t0_ms: time of the first sample on the sweep's clock [ms].
+
+    Raises:
+        InvalidValueError: samples that are not a vector, or a rate that is not positive.
+    """
+
+    values: FloatArray
+    rate_hz: float
+    unit: str
+    t0_ms: float = 0.0
+
+    def __post_init__(self) -> None:
+        values = np.asarray(self.values, dtype=np.float64)
+        if values.ndim != 1:
+            raise InvalidValueError("a channel holds one waveform", got=values.shape, expected="shape (w,)")
+        if not (math.isfinite(self.rate_hz) and self.rate_hz > 0):
+            raise InvalidValueError("a sampling rate must be positive", got=self.rate_hz)
+        _require_finite("Channel", t0_ms=self.t0_ms)
+        object.__setattr__(self, "values", values)
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """The waveforms of one trial, and what the device knows of its timing. All times are on the sweep's own clock.
+
+    Args:
+        channels: waveforms by name; isiw knows `emg`, `acceleration`, `pressure`, `force` and `valve`.
+        t_valve_ms: the valve command [ms]; None where unknown.
+        t_tms_ms: the magnetic pulse [ms]; None where unknown.
+        t_hit_ms: the impact, where the device measures it [ms]; None to have it found in the waveforms.
+        isi_sd_ms: SD of the realised ISI where the impact is not measured [ms].
+
+    Raises:
+        InvalidValueError: a time that is not finite, or a negative SD.
+    """
+
+    channels: Mapping[str, Channel]
+    t_valve_ms: float | None = None
+    t_tms_ms: float | None = None
+    t_hit_ms: float | None = None
+    isi_sd_ms: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require_finite("Sweep", t_valve_ms=self.t_valve_ms, t_tms_ms=self.t_tms_ms, t_hit_ms=self.t_hit_ms)
+        _require_amplitude("Sweep", isi_sd_ms=self.isi_sd_ms)
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What a device reports that measures the MEP itself.
+
+    Args:
+        mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 means below the detection limit.
+        isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone.
+        isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
+        background_rms_uv: EMG before the pulse [µV RMS], where known.
+        t_valve_ms: time of the valve command [ms], where known.
+        t_hit_ms: time of the impact [ms], where known.
+        t_tms_ms: time of the magnetic pulse [ms], where known.
+
+    Raises:
+        InvalidValueError: a value that is not finite, or a negative amplitude.
+    """
+
+    mep_mv: float
+    isi_ms: float | None
+    isi_sd_ms: float = 0.0
+    background_rms_uv: float | None = None
+    t_valve_ms: float | None = None
+    t_hit_ms: float | None = None
+    t_tms_ms: float | None = None
+
+    def __post_init__(self) -> None:
+        _require_finite(
+            "Measurement",
+            isi_ms=self.isi_ms,
+            t_valve_ms=self.t_valve_ms,
+            t_hit_ms=self.t_hit_ms,
+            t_tms_ms=self.t_tms_ms,
+        )
+        _require_amplitude(
+            "Measurement", mep_mv=self.mep_mv, isi_sd_ms=self.isi_sd_ms, background_rms_uv=self.background_rms_uv
+        )
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One delivered pair of stimuli and its outcome, as logged.
+
+    Args:
+        index: number of the trial, from 0.
+        status: accepted trials are told to the strategy, mistrials are not; both count as stimuli.
+        commanded_isi_ms: the ISI that was asked for [ms]; None for TMS alone.
+        reason: why it is a mistrial; None where accepted.
+        isi_ms: the realised ISI [ms]; None for TMS alone or where unknown.
+        isi_sd_ms: SD of the realised ISI [ms].
+        mep_mv: peak-to-peak amplitude of the MEP [mV]; None where there is no trustworthy one.
+        background_rms_uv: EMG before the pulse [µV RMS].
+        t_valve_ms: time of the valve command [ms].
+        t_hit_ms: time of the impact [ms].
+        t_tms_ms: time of the magnetic pulse [ms].
+        excluded: excluded by an operator afterwards.
+
+    Raises:
+        InvalidValueError: a mistrial without a reason, an accepted trial with one or without an amplitude, or a value
+            that is not finite.
+    """
+
+    index: int
+    status: Status
+    commanded_isi_ms: float | None
+    reason: MistrialReason | None = None
+    isi_ms: float | None = None
+    isi_sd_ms: float = 0.0
+    mep_mv: float | None = None
+    background_rms_uv: float | None = None
+    t_valve_ms: float | None = None
+    t_hit_ms: float | None = None
+    t_tms_ms: float | None = None
+    excluded: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "status", Status(self.status))
+        if self.reason is not None:
+            object.__setattr__(self, "reason", MistrialReason(self.reason))
+        if (self.status is Status.MISTRIAL) != (self.reason is not None):
+            raise InvalidValueError("a mistrial needs a reason and an accepted trial has none", got=self.reason)
+        if self.status is Status.ACCEPTED and self.mep_mv is None:
+            raise InvalidValueError("an accepted trial needs its MEP", got=self.index)
+        _require_finite(
+            "Trial",
+            commanded_isi_ms=self.commanded_isi_ms,
+            isi_ms=self.isi_ms,
+            t_valve_ms=self.t_valve_ms,
+            t_hit_ms=self.t_hit_ms,
+            t_tms_ms=self.t_tms_ms,
+        )
+        _require_amplitude(
+            "Trial", mep_mv=self.mep_mv, isi_sd_ms=self.isi_sd_ms, background_rms_uv=self.background_rms_uv
+        )
+
+    @property
+    def told(self) -> bool:
+        """Whether the strategy learns from it."""
+        return self.status is Status.ACCEPTED and not self.excluded
+
+
+@dataclass(frozen=True)
+class TrialTable:
+    """All trials of one session, in the order of delivery.
+
+    Args:
+        trials: the trials; their indices ascend.
+
+    Raises:
+        InvalidValueError: indices that do not ascend.
+    """
+
+    trials: tuple[Trial, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        trials = tuple(self.trials)
+        indices = [trial.index for trial in trials]
+        if indices != sorted(set(indices)):
+            raise InvalidValueError("the trials' indices must ascend", got=indices)
+        object.__setattr__(self, "trials", trials)
+
+    def __len__(self) -> int:
+        return len(self.trials)
+
+    def __iter__(self) -> Iterator[Trial]:
+        return iter(self.trials)
+
+    def __getitem__(self, position: int) -> Trial:
+        return self.trials[position]
+
+    def appended(self, trial: Trial) -> TrialTable:
+        """A table with one more trial at its end."""
+        return TrialTable((*self.trials, trial))
+
+    def excluding(self, indices: Iterable[int]) -> TrialTable:
+        """A table in which the trials of these indices are excluded."""
+        dropped = set(indices)
+        return TrialTable(
+            tuple(dataclasses.replace(t, excluded=True) if t.index in dropped else t for t in self.trials)
+        )
+
+    @property
+    def told(self) -> tuple[Trial, ...]:
+        """The trials that a strategy learns from."""
+        return tuple(trial for trial in self.trials if trial.told)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The trials as a DataFrame, a row a trial, columns as in `Trial`, indexed by `index`."""
+        columns = [f.name for f in dataclasses.fields(Trial)]
+        rows = [[getattr(trial, name) for name in columns] for trial in self.trials]
+        return pd.DataFrame(rows, columns=columns).set_index("index")

@@ -1,0 +1,24 @@
+"""Array aliases and the shape alphabet.
+
+Shapes in docstrings use one alphabet throughout:
+
+    n  trials              t  candidate ISIs, or the points of the design grid
+    s  posterior samples   p  particles
+    b  parallel subjects   w  waveform samples
+    q  quadrature nodes    y  values of the next MEP
+"""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["ArrayLike", "BoolArray", "FloatArray", "IntArray", "Reference"]
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int64]
+BoolArray: TypeAlias = NDArray[np.bool_]
+
+Reference: TypeAlias = Literal["impact", "valve"]

@@ -1,0 +1,189 @@
+"""The window: the ISIs that enhance the MEP, what is believed about it, and the 0.135 rule that defines it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from isiw.errors import InvalidValueError
+from isiw.types import ArrayLike, BoolArray, FloatArray
+
+__all__ = ["EDGE_LEVEL", "Interval", "ProfileBand", "Window", "WindowEstimate", "window_from_excess"]
+
+EDGE_LEVEL = 0.135
+"""The share of the largest excess that a window's edge has: two SDs down a Gaussian (dissertation, 4.3)."""
+
+MIN_EXCESS_MV = 0.002
+MIN_EXCESS_OF_BASELINE = 0.10
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Window:
+    """The ISIs that enhance the MEP: disjoint segments and their hull.
+
+    Args:
+        start_ms: first enhancing ISI [ms].
+        end_ms: last enhancing ISI [ms].
+        segments: disjoint intervals (start, end) [ms] in ascending order; one by default.
+
+    Raises:
+        InvalidValueError: values that are not finite, an end before a start, or segments that overlap or miss the hull.
+    """
+
+    start_ms: float
+    end_ms: float
+    segments: tuple[Interval, ...] = ()
+
+    def __post_init__(self) -> None:
+        segments = tuple((float(a), float(b)) for a, b in self.segments) or (
+            (float(self.start_ms), float(self.end_ms)),
+        )
+        flat = [edge for segment in segments for edge in segment]
+        if not all(math.isfinite(edge) for edge in flat):
+            raise InvalidValueError("a window's edges must be finite", got=segments)
+        if any(b < a for a, b in segments) or any(
+            b >= a for (_, b), (a, _) in zip(segments, segments[1:], strict=False)
+        ):
+            raise InvalidValueError("a window's segments must ascend without overlap", got=segments)
+        if (self.start_ms, self.end_ms) != (flat[0], flat[-1]):
+            raise InvalidValueError(
+                "start and end are the hull of the segments", got=(self.start_ms, self.end_ms), expected=str(flat)
+            )
+        object.__setattr__(self, "segments", segments)
+        object.__setattr__(self, "start_ms", flat[0])
+        object.__setattr__(self, "end_ms", flat[-1])
+
+    @classmethod
+    def from_mask(cls, grid_ms: ArrayLike, mask: ArrayLike) -> Window | None:
+        """The window of the marked grid points, or None where none is marked.
+
+        Args:
+            grid_ms: ascending ISIs [ms], shape (t,).
+            mask: which of them enhance the MEP, shape (t,).
+        """
+        grid, inside = np.asarray(grid_ms, dtype=float), np.asarray(mask, dtype=bool)
+        if not inside.any():
+            return None
+        steps = np.flatnonzero(np.diff(np.concatenate(([False], inside, [False])).astype(int)))
+        segments = tuple((float(grid[a]), float(grid[b - 1])) for a, b in zip(steps[::2], steps[1::2], strict=True))
+        return cls(segments[0][0], segments[-1][1], segments)
+
+    @property
+    def width_ms(self) -> float:
+        """Width of the hull [ms]."""
+        return self.end_ms - self.start_ms
+
+    def mask(self, grid_ms: ArrayLike) -> BoolArray:
+        """Which of the grid points [ms] lie in the window, shape of `grid_ms`."""
+        grid = np.asarray(grid_ms, dtype=float)
+        inside = np.zeros(grid.shape, dtype=bool)
+        for start, end in self.segments:
+            inside |= (grid >= start - 1e-9) & (grid <= end + 1e-9)
+        return inside
+
+    def __str__(self) -> str:
+        return " and ".join(f"{a:g}–{b:g} ms" for a, b in self.segments)
+
+
+def window_from_excess(grid_ms: ArrayLike, excess_mv: ArrayLike, baseline_mv: float) -> Window | None:
+    """The window by the 0.135 rule, or None where nothing is enhanced.
+
+    Args:
+        grid_ms: ascending ISIs [ms], shape (t,).
+        excess_mv: expected MEP minus the unconditioned baseline [mV], shape (t,).
+        baseline_mv: expected MEP without a tap [mV].
+
+    Returns:
+        All grid points with at least 0.135 of the largest excess; None where the largest excess is below 10 % of the
+        baseline or 2 µV, whichever is more.
+    """
+    excess = np.asarray(excess_mv, dtype=float)
+    peak = float(excess.max())
+    if peak < max(MIN_EXCESS_OF_BASELINE * baseline_mv, MIN_EXCESS_MV):
+        return None
+    return Window.from_mask(grid_ms, excess >= EDGE_LEVEL * peak)
+
+
+class ProfileBand(NamedTuple):
+    """The expected MEP by ISI: median and a credible band [mV], each of shape (t,)."""
+
+    median_mv: FloatArray
+    low_mv: FloatArray
+    high_mv: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class WindowEstimate:
+    """What is believed about one person's window. What a non-Bayesian method does not have is None.
+
+    Args:
+        probability: probability that there is a window.
+        window: the reported decision; None where the probability is below one half.
+        start_ms: posterior median of the hull's start, given a window [ms]; -inf where it lies before the range.
+        end_ms: posterior median of the hull's end, given a window [ms]; +inf where it lies beyond the range.
+        grid_ms: the ISIs of `profile_quantiles_mv`, shape (t,).
+        edge_samples_ms: posterior samples of (start, end) given a window, ±inf beyond the range, shape (s, 2).
+        profile_quantiles_mv: the 0.05, 0.5 and 0.95 quantiles of the expected MEP by ISI [mV], shape (3, t).
+
+    Raises:
+        InvalidValueError: a probability outside 0–1, or a window reported against it.
+    """
+
+    probability: float | None
+    window: Window | None
+    start_ms: float | None = None
+    end_ms: float | None = None
+    grid_ms: FloatArray | None = field(default=None, repr=False)
+    edge_samples_ms: FloatArray | None = field(default=None, repr=False)
+    profile_quantiles_mv: FloatArray | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.probability is None:
+            return
+        if not 0.0 <= self.probability <= 1.0:
+            raise InvalidValueError("the probability of a window must lie in 0–1", got=self.probability)
+        if self.window is not None and self.probability < 0.5:
+            raise InvalidValueError("a window is reported although none is more probable", got=self.probability)
+
+    def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:
+        """Credible intervals of start and end, given that there is a window [ms].
+
+        Args:
+            level: the credible level, in 0–1.
+
+        Returns:
+            ((start low, start high), (end low, end high)), an edge beyond the range being ±inf; None where the method
+            has no posterior of the edges.
+
+        Raises:
+            InvalidValueError: a level outside 0–1.
+        """
+        if not 0.0 < level < 1.0:
+            raise InvalidValueError("a credible level must lie between 0 and 1", got=level)
+        if self.edge_samples_ms is None or not len(self.edge_samples_ms):
+            return None
+        tail = (1.0 - level) / 2.0
+        # An order statistic never averages a finite edge with an infinite one.
+        quantiles = np.quantile(self.edge_samples_ms, [tail, 1.0 - tail], axis=0, method="nearest")
+        (start_low, end_low), (start_high, end_high) = quantiles.tolist()
+        return (start_low, start_high), (end_low, end_high)
+
+    def profile(self, isi_ms: ArrayLike) -> ProfileBand | None:
+        """Median and 90 % band of the expected MEP at some ISIs.
+
+        Args:
+            isi_ms: ISIs [ms], shape (t,).
+
+        Returns:
+            The band [mV], or None where the method has none.
+        """
+        if self.grid_ms is None or self.profile_quantiles_mv is None:
+            return None
+        isi = np.atleast_1d(np.asarray(isi_ms, dtype=float))
+        low, median, high = (np.interp(isi, self.grid_ms, row) for row in self.profile_quantiles_mv)
+        return ProfileBand(median, low, high)
