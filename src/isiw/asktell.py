@@ -1,0 +1,163 @@
+"""The strategy: model, acquisition function, and stopping rule, as one ask/tell object that changes over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import torch
+
+from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError, StrategyError
+from isiw.models.protocol import Observation, Posterior, ResponseModel, Tensor
+from isiw.stopping import Progress, StopDecision, StoppingRule
+from isiw.window import WindowEstimate
+
+__all__ = ["Recipe", "Strategy", "candidate_isis"]
+
+MAX_CANDIDATES = 128
+
+
+def candidate_isis(space: DesignSpace, max_candidates: int = MAX_CANDIDATES) -> Tensor:
+    """Evenly spaced ISIs of the design grid to score [ms], both ends included, shape (t,).
+
+    Args:
+        space: the design space.
+        max_candidates: at most this many, so that the cost of an ask does not grow with the range.
+    """
+    grid = space.grid_ms
+    stride = max(1, math.ceil((len(grid) - 1) / (max_candidates - 1)))
+    picked = sorted({*range(0, len(grid), stride), len(grid) - 1})
+    return torch.as_tensor(grid[picked], dtype=torch.float32)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a named strategy was made, so that a log can make it again.
+
+    Args:
+        name: its name in the catalogue; empty for a strategy built from a user's own objects.
+        seed: the seed of all its randomness.
+        settings: the settings that differ from the named strategy's own, as TOML values.
+    """
+
+    name: str
+    seed: int
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Strategy:
+    """Proposes the next ISI and learns from each outcome. One of the two objects that change over time.
+
+    Args:
+        space: the ISIs that may be asked.
+        model: the model of the person's responses.
+        acquisition: the acquisition function that scores candidate ISIs.
+        stopping: the rule that says when to stop.
+        seed: seed of all randomness; the same seed and tells give the same asks.
+        recipe: how the catalogue made this strategy; None where it was built by hand.
+
+    Raises:
+        StrategyError: the model's posterior lacks a capability that the acquisition function needs.
+    """
+
+    def __init__(
+        self,
+        space: DesignSpace,
+        model: ResponseModel,
+        acquisition: AcquisitionFunction,
+        stopping: StoppingRule,
+        *,
+        seed: int = 0,
+        recipe: Recipe | None = None,
+    ) -> None:
+        self.space, self.model, self.acquisition, self.stopping = space, model, acquisition, stopping
+        self.recipe = recipe or Recipe(name="", seed=seed)
+        self._seed = seed
+        self._candidates = candidate_isis(space)
+        self._posterior: Posterior = model.prior(space, seed)
+        missing = [c.__name__ for c in acquisition.needs if not isinstance(self._posterior, c)]
+        if missing:
+            raise StrategyError(
+                f"{type(acquisition).__name__} cannot work with {type(model).__name__}",
+                got=f"a posterior without {', '.join(missing)}",
+                remedy="Choose another acquisition function, or a model whose posterior has the capability.",
+            )
+        self._told = 0
+        self._mistrials = 0
+        self._next_isi_ms: float | None = None
+        self._estimate: WindowEstimate | None = None
+
+    def restarted(self) -> Strategy:
+        """The same strategy before its first trial."""
+        return Strategy(self.space, self.model, self.acquisition, self.stopping, seed=self._seed, recipe=self.recipe)
+
+    @property
+    def posterior(self) -> Posterior:
+        """What is believed after the trials told so far."""
+        return self._posterior
+
+    def ask(self) -> float:
+        """The next ISI [ms], on the grid; the same until the next `tell`."""
+        if self._next_isi_ms is None:
+            scores = self.acquisition(self._posterior, self._candidates)
+            self._next_isi_ms = self.space.snap(float(self._candidates[best_candidate(scores)[0]]))
+        return self._next_isi_ms
+
+    def tell(
+        self,
+        isi_ms: float | None,
+        mep_mv: float | None = None,
+        *,
+        response: bool | None = None,
+        isi_sd_ms: float = 0.0,
+    ) -> None:
+        """Learn from one accepted trial.
+
+        Args:
+            isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone.
+            mep_mv: peak-to-peak amplitude [mV]; 0 is left-censored at the detection limit.
+            response: whether a response was seen, instead of an amplitude.
+            isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
+
+        Raises:
+            InvalidValueError: NaN, infinite or negative values, or not exactly one of `mep_mv` and `response`.
+            OutOfSpaceError: an ISI beyond the space and its tolerance.
+        """
+        if (mep_mv is None) == (response is None):
+            raise InvalidValueError("tell needs either mep_mv or response", got=(mep_mv, response))
+        if mep_mv is not None and not (math.isfinite(mep_mv) and mep_mv >= 0):
+            raise InvalidValueError(
+                "mep_mv must be a finite amplitude, not negative",
+                got=mep_mv,
+                remedy="Log a trial without a trustworthy amplitude as a mistrial instead of telling it.",
+            )
+        if not (math.isfinite(isi_sd_ms) and isi_sd_ms >= 0):
+            raise InvalidValueError("isi_sd_ms must be finite and not negative", got=isi_sd_ms)
+        isi = math.nan if isi_ms is None else self.space.check_realised(isi_ms)
+        observation = Observation(
+            isi_ms=torch.tensor([isi]),
+            mep_mv=torch.tensor([math.nan if mep_mv is None else mep_mv]),
+            isi_sd_ms=torch.tensor([isi_sd_ms]),
+            response=torch.tensor([math.nan if response is None else float(response)]),
+        )
+        self._posterior = self.model.update(self._posterior, observation)
+        self._told += 1
+        self._next_isi_ms = self._estimate = None
+
+    def count_mistrial(self) -> None:
+        """Count a delivered stimulus whose outcome is not told: it uses up budget and changes nothing else."""
+        self._mistrials += 1
+
+    def estimate(self) -> WindowEstimate:
+        """What is believed about the window now."""
+        if self._estimate is None:
+            self._estimate = self._posterior.estimate()
+        return self._estimate
+
+    def decision(self) -> StopDecision:
+        """Whether to stop now, and why."""
+        return self.stopping(Progress(self._told + self._mistrials, self._told, self.estimate()))

@@ -1,0 +1,141 @@
+"""When to stop: rules that look at the progress of a session and answer with a reason.
+
+A rule is a frozen settings object called with a `Progress`. Rules compose with `AnyOf`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from isiw.errors import InvalidValueError
+from isiw.window import WindowEstimate
+
+__all__ = ["AnyOf", "Budget", "CredibleWidth", "NoWindow", "Progress", "StopDecision", "StoppingRule"]
+
+
+@dataclass(frozen=True)
+class StopDecision:
+    """Whether to stop, and why. `reason` is a full sentence either way."""
+
+    stop: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a session has come.
+
+    Args:
+        delivered: stimuli delivered so far; mistrials count.
+        told: trials told so far.
+        estimate: what is believed about the window now.
+    """
+
+    delivered: int
+    told: int
+    estimate: WindowEstimate
+
+
+class StoppingRule(Protocol):
+    """A rule: from progress to a decision."""
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Stop when `max_trials` stimuli have been delivered; mistrials count."""
+
+    max_trials: int
+
+    def __post_init__(self) -> None:
+        if self.max_trials < 1:
+            raise InvalidValueError("max_trials must be at least 1", got=self.max_trials)
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        left = self.max_trials - progress.delivered
+        if left <= 0:
+            return StopDecision(stop=True, reason=f"The budget of {self.max_trials} stimuli is used up.")
+        return StopDecision(stop=False, reason=f"{left} stimuli are left.")
+
+
+@dataclass(frozen=True)
+class CredibleWidth:
+    """Stop when the credible intervals of both edges are narrow enough, and a window is likely.
+
+    Args:
+        width_ms: the largest acceptable width of each edge's interval [ms].
+        level: the credible level of the intervals.
+        min_probability: the least probability of a window.
+
+    Raises:
+        InvalidValueError: a width that is not positive, or a level or probability outside 0–1.
+    """
+
+    width_ms: float
+    level: float = 0.9
+    min_probability: float = 0.9
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.width_ms) and self.width_ms > 0):
+            raise InvalidValueError("width_ms must be positive", got=self.width_ms)
+        if not (0 < self.level < 1 and 0 <= self.min_probability <= 1):
+            raise InvalidValueError("levels and probabilities lie in 0–1", got=(self.level, self.min_probability))
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        intervals = progress.estimate.interval(self.level)
+        if intervals is None:
+            return StopDecision(stop=False, reason="The edges have no credible intervals.")
+        widths = [high - low if math.isfinite(high - low) else math.inf for low, high in intervals]
+        known = (progress.estimate.probability or 0.0) >= self.min_probability and max(widths) <= self.width_ms
+        spans = f"the {self.level:.0%} intervals of start and end span {widths[0]:.0f} and {widths[1]:.0f} ms"
+        if known:
+            return StopDecision(stop=True, reason=f"The window is known: {spans}.")
+        return StopDecision(stop=False, reason=f"The window is not known well enough yet: {spans}.")
+
+
+@dataclass(frozen=True)
+class NoWindow:
+    """Stop when it is all but certain that there is no window.
+
+    Args:
+        probability: the least probability of "no window" to stop at.
+
+    Raises:
+        InvalidValueError: a probability outside 0–1.
+    """
+
+    probability: float = 0.9
+
+    def __post_init__(self) -> None:
+        if not 0 < self.probability <= 1:
+            raise InvalidValueError("a probability lies in 0–1", got=self.probability)
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        if progress.estimate.probability is None:
+            return StopDecision(stop=False, reason="The probability of a window is not known.")
+        absent = 1.0 - progress.estimate.probability
+        if absent >= self.probability:
+            return StopDecision(stop=True, reason=f"There is no window, with probability {absent:.2f}.")
+        return StopDecision(stop=False, reason=f"No window has probability {absent:.2f}.")
+
+
+@dataclass(frozen=True)
+class AnyOf:
+    """Stop as soon as one of the rules says so; its reason is given."""
+
+    rules: tuple[StoppingRule, ...]
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        decisions = [rule(progress) for rule in self.rules]
+        for decision in decisions:
+            if decision.stop:
+                return decision
+        return StopDecision(stop=False, reason=" ".join(decision.reason for decision in decisions))
