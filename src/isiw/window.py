@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -46,9 +47,7 @@ class Window:
         flat = [edge for segment in segments for edge in segment]
         if not all(math.isfinite(edge) for edge in flat):
             raise InvalidValueError("a window's edges must be finite", got=segments)
-        if any(b < a for a, b in segments) or any(
-            b >= a for (_, b), (a, _) in zip(segments, segments[1:], strict=False)
-        ):
+        if any(b < a for a, b in segments) or any(b >= a for (_, b), (a, _) in itertools.pairwise(segments)):
             raise InvalidValueError("a window's segments must ascend without overlap", got=segments)
         if (self.start_ms, self.end_ms) != (flat[0], flat[-1]):
             raise InvalidValueError(

@@ -32,7 +32,7 @@ class AcquisitionFunction(Protocol):
 
 
 def best_candidate(scores: Tensor) -> Tensor:
-    """Index of the best candidate for each person, shape (b,); a tie goes to the first, a score that is not finite loses.
+    """Index of the best candidate for each person, shape (b,); a tie goes to the first, a score not finite loses.
 
     Args:
         scores: shape (b, t).
