@@ -1,0 +1,88 @@
+"""How good an estimate is: F1, edge errors, coverage, and trials to a lasting criterion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from isiw.design import DesignSpace
+from isiw.types import ArrayLike, FloatArray
+from isiw.window import Interval, Window, WindowEstimate
+
+__all__ = ["covers", "edge_error_ms", "f1", "f1_of_masks", "trials_to_lasting"]
+
+
+def f1_of_masks(estimated: ArrayLike, true: ArrayLike) -> FloatArray:
+    """F1 of an estimated against a true set of grid points; 1 if both are empty, 0 if one is.
+
+    Args:
+        estimated: membership of each grid point, shape (..., t).
+        true: membership of each grid point, shape (..., t), broadcast against `estimated`.
+
+    Returns:
+        F1, shape (...).
+    """
+    a, b = np.asarray(estimated, dtype=bool), np.asarray(true, dtype=bool)
+    size = a.sum(axis=-1) + b.sum(axis=-1)
+    return np.where(size == 0, 1.0, 2.0 * (a & b).sum(axis=-1) / np.maximum(size, 1))
+
+
+def f1(estimate: WindowEstimate | Window | None, truth: Window | None, space: DesignSpace) -> float:
+    """F1 of an estimated window against the truth on the space's grid.
+
+    Args:
+        estimate: the estimate, or the reported window; None is "there is no window".
+        truth: the true window; None where there is none.
+        space: the design space whose grid counts.
+    """
+    window = estimate.window if isinstance(estimate, WindowEstimate) else estimate
+    masks = [np.zeros(len(space.grid_ms), dtype=bool) if w is None else w.mask(space.grid_ms) for w in (window, truth)]
+    return float(f1_of_masks(*masks))
+
+
+def true_edges_ms(truth: Window, space: DesignSpace) -> Interval:
+    """Start and end of a true window [ms], ±inf where it runs out of the range."""
+    start = -math.inf if truth.start_ms <= space.low_ms else truth.start_ms
+    end = math.inf if truth.end_ms >= space.high_ms else truth.end_ms
+    return start, end
+
+
+def covers(estimate: WindowEstimate, truth: Window, space: DesignSpace, level: float = 0.9) -> tuple[bool, bool] | None:
+    """Whether the credible intervals of start and end hold the true edges; None where there are no intervals.
+
+    Args:
+        estimate: the estimate.
+        truth: the true window.
+        space: the design space; an edge at its border counts as beyond the range. The grid's resolution is granted.
+        level: the credible level.
+    """
+    intervals = estimate.interval(level)
+    if intervals is None:
+        return None
+    slack = 0.5 * space.step_ms
+    start, end = (
+        low - slack <= edge <= high + slack
+        for (low, high), edge in zip(intervals, true_edges_ms(truth, space), strict=True)
+    )
+    return start, end
+
+
+def edge_error_ms(estimate: WindowEstimate | Window | None, truth: Window | None) -> tuple[float, float] | None:
+    """Estimated minus true start and end [ms]; None where either has no window."""
+    window = estimate.window if isinstance(estimate, WindowEstimate) else estimate
+    if window is None or truth is None:
+        return None
+    return window.start_ms - truth.start_ms, window.end_ms - truth.end_ms
+
+
+def trials_to_lasting(mean_f1: ArrayLike, criterion: float) -> int | None:
+    """The first trial from which a cohort's mean F1 stays at or above a criterion; None where it never does.
+
+    Args:
+        mean_f1: mean F1 after 1, 2, … trials, shape (n,).
+        criterion: the least F1.
+    """
+    below = np.flatnonzero(np.asarray(mean_f1, dtype=float) < criterion)
+    first = 1 if len(below) == 0 else int(below[-1]) + 2
+    return first if first <= len(np.asarray(mean_f1)) else None

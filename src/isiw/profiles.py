@@ -1,0 +1,93 @@
+"""ISI–MEP response profiles: how strongly a tap facilitates, as a share of its best ISI.
+
+A profile is a value that maps ISIs counted from the impact to facilitation in 0–1. The families are those that have
+been seen or argued for: a Gaussian (dissertation, 4.2), skewed and flat-topped ones (8.1, appendix B), and two peaks
+(electrical conditioning has two facilitation windows).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from isiw.errors import InvalidValueError
+from isiw.types import ArrayLike, FloatArray
+
+__all__ = ["PeakProfile", "Profile", "TwoPeakProfile"]
+
+
+class Profile(Protocol):
+    """Facilitation by ISI."""
+
+    def __call__(self, isi_ms: ArrayLike) -> FloatArray:
+        """Facilitation in 0–1 at ISIs counted from the impact [ms], same shape."""
+
+
+def _require_span(start_ms: float, width_ms: float) -> None:
+    if not (math.isfinite(start_ms) and math.isfinite(width_ms) and width_ms > 0):
+        raise InvalidValueError("a profile needs a finite start and a positive width", got=(start_ms, width_ms))
+
+
+@dataclass(frozen=True)
+class PeakProfile:
+    """One peak whose flanks fall to exp(-2) at both ends of its span.
+
+    Args:
+        start_ms: where the rising flank has exp(-2) of the peak [ms from the impact].
+        width_ms: from there to the same level of the falling flank [ms].
+        peak_at: where the peak lies, as a share of the width; 0.5 is symmetric.
+        exponent: 2 is Gaussian (SD = width/4 if symmetric), more is flatter on top with steeper flanks.
+
+    Raises:
+        InvalidValueError: a span, peak or exponent that cannot be.
+    """
+
+    start_ms: float
+    width_ms: float
+    peak_at: float = 0.5
+    exponent: float = 2.0
+
+    def __post_init__(self) -> None:
+        _require_span(self.start_ms, self.width_ms)
+        if not (0 < self.peak_at < 1 and self.exponent > 0):
+            raise InvalidValueError("peak_at lies in 0–1, exponent above 0", got=(self.peak_at, self.exponent))
+
+    def __call__(self, isi_ms: ArrayLike) -> FloatArray:
+        """Facilitation in 0–1 at ISIs counted from the impact [ms], same shape."""
+        share = (np.asarray(isi_ms, dtype=np.float64) - self.start_ms) / self.width_ms - self.peak_at
+        flank = np.where(share < 0, self.peak_at, 1.0 - self.peak_at)
+        return np.asarray(np.exp(-2.0 * np.abs(share / flank) ** self.exponent))
+
+
+@dataclass(frozen=True)
+class TwoPeakProfile:
+    """Two Gaussians at 0.27 and 0.73 of the span, each with an SD of width/7.5.
+
+    Args:
+        start_ms: start of the span [ms from the impact].
+        width_ms: width of the span [ms].
+        first: height of the first peak.
+        second: height of the second peak; the higher of the two has 1.
+
+    Raises:
+        InvalidValueError: a span or heights that cannot be.
+    """
+
+    start_ms: float
+    width_ms: float
+    first: float
+    second: float
+
+    def __post_init__(self) -> None:
+        _require_span(self.start_ms, self.width_ms)
+        if not (min(self.first, self.second) >= 0 and max(self.first, self.second) == 1):
+            raise InvalidValueError("the higher peak has height 1", got=(self.first, self.second))
+
+    def __call__(self, isi_ms: ArrayLike) -> FloatArray:
+        """Facilitation in 0–1 at ISIs counted from the impact [ms], same shape."""
+        share = (np.asarray(isi_ms, dtype=np.float64) - self.start_ms) / self.width_ms
+        peaks = [np.exp(-0.5 * ((share - at) * 7.5) ** 2) for at in (0.27, 0.73)]
+        return np.asarray(self.first * peaks[0] + self.second * peaks[1])

@@ -1,0 +1,296 @@
+"""Simulated people: the cohorts on which strategies are compared, and the truth about each person.
+
+A `SimulatedSubject` never changes; `begin` gives a `Responder` that holds what has a memory within a session (drift,
+start-up, serial correlation). Person i of seed s is the same on every machine.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.profiles import PeakProfile, Profile, TwoPeakProfile
+from isiw.recruitment import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
+from isiw.types import FloatArray, Reference
+from isiw.window import Window, window_from_excess
+
+__all__ = ["COHORTS", "Drift", "Responder", "Response", "SimulatedSubject", "cohort"]
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How a person's log gain wanders: an AR(1) walk from zero, and the start-up of the first trials.
+
+    Args:
+        persistence: AR(1) coefficient from trial to trial.
+        innovation_sd: SD of each step, natural log.
+        startup: what the first trials have on top, natural log.
+    """
+
+    persistence: float = 0.97
+    innovation_sd: float = 0.12
+    startup: tuple[float, ...] = (0.29, 0.20)
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a stimulus came to.
+
+    Args:
+        isi_ms: the ISI as told [ms]: the realised one where it is known, else the commanded; None for TMS alone.
+        mep_mv: peak-to-peak amplitude of the MEP [mV].
+        isi_sd_ms: SD of the realised ISI about the told one [ms].
+    """
+
+    isi_ms: float | None
+    mep_mv: float
+    isi_sd_ms: float = 0.0
+
+
+@dataclass(frozen=True)
+class SimulatedSubject:
+    """One simulated person.
+
+    Args:
+        profile: facilitation by ISI from the impact.
+        response: from facilitation to the MEP.
+        hit_delay_ms: mean time from the valve command to the impact [ms].
+        hit_delay_sd_ms: its SD from trial to trial [ms].
+        drift: drift of the gain; None where there is none.
+        input_correlation: lag-1 correlation of the input noise.
+        outlier_probability: share of trials replaced by an artefact of 0.1–0.5 mV.
+        isi_jitter_ms: SD of the realised about the commanded ISI, beside the hit delay's [ms].
+        jitter_told: whether the jittered ISI is told, or the commanded one with its SD.
+        scale: factor on every amplitude.
+    """
+
+    profile: Profile
+    response: ResponseCurve
+    hit_delay_ms: float
+    hit_delay_sd_ms: float
+    drift: Drift | None = None
+    input_correlation: float = 0.0
+    outlier_probability: float = 0.0
+    isi_jitter_ms: float = 0.0
+    jitter_told: bool = True
+    scale: float = 1.0
+
+    def facilitation(self, isi_ms: FloatArray, reference: Reference) -> FloatArray:
+        """Facilitation in 0–1 at ISIs on a reference [ms], at the mean hit delay; same shape."""
+        return self.profile(isi_ms if reference == "impact" else isi_ms - self.hit_delay_ms)
+
+    def expected_mep_mv(self, space: DesignSpace) -> FloatArray:
+        """Expected MEP on the space's grid [mV], drift and start-up off, shape (t,)."""
+        evoked = self.response.expected_evoked_mv(self.facilitation(space.grid_ms, space.reference))
+        return self.scale * (evoked + self.response.floor.mean_mv)
+
+    @property
+    def baseline_mv(self) -> float:
+        """Expected MEP without a tap [mV]."""
+        return self.scale * float(self.response.expected_evoked_mv(0.0) + self.response.floor.mean_mv)
+
+    def window(self, space: DesignSpace) -> Window | None:
+        """The true window on the space's grid; None where there is none."""
+        return window_from_excess(space.grid_ms, self.expected_mep_mv(space) - self.baseline_mv, self.baseline_mv)
+
+    def begin(self, seed: int) -> Responder:
+        """A session with this person, its trial noise from this seed."""
+        return Responder(self, seed)
+
+
+class Responder:
+    """One session with a simulated person: answers stimuli, and drifts as it does.
+
+    Args:
+        subject: the person.
+        seed: seed of the session's trial noise.
+    """
+
+    def __init__(self, subject: SimulatedSubject, seed: int) -> None:
+        self.subject = subject
+        self._rng = np.random.default_rng(seed)
+        self._trials = 0
+        self._input_z = self._rng.standard_normal()
+        self._walk = 0.0
+
+    def respond(self, isi_ms: float | None, reference: Reference) -> Response:
+        """Answer one pair of stimuli.
+
+        Args:
+            isi_ms: the commanded ISI on the reference [ms]; None for TMS alone.
+            reference: the event that the ISI counts from. From the valve command the hit delay's variation stays
+                unseen; from the impact it moves the realised ISI, which is told.
+        """
+        noise = self._next_noise()
+        told_ms, facilitation = (None, 0.0) if isi_ms is None else self._stimulate(isi_ms, reference)
+        subject, rng = self.subject, self._rng
+        floor_mv = subject.response.floor.median_mv * np.exp(subject.response.floor.log_sd * rng.standard_normal())
+        mep_mv = subject.response.sample_evoked_mv(facilitation, noise, rng) + floor_mv
+        if rng.random() < subject.outlier_probability:
+            mep_mv = rng.uniform(0.1, 0.5)
+        unseen_ms = 0.0 if subject.jitter_told or isi_ms is None else subject.isi_jitter_ms
+        return Response(told_ms, float(subject.scale * mep_mv), unseen_ms)
+
+    def _stimulate(self, isi_ms: float, reference: Reference) -> tuple[float, float]:
+        subject, rng = self.subject, self._rng
+        late_ms = subject.hit_delay_sd_ms * rng.standard_normal()
+        realised_ms = isi_ms + subject.isi_jitter_ms * rng.standard_normal()
+        told_ms = realised_ms if subject.jitter_told else isi_ms
+        from_impact_ms = realised_ms - late_ms
+        if reference == "valve":
+            return told_ms, float(subject.profile(from_impact_ms - subject.hit_delay_ms))
+        return told_ms - late_ms, float(subject.profile(from_impact_ms))
+
+    def _next_noise(self) -> TrialNoise:
+        subject, rng = self.subject, self._rng
+        correlation = subject.input_correlation
+        self._input_z = correlation * self._input_z + np.sqrt(1 - correlation**2) * rng.standard_normal()
+        log_gain = 0.0
+        if subject.drift is not None:
+            self._walk = subject.drift.persistence * self._walk + subject.drift.innovation_sd * rng.standard_normal()
+            startup = subject.drift.startup
+            log_gain = self._walk + (startup[self._trials] if self._trials < len(startup) else 0.0)
+        self._trials += 1
+        return TrialNoise(float(self._input_z), float(log_gain))
+
+
+_WIDTHS_KIM_MS: Final = (75, 65, 80, 70, 110, 120, 220, 145, 135, 110, 60)
+"""Window widths of the dissertation's eleven subjects [ms] (Table 4.1)."""
+
+
+_Shape = Callable[[np.random.Generator, float, float], Profile]
+
+
+def _gaussian(_rng: np.random.Generator, start_ms: float, width_ms: float) -> Profile:
+    return PeakProfile(start_ms, width_ms)
+
+
+def _skewed(rng: np.random.Generator, start_ms: float, width_ms: float) -> Profile:
+    early = float(rng.uniform(0.22, 0.40))
+    return PeakProfile(start_ms, width_ms, peak_at=early if rng.random() < 0.5 else 1.0 - early)
+
+
+def _plateau(rng: np.random.Generator, start_ms: float, width_ms: float) -> Profile:
+    return PeakProfile(start_ms, width_ms, exponent=float(rng.uniform(4, 8)))
+
+
+def _two_peak(rng: np.random.Generator, start_ms: float, width_ms: float) -> Profile:
+    lower = float(rng.uniform(0.4, 1.0))
+    heights = (1.0, lower) if rng.random() < 0.5 else (lower, 1.0)
+    return TwoPeakProfile(start_ms, width_ms, *heights)
+
+
+def _log_normal(rng: np.random.Generator, median: float, log_sd: float) -> float:
+    return float(median * np.exp(log_sd * rng.standard_normal()))
+
+
+def _span(rng: np.random.Generator, width_ms: tuple[float, float] | None = None) -> tuple[float, float]:
+    start_ms, usual_ms = float(rng.uniform(5, 110)), float(np.clip(_log_normal(rng, 100, 0.42), 40, 230))
+    return start_ms, usual_ms if width_ms is None else float(rng.uniform(*width_ms))
+
+
+def _gain(rng: np.random.Generator) -> GainResponse:
+    floor = EmgFloor(_log_normal(rng, 0.008, 0.3), 0.35)
+    return GainResponse(floor, _log_normal(rng, 0.06, 0.5), float(rng.uniform(0.4, 0.9)))
+
+
+def _recruitment(rng: np.random.Generator, boost_pct_rmt: tuple[float, float] = (6, 18)) -> RecruitmentResponse:
+    floor = EmgFloor(_log_normal(rng, 0.010, 0.25), float(rng.uniform(0.12, 0.25)))
+    return RecruitmentResponse(
+        floor,
+        amplitude_mv=_log_normal(rng, 0.16, 0.35),
+        slope_per_pct=0.30,
+        x50_pct_rmt=float(rng.uniform(103, 107)),
+        boost_pct_rmt=float(rng.uniform(*boost_pct_rmt)),
+        sigma_x_pct_rmt=float(rng.uniform(5, 9)),
+        sigma_y=float(rng.uniform(0.3, 0.5)),
+    )
+
+
+def _subject(rng: np.random.Generator, profile: Profile, response: ResponseCurve) -> SimulatedSubject:
+    return SimulatedSubject(profile, response, float(rng.uniform(170, 190)), float(rng.uniform(1, 4)))
+
+
+def _gain_subject(
+    rng: np.random.Generator, width_ms: tuple[float, float] | None = None, shape: _Shape = _gaussian
+) -> SimulatedSubject:
+    start_ms, width = _span(rng, width_ms)
+    return _subject(rng, shape(rng, start_ms, width), _gain(rng))
+
+
+def _low_response_subject(rng: np.random.Generator) -> SimulatedSubject:
+    profile = PeakProfile(*_span(rng))
+    return _subject(rng, profile, replace(_gain(rng), max_response_probability=float(rng.uniform(0.4, 0.7))))
+
+
+def _jitter_subject(rng: np.random.Generator, *, told: bool) -> SimulatedSubject:
+    return replace(_gain_subject(rng), isi_jitter_ms=float(rng.uniform(1, 5)), jitter_told=told)
+
+
+def _recruitment_subject(rng: np.random.Generator) -> SimulatedSubject:
+    subject = _subject(rng, PeakProfile(*_span(rng)), _recruitment(rng))
+    return replace(subject, input_correlation=float(rng.uniform(0, 0.2)))
+
+
+def _nonresponder(rng: np.random.Generator, *, kind: bool) -> SimulatedSubject:
+    profile = PeakProfile(*_span(rng))
+    if kind:
+        return _subject(rng, profile, replace(_gain(rng), gain_mv=0.0))
+    subject = _subject(rng, profile, replace(_recruitment(rng), boost_pct_rmt=0.0))
+    return replace(subject, input_correlation=float(rng.uniform(0, 0.2)))
+
+
+def _kim_subject(index: int) -> SimulatedSubject:
+    rng = np.random.default_rng([zlib.crc32(b"kim11"), 4, index])
+    profile = PeakProfile(float(rng.uniform(20, 100)), _WIDTHS_KIM_MS[index])
+    subject = _subject(rng, profile, _recruitment(rng, boost_pct_rmt=(6, 14)))
+    return replace(subject, input_correlation=float(rng.uniform(0, 0.2)))
+
+
+_DRAW: Final[dict[str, Callable[[np.random.Generator], SimulatedSubject]]] = {
+    "gaussian": _gain_subject,
+    "skewed": partial(_gain_subject, shape=_skewed),
+    "plateau": partial(_gain_subject, shape=_plateau),
+    "two-peak": partial(_gain_subject, shape=_two_peak),
+    "narrow": partial(_gain_subject, width_ms=(35, 50)),
+    "wide": partial(_gain_subject, width_ms=(180, 230)),
+    "low-response": _low_response_subject,
+    "outliers": lambda rng: replace(_gain_subject(rng), outlier_probability=0.06),
+    "drift": lambda rng: replace(_gain_subject(rng), drift=Drift()),
+    "jitter": partial(_jitter_subject, told=True),
+    "jitter-untold": partial(_jitter_subject, told=False),
+    "recruitment": _recruitment_subject,
+}
+
+COHORTS: Final = (*_DRAW, "nonresponder", "kim11")
+"""The names that `cohort` knows."""
+
+
+def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
+    """The first n people of a cohort.
+
+    Args:
+        name: one of `COHORTS`.
+        n: how many people. `kim11` has eleven, and cycles: its sessions differ in trial noise only.
+        seed: seed of the people; 0–999 are for work, reported figures use 10,000 and above.
+
+    Raises:
+        InvalidValueError: an unknown name, or a negative number.
+    """
+    if name not in COHORTS:
+        raise InvalidValueError("unknown cohort", got=name, expected=", ".join(COHORTS))
+    if n < 0 or seed < 0:
+        raise InvalidValueError("n and seed must not be negative", got=(n, seed))
+    if name == "kim11":
+        return [_kim_subject(i % len(_WIDTHS_KIM_MS)) for i in range(n)]
+    generators = [np.random.default_rng([zlib.crc32(name.encode()), seed, i]) for i in range(n)]
+    if name == "nonresponder":
+        return [_nonresponder(rng, kind=i % 2 == 0) for i, rng in enumerate(generators)]
+    return [_DRAW[name](rng) for rng in generators]
