@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import gamma, norm
+
 from isiw.design import DesignSpace
 from isiw.profiles import PeakProfile
 from isiw.recruitment import GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.subjects import SimulatedSubject
 from isiw.types import FloatArray
 from isiw.window import EDGE_LEVEL, Window
-from scipy.stats import gamma, norm
 
 LEVELS = np.linspace(0.0, 1.0, 61) ** 2
 STARTS_MS = np.arange(5.0, 110.1, 3.0)
