@@ -79,7 +79,7 @@ class Prior:
         rest: mean and SD of the drive at rest in logits: k (90 % RMT − x50).
     """
 
-    p_window: float = 0.85
+    p_window: float = 0.8
     p_shape: tuple[float, float, float, float] = (0.5, 0.2, 0.12, 0.18)
     p_noise: tuple[float, float, float] = (0.4, 0.15, 0.45)
     start_ms: tuple[float, float] = (0.0, 125.0)
