@@ -10,11 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from scipy.stats import gamma, norm
 
 from isiw.design import DesignSpace
 from isiw.profiles import PeakProfile
 from isiw.recruitment import GainResponse, RecruitmentResponse, ResponseCurve
+from isiw.studies import SimulatedSession, play
 from isiw.subjects import SimulatedSubject
 from isiw.types import FloatArray
 from isiw.window import EDGE_LEVEL, Window
@@ -64,6 +66,10 @@ def _prior(starts_ms: FloatArray, widths_ms: FloatArray) -> FloatArray:
     return (density * ((starts_ms >= 5) & (starts_ms <= 110))) / np.sum(density)
 
 
+ORACLE_COHORTS = ("gaussian", "narrow", "wide", "low-response", "outliers", "drift", "jitter", "recruitment", "kim11")
+"""Cohorts whose profile's family the oracle knows: one symmetric peak."""
+
+
 @dataclass
 class Oracle:
     """One session of the oracle with one person.
@@ -108,13 +114,16 @@ class Oracle:
         gain = -(mixture * np.log(mixture)).sum(1) - shares @ entropy
         return float(self.candidates_ms[gain.argmax()])
 
-    def tell(self, isi_ms: float, mep_mv: float) -> None:
-        """Learn from one trial."""
+    def tell(self, isi_ms: float | None, mep_mv: float | None = None, *, isi_sd_ms: float = 0.0) -> None:
+        """Learn from one trial; the SD of the ISI is not used."""
+        del isi_sd_ms
+        if isi_ms is None or mep_mv is None:
+            raise ValueError("the oracle is told amplitudes at ISIs only")
         outcome = np.searchsorted(self._edges_mv, mep_mv / self.subject.scale)
         self._log_weights += np.log(self._mass[self._levels(np.array([isi_ms]))[:, 0], outcome])
         self._log_weights -= np.logaddexp.reduce(self._log_weights)
 
-    def window(self) -> Window | None:
+    def estimate(self) -> Window | None:
         """The window of largest posterior expected F1 among the level sets of the posterior's membership."""
         weights = np.exp(self._log_weights)
         membership = weights @ self._masks
@@ -124,3 +133,8 @@ class Oracle:
         sizes = candidates.sum(1)[:, None] + self._masks.sum(1)
         expected = (2 * overlap / np.maximum(sizes, 1)) @ weights
         return Window.from_mask(self.space.grid_ms, candidates[expected.argmax()])
+
+
+def simulate_oracle(session: SimulatedSession) -> pd.DataFrame:
+    """Run one session of a study with the oracle."""
+    return play(session, Oracle(session.subject(), session.space))
