@@ -2,37 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from isiw.design import DesignSpace
 from isiw.signals.mep import background_rms_uv, mep_amplitude
-from isiw.trials import MistrialReason, Stimulus, Sweep
-from isiw.types import Reference
+from isiw.trials import MistrialReason, Status, Stimulus, Sweep
 
-__all__ = ["Judged", "QualitySettings", "judge"]
+__all__ = ["Judged", "SignalLimits", "judge"]
 
 
 @dataclass(frozen=True)
-class QualitySettings:
-    """What makes a trial trustworthy.
+class SignalLimits:
+    """What a sweep must keep to be accepted.
 
     Args:
-        reference: the event that ISIs count from.
-        max_background_rms_uv: largest background EMG [µV RMS].
-        mep_window_ms: where the MEP is looked for, from the pulse [ms].
+        mep_window_ms: where the MEP is sought [ms after the pulse].
+        background_uv: the most EMG at rest before the pulse [µV RMS].
     """
 
-    reference: Reference = "impact"
-    max_background_rms_uv: float = 10.0
     mep_window_ms: tuple[float, float] = (15.0, 35.0)
+    background_uv: float = 10.0
 
 
 @dataclass(frozen=True)
 class Judged:
-    """What a sweep came to. `reason` is None where the trial is accepted."""
+    """What a sweep came to: accepted, or a mistrial with its reason. All times are on the sweep's clock."""
 
-    reason: MistrialReason | None
+    status: Status = Status.ACCEPTED
+    reason: MistrialReason | None = None
     isi_ms: float | None = None
     isi_sd_ms: float = 0.0
     mep_mv: float | None = None
@@ -41,32 +40,37 @@ class Judged:
     t_hit_ms: float | None = None
     t_tms_ms: float | None = None
 
-    @property
-    def accepted(self) -> bool:
-        """Whether the trial may be told."""
-        return self.reason is None
 
-
-def judge(sweep: Sweep, stimulus: Stimulus, settings: QualitySettings) -> Judged:
+def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Judged:
     """Judge one sweep.
 
     Args:
-        sweep: the recorded waveforms and times.
+        sweep: the recorded waveforms and what the device knows of their timing.
         stimulus: what was commanded.
-        settings: what makes a trial trustworthy.
+        space: says which event the ISI counts from, and how far it may be off.
+        limits: what the sweep must keep.
     """
+    limits = limits or SignalLimits()
     emg, t_tms_ms = sweep.channels.get("emg"), sweep.t_tms_ms
-    if t_tms_ms is None:
-        return Judged(MistrialReason.NO_PULSE, t_valve_ms=sweep.t_valve_ms, t_hit_ms=sweep.t_hit_ms)
-    first_ms = sweep.t_hit_ms if settings.reference == "impact" else sweep.t_valve_ms
-    times = {"t_valve_ms": sweep.t_valve_ms, "t_hit_ms": sweep.t_hit_ms, "t_tms_ms": t_tms_ms}
-    if stimulus.isi_ms is not None and first_ms is None:
-        return Judged(MistrialReason.NO_IMPACT, **times)
-    isi_ms = None if stimulus.isi_ms is None or first_ms is None else t_tms_ms - first_ms
+    first_ms = sweep.t_hit_ms if space.reference == "impact" else sweep.t_valve_ms
+    timed = Judged(t_valve_ms=sweep.t_valve_ms, t_hit_ms=sweep.t_hit_ms, t_tms_ms=t_tms_ms)
     if emg is None or not np.isfinite(emg.values).all() or np.ptp(emg.values) == 0:
-        return Judged(MistrialReason.MISSING_CHANNEL, isi_ms, sweep.isi_sd_ms, **times)
-    from_first_sample_ms = t_tms_ms - emg.t0_ms
-    background = float(background_rms_uv(emg.values, emg.rate_hz, from_first_sample_ms))
-    mep_mv = float(mep_amplitude(emg.values, emg.rate_hz, from_first_sample_ms, settings.mep_window_ms))
-    reason = MistrialReason.BACKGROUND_ACTIVITY if background > settings.max_background_rms_uv else None
-    return Judged(reason, isi_ms, sweep.isi_sd_ms, mep_mv, background, **times)
+        return _mistrial(timed, MistrialReason.MISSING_CHANNEL)
+    if t_tms_ms is None:
+        return _mistrial(timed, MistrialReason.NO_PULSE)
+    if stimulus.isi_ms is not None:
+        if first_ms is None:
+            return _mistrial(timed, MistrialReason.NO_IMPACT)
+        timed = replace(timed, isi_ms=t_tms_ms - first_ms, isi_sd_ms=sweep.isi_sd_ms)
+        if abs(t_tms_ms - first_ms - stimulus.isi_ms) > space.tolerance_ms:
+            return _mistrial(timed, MistrialReason.ISI_OFF)
+    background = float(background_rms_uv(emg.values, emg.rate_hz, t_tms_ms - emg.t0_ms))
+    timed = replace(timed, background_rms_uv=background)
+    if background > limits.background_uv:
+        return _mistrial(timed, MistrialReason.BACKGROUND_ACTIVITY)
+    mep_mv = mep_amplitude(emg.values, emg.rate_hz, t_tms_ms - emg.t0_ms, limits.mep_window_ms)
+    return replace(timed, mep_mv=float(mep_mv))
+
+
+def _mistrial(judged: Judged, reason: MistrialReason) -> Judged:
+    return replace(judged, status=Status.MISTRIAL, reason=reason)
