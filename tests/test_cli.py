@@ -98,7 +98,8 @@ def test_show_lists_trials_and_repeats_the_statement(isiw, log):
 
 def test_show_of_a_damaged_log_says_what_was_lost_and_exits_3(isiw, log):
     whole = bytearray(log.read_bytes())
-    whole[whole.rfind(b"\x04\x00\x00\x00zstd") + 60] ^= 0xFF
+    blocks = [at for at in range(len(whole)) if whole.startswith(b"\x04\x00\x00\x00zstd", at)]
+    whole[blocks[4] + 60] ^= 0xFF
     log.write_bytes(whole)
     result = isiw("show", log)
     assert result.exit_code == 3

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from isiw.catalogue import StrategySettings
 from isiw.config import (
     RunConfig,
     config_of_log,
@@ -40,7 +41,7 @@ def test_a_file_changes_what_it_names(config_file):
     config = load_config(config_file('seed = 7\n[subject]\ncohort = "gaussian"\n[strategy.settings]\nmax_trials = 4\n'))
     assert config.seed == 7
     assert config.subject.cohort == "gaussian"
-    assert config.strategy.settings == {"max_trials": 4}
+    assert config.strategy.settings == StrategySettings(max_trials=4)
     assert config.limits == RunConfig().limits
 
 
@@ -50,6 +51,8 @@ def test_a_file_changes_what_it_names(config_file):
         ("sead = 7", ["session.toml", "sead", "7", "Did you mean seed?"]),
         ("[subject]\ncohrt = 'x'", ["subject.cohrt", "'x'", "Did you mean cohort?", "cohort, data, kind, number"]),
         ("seed = 'many'", ["value of seed", "'many'", "integer"]),
+        ("[strategy.settings]\nmax_trails = 9", ["strategy.settings.max_trails", "Did you mean max_trials?"]),
+        ("[strategy.settings]\nmax_trials = 'all'", ["strategy.settings.max_trials", "'all'", "integer"]),
         ("seed = -1", ["value of seed", "-1"]),
         ("[limits]\nmin_iti_s = nan", ["limits.min_iti_s", "nan"]),
         ("[subject]\nkind = 'real'", ["subject.kind", "'real'", "'simulated' or 'recorded'"]),

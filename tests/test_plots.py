@@ -65,12 +65,12 @@ def test_edges_beyond_the_range_are_drawn_at_its_border(record):
 
 def test_a_session_without_a_window_is_drawn(record):
     entries = [e.model_copy(update={"segments_ms": ()}) if hasattr(e, "segments_ms") else e for e in record.history]
-    none = type(record)(record.path, record.header, tuple(entries), {}, (), True)  # noqa: FBT003
+    none = type(record)(record.path, record.header, tuple(entries), {}, (), True)
     profile = session_figure(none).axes[0]
     assert profile.get_title(loc="left").startswith("No window")
     assert "window" not in labels(profile)
 
 
 def test_a_session_without_trials_is_drawn(record, tmp_path):
-    empty = type(record)(record.path, record.header, (), {}, (), False)  # noqa: FBT003
+    empty = type(record)(record.path, record.header, (), {}, (), False)
     assert save_session_plot(empty, tmp_path / "empty.png").stat().st_size > 1000

@@ -24,7 +24,7 @@ def record(tmp_path, scripted_strategy, scripted_device):
 def with_estimate(record, **changes):
     entries = list(record.history)
     entries[-1] = entries[-1].model_copy(update=changes)
-    return type(record)(record.path, record.header, tuple(entries), {}, (), True)  # noqa: FBT003
+    return type(record)(record.path, record.header, tuple(entries), {}, (), True)
 
 
 def test_the_statement_has_window_intervals_counts_and_reason(record):
@@ -71,7 +71,7 @@ def test_an_exclusion_after_the_estimate_is_said(record):
 
 
 def test_without_a_trial_there_is_nothing_to_say(record):
-    empty = type(record)(record.path, record.header, (), {}, (), False)  # noqa: FBT003
+    empty = type(record)(record.path, record.header, (), {}, (), False)
     assert final_statement(empty) == "No trial has been completed."
 
 

@@ -129,6 +129,10 @@ class DurableFile:
 
     def close(self) -> None:
         """Make everything durable and close."""
-        if not self._file.closed:
+        if self._file.closed:
+            return
+        try:
             self.sync()
-            self._file.close()
+        finally:
+            with _disk_errors(self.path):
+                self._file.close()

@@ -136,8 +136,10 @@ class LogWriter:
         Raises:
             LogError: somebody has put a file there meanwhile; the log stays `FILE.part`.
         """
-        self._writer.finish()
-        self._file.close()
+        try:
+            self._writer.finish()
+        finally:
+            self._file.close()
         if self.path.exists() and not self._replaces:
             raise LogError(
                 "another file has taken the log's place",
