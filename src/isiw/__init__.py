@@ -21,6 +21,7 @@ _HOME = {
     "ReplayDevice": "devices.replay",
     "Session": "session",
     "SimulatedDevice": "devices.simulated",
+    "StopDecision": "stopping",
     "VALVE_SPACE": "design",
     "Window": "window",
     "WindowEstimate": "window",
@@ -36,7 +37,7 @@ _HOME = {
     "read_session": "log.reader",
     "resume": "resumption",
 }
-_MODULES = {"config", "errors", "metrics", "plots", "report", "signals", "subjects"}
+_MODULES = {"config", "errors", "metrics", "plots", "report", "signals", "subjects", "testing"}
 
 __all__ = ["__version__", *sorted(_HOME), *sorted(_MODULES)]  # noqa: PLE0604 - the names are strings, listed above
 
