@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 from typer.testing import CliRunner
@@ -121,7 +120,7 @@ def test_plot_draws_into_the_file(isiw, log, tmp_path):
 def test_exclude_appends_and_resume_learns_without_it(isiw, log):
     assert isiw("exclude", log, 1, "--reason", "sneezed").exit_code == 0
     shown = isiw("show", log).output
-    assert "exclusion, trial 1: sneezed" in shown
+    assert "exclusion (trial 1): sneezed" in shown
     assert "(excluded)" in shown
     result = isiw("resume", log)
     assert result.exit_code == 0, result.output
@@ -180,10 +179,9 @@ def test_a_killed_run_is_resumed_to_where_it_would_have_come(tmp_path, isiw):
 def test_help_and_import_load_no_torch_and_are_fast():
     check = "import sys, isiw.cli; assert not {'torch', 'matplotlib', 'pandas', 'pydantic'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", check], check=True)  # noqa: S603
-    times_s = []
-    for _ in range(3):
-        begin_s = time.perf_counter()
-        done = subprocess.run([*COMMAND, "--help"], check=True, capture_output=True, text=True)  # noqa: S603
-        times_s.append(time.perf_counter() - begin_s)
-        assert "resume" in done.stdout
-    assert min(times_s) < 0.5
+    begin = os.times()
+    done = subprocess.run([*COMMAND, "--help"], check=True, capture_output=True, text=True)  # noqa: S603
+    end = os.times()
+    assert "resume" in done.stdout
+    # Time on the processor, which does not depend on what else the machine is doing.
+    assert (end.children_user - begin.children_user) + (end.children_system - begin.children_system) < 0.5

@@ -119,7 +119,9 @@ def test_the_limit_of_pulses_ends_the_session_and_is_logged(scripted_strategy, s
     result = Session(scripted_device(), scripted_strategy(9), log=log, limits=limits).run()
     assert len(result.trials) == 3
     assert result.decision.reason == "The limit of 3 pulses is reached."
-    assert [event.kind for event in read_session(log).events] == ["limit"]
+    record = read_session(log)
+    assert [event.kind for event in record.events] == ["limit"]
+    assert record.decision == result.decision
 
 
 def test_an_isi_beyond_the_limits_is_never_delivered(scripted_strategy, scripted_device, log):
@@ -167,7 +169,7 @@ def test_a_device_that_fails_leaves_an_intact_log_and_is_stopped(scripted_strate
     assert [trial.status for trial in record.table] == [Status.ACCEPTED, Status.ACCEPTED, Status.MISTRIAL]
     assert record.table[2].reason is MistrialReason.OUTCOME_UNKNOWN
     assert record.table[2].commanded_isi_ms == device.delivered[2].isi_ms
-    assert record.events[-1].kind == "fault"
+    assert (record.events[-1].kind, record.events[-1].trial) == ("fault", 2)
     assert device.calls == ["stage", "stop", "unstage"]
     assert len(session.strategy.posterior.told) == 2
 

@@ -28,7 +28,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-_WIDTHS = (6, 9, 30, 10, 16, 10, 10, 5)
+_WIDTHS = (5, 7, 30, 9, 14, 8, 8, 4)
 _NO_DEFAULT = {"show_default": False}
 
 Log = Annotated[Path, typer.Argument(help="A session's log.", **_NO_DEFAULT)]
@@ -74,7 +74,7 @@ def show(log: Log) -> None:
         for row in (isiw.report.TRIAL_HEADINGS, *isiw.report.trial_rows(record)):
             _print_row(row)
         for event in record.events:
-            _print(f"{event.kind}, trial {event.trial}: {event.text}")
+            _print(f"{event.kind} (trial {event.trial}): {event.text}")
         _print(isiw.report.final_statement(record), style="bold")
         _exit_if_damaged(record.losses)
 
@@ -126,7 +126,7 @@ def _show_progress(update: SessionUpdate) -> None:
 
 
 def _print_row(cells: Sequence[str]) -> None:
-    _print("".join(cell.ljust(width) for cell, width in zip(cells, _WIDTHS, strict=False)).rstrip())
+    _print("  ".join(cell.ljust(width) for cell, width in zip(cells, _WIDTHS, strict=False)).rstrip())
 
 
 def _print(text: str, *, style: str | None = None, stderr: bool = False) -> None:

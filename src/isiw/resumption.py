@@ -67,7 +67,8 @@ def resume(
         signals=header.signals,
         config=header.config,
     )
-    event = Event(kind="resume", trial=len(replayed.trials), text=_resumption_text(record, replayed))
+    last = len(replayed.trials) - 1 if replayed.trials else None
+    event = Event(kind="resume", trial=last, text=_resumption_text(record, replayed))
     session.continue_from(
         replayed.trials, lambda: LogWriter.continuing(path, salvaged, header), (*replayed.unknown, event)
     )

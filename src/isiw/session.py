@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import isiw
 from isiw.asktell import Strategy
 from isiw.design import DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
@@ -129,7 +130,7 @@ class Session:
         self._on_trial, self._timeout_s = on_trial, timeout_s
         recipe = strategy.recipe
         self._header = Header(
-            isiw_version=importlib.metadata.version("isiw"),
+            isiw_version=isiw.__version__,
             created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
             subject=subject,
             seed=recipe.seed,
@@ -195,17 +196,24 @@ class Session:
 
     def _log_failure(self, error: BaseException) -> None:
         kind: EventKind = "limit" if isinstance(error, LimitExceededError) else "fault"
-        text = "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else ""
-        self._log.append(Event(kind=kind, trial=len(self.trials), text=text or f"{type(error).__name__}: {error}"))
+        interrupted = isinstance(error, KeyboardInterrupt)
+        self._log_event(kind, "Interrupted by the operator." if interrupted else f"{type(error).__name__}: {error}")
+
+    def _log_event(self, kind: EventKind, text: str) -> None:
+        self._log.append(Event(kind=kind, trial=len(self.trials) - 1 if self.trials else None, text=text))
 
     def _loop(self) -> StopDecision:
         decision = self.strategy.decision()
         while not decision.stop:
             if not self._device.pulses_left:
-                decision = StopDecision(stop=True, reason=f"The limit of {self._limits.max_pulses} pulses is reached.")
-                self._log.append(Event(kind="limit", trial=len(self.trials), text=decision.reason))
-                return decision
+                return self._stop_at_limit()
             decision = self._one_trial()
+        return decision
+
+    def _stop_at_limit(self) -> StopDecision:
+        decision = StopDecision(stop=True, reason=f"The limit of {self._limits.max_pulses} pulses is reached.")
+        self._log_event("limit", decision.reason)
+        self._log.append(Estimate.of(len(self.trials) - 1, self.strategy.estimate(), decision, None))
         return decision
 
     def _one_trial(self) -> StopDecision:

@@ -197,7 +197,7 @@ EventKind: TypeAlias = Literal["exclusion", "limit", "fault", "resume", "fallbac
 
 
 class Event(_Record):
-    """Something that happened to a session or to one of its trials."""
+    """Something that happened to a session; `trial` is the excluded trial, or else the last one before it."""
 
     kind: EventKind
     trial: int | None = None
