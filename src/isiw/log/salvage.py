@@ -1,0 +1,209 @@
+"""Salvage: everything that can still be read from a log, finished or torn or damaged, and in words what cannot."""
+
+from __future__ import annotations
+
+import io
+import re
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, cast
+
+import zstandard
+from mcap import records as mcap
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile, McapError
+from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+
+from isiw.errors import DamagedLogError, LogError
+from isiw.log.schema import TOPICS
+from isiw.log.storage import log_of, part_of
+
+__all__ = ["Message", "Salvage", "current_file", "salvage"]
+
+_UNREADABLE = (McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, MemoryError, OverflowError)
+"""What the MCAP reader raises on damaged bytes; a failed checksum is a ValueError."""
+
+_CHUNK_MARK = b"\x04\x00\x00\x00zstd"
+_CHUNK_MARK_AT = 8 + 8 + 8 + 4  # behind a chunk's two times, size and checksum
+
+_FOOTER_BYTES = 1 + 8 + 8 + 8 + 4
+_MAGIC = b"\x89MCAP0\r\n"
+
+
+@dataclass(frozen=True)
+class Message:
+    """One record, still as bytes.
+
+    Args:
+        topic: its topic.
+        data: its JSON.
+        log_time_ns: when it was logged [ns since 1970].
+        sequence: its number in the file, from 0.
+    """
+
+    topic: str
+    data: bytes
+    log_time_ns: int
+    sequence: int = 0
+
+
+@dataclass
+class Salvage:
+    """What was read.
+
+    Args:
+        path: the file that was read.
+        messages: the records, in the order in which they were written.
+        attachments: by name.
+        losses: what could not be read, a sentence each; empty where nothing is missing.
+        finished: whether the session closed its log.
+        topics: by channel number; known beforehand, in case the chunk that defines the channels is lost.
+    """
+
+    path: Path
+    messages: list[Message] = field(default_factory=list)
+    attachments: dict[str, bytes] = field(default_factory=dict)
+    losses: list[str] = field(default_factory=list)
+    finished: bool = False
+    topics: dict[int, str] = field(default_factory=lambda: dict(enumerate(TOPICS, start=1)))
+
+
+def current_file(path: str | Path) -> Path:
+    """The file that holds the most of a log: `FILE.part` where there is one, as it began as a copy of `FILE`.
+
+    Args:
+        path: the log, with or without `.part`.
+
+    Raises:
+        LogError: there is neither.
+    """
+    log = log_of(Path(path))
+    for candidate in (part_of(log), log):
+        if candidate.is_file():
+            return candidate
+    raise LogError("there is no such log", got=str(path), remedy="Check the path; isiw run prints it at its end.")
+
+
+def salvage(path: str | Path) -> Salvage:
+    """Read everything that can be read from a log.
+
+    Args:
+        path: the log, with or without `.part`.
+
+    Raises:
+        LogError: no such file, or not a log.
+        DamagedLogError: a log of which nothing can be read.
+    """
+    found = Salvage(current_file(path))
+    with found.path.open("rb") as file:
+        if not file.read(len(_MAGIC)):
+            raise DamagedLogError("the log is empty", got=str(found.path), remedy="No trial was recorded in it.")
+        file.seek(0)
+        size = found.path.stat().st_size
+        _read(file, size, found)
+        if found.finished:
+            _check_summary(file, found)
+    _report_gaps(found)
+    if not found.messages and not found.attachments:
+        raise DamagedLogError(
+            "nothing can be read from the log", got=str(found.path), remedy="Is it an isiw log (MCAP)?"
+        )
+    return found
+
+
+def _read(file: IO[bytes], size: int, found: Salvage) -> None:
+    """Read record after record; a chunk that fails is left out, and reading goes on behind it."""
+    reader = StreamReader(cast("IO[bytes]", _Exact(file)), emit_chunks=True, validate_crcs=True, record_size_limit=size)
+    readable_to, sealed = 0, False
+    try:
+        for record in reader.records:
+            if isinstance(record, mcap.Chunk):
+                _read_chunk(record, readable_to, found)
+            elif isinstance(record, mcap.Attachment):
+                found.attachments[record.name] = record.data
+            readable_to = file.tell()
+            sealed = sealed or isinstance(record, mcap.DataEnd)
+            found.finished = found.finished or isinstance(record, mcap.Footer)
+    except CRCValidationError:
+        found.finished = sealed = True
+        if not found.losses:
+            found.losses.append("The checksum of the whole file fails, though every record's own is good.")
+    except _UNREADABLE as error:
+        if isinstance(error, EndOfFile) and file.tell() == readable_to:
+            pass  # a session that never closed its log; nothing is torn
+        elif sealed:
+            found.losses.append("The index at the end of the file is damaged. No record is affected.")
+        else:
+            _search_chunks(file, found)
+            found.losses.insert(0, f"The log is torn or damaged at byte {readable_to} of {size}.")
+    if found.finished and not sealed:
+        found.losses.append("The mark behind the last record is damaged. No record is affected.")
+
+
+class _Exact:
+    """A file that raises where it ends too early; the reader would take half a record for a whole one."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+
+    def read(self, size: int) -> bytes:
+        data = self._file.read(size)
+        if len(data) < size:
+            raise EndOfFile
+        return data
+
+
+def _search_chunks(file: IO[bytes], found: Salvage) -> None:
+    """Read all chunks of a file in which the records' lengths can no longer be followed from one to the next."""
+    found.messages.clear()
+    found.losses.clear()
+    file.seek(0)
+    data = file.read()
+    for match in re.finditer(re.escape(_CHUNK_MARK), data):
+        start = max(0, match.start() - _CHUNK_MARK_AT)
+        try:
+            chunk = mcap.Chunk.read(ReadDataStream(cast("IO[bytes]", _Exact(io.BytesIO(data[start:])))))
+        except _UNREADABLE:
+            continue  # torn; the numbers of the records tell what it held
+        _read_chunk(chunk, start, found)
+
+
+def _read_chunk(chunk: mcap.Chunk, offset: int, found: Salvage) -> None:
+    try:
+        contents = list(breakup_chunk(chunk, validate_crc=True))
+    except _UNREADABLE:
+        found.losses.append(f"A block of {len(chunk.data)} bytes at byte {offset} fails its checksum and is lost.")
+        return
+    for record in contents:
+        if isinstance(record, mcap.Channel):
+            found.topics[record.id] = record.topic
+        elif isinstance(record, mcap.Message) and record.channel_id in found.topics:
+            found.messages.append(
+                Message(found.topics[record.channel_id], record.data, record.log_time, record.sequence)
+            )
+
+
+def _check_summary(file: IO[bytes], found: Salvage) -> None:
+    """The library leaves the summary's checksum unchecked; it holds no record, but damage is damage."""
+    file.seek(0)
+    data = file.read()
+    footer_at = len(data) - len(_MAGIC) - _FOOTER_BYTES
+    summary_at, _, checksum = struct.unpack("<QQI", data[footer_at + 9 : footer_at + _FOOTER_BYTES])
+    if zlib.crc32(data[summary_at : footer_at + _FOOTER_BYTES - 4]) != checksum:
+        found.losses.append("The index at the end of the file fails its checksum. No record is affected.")
+
+
+def _report_gaps(found: Salvage) -> None:
+    for first, last in _gaps(message.sequence for message in found.messages):
+        found.losses.append(f"Record {first} is lost." if first == last else f"Records {first} to {last} are lost.")
+
+
+def _gaps(sequence: Iterator[int]) -> Iterator[tuple[int, int]]:
+    expected = 0
+    for number in sequence:
+        if number > expected:
+            yield expected, number - 1
+        expected = number + 1
