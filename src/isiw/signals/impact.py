@@ -85,7 +85,8 @@ def _falls(above_rest: FloatArray, band: FloatArray, start: int) -> tuple[IntArr
 def _samples(waves: FloatArray, rows: IntArray, columns: IntArray, start: int, stop: int) -> FloatArray:
     """Samples from `start` to `stop` about each (row, column), shape (candidates, stop - start)."""
     about = np.clip(columns[:, None] + np.arange(start, stop), 0, waves.shape[-1] - 1)
-    return waves[rows[:, None], about]
+    samples: FloatArray = waves[rows[:, None], about]
+    return samples
 
 
 def _last_fall(fall: FloatArray) -> FloatArray:

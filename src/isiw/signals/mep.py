@@ -133,7 +133,8 @@ def mep_onsets(
     amplitude = mep_amplitudes(waves, rate_hz, pulse, window_ms)[:, None]
     sure = first_true(in_window & (deviation >= np.maximum(SURE_SHARE * amplitude, SURE_SD * noise)))
     onset = crossing_before(deviation, ONSET_SD * noise, sure)
-    return times[:, 0] - pulse + onset * 1000 / rate_hz
+    latency: FloatArray = times[:, 0] - pulse + onset * 1000 / rate_hz
+    return latency
 
 
 def mep_present(
@@ -175,7 +176,7 @@ def background_rms(
     """
     waves = as_waveforms(emg_mv, rate_hz, "EMG")
     rest = _quiet(waves, rate_hz, per_waveform(t_tms_ms, waves), per_waveform(t_hit_ms, waves))
-    return np.nanstd(rest, axis=-1)
+    return np.asarray(np.nanstd(rest, axis=-1), dtype=np.float64)
 
 
 def _require_one(emg_mv: ArrayLike) -> None:

@@ -41,7 +41,7 @@ class SignalLimits:
         mep_window_ms: where the MEP is sought [ms after the pulse]; `MEP_WINDOWS_MS` has one for each muscle group.
         background_uv: the most EMG at rest before the pulse [µV RMS]; above it the muscle was not relaxed.
         full_scale_mv: the largest EMG that the amplifier can show [mV]; None to look for flat tops only.
-        isi_tolerance_ms: how far the realised ISI may be from the commanded one [ms]; None for the space's tolerance.
+        isi_tolerance_ms: how far the realised ISI may be from the commanded one [ms]; the space's tolerance is the most.
         tap_artefact_ms: how long the artefact of the tap lasts in the EMG [ms]; what it covers of the MEP window does
             not count.
 
@@ -72,7 +72,6 @@ class Judged:
     """What a sweep came to: accepted, or a mistrial with its reason. All times are on the sweep's clock.
 
     Args:
-        status: accepted or mistrial.
         reason: why it is a mistrial; None where accepted.
         isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone or where unknown.
         isi_sd_ms: SD of the realised ISI [ms]; 0 where both of its events were measured.
@@ -83,7 +82,6 @@ class Judged:
         t_tms_ms: the magnetic pulse [ms].
     """
 
-    status: Status = Status.ACCEPTED
     reason: MistrialReason | None = None
     isi_ms: float | None = None
     isi_sd_ms: float = 0.0
@@ -92,6 +90,16 @@ class Judged:
     t_valve_ms: float | None = None
     t_hit_ms: float | None = None
     t_tms_ms: float | None = None
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the trial may be told."""
+        return self.reason is None
+
+    @property
+    def status(self) -> Status:
+        """Accepted or mistrial."""
+        return Status.ACCEPTED if self.accepted else Status.MISTRIAL
 
 
 def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Judged:
@@ -148,7 +156,7 @@ def _longest_run(mask: FloatArray) -> int:
 
 
 def _mistrial(judged: Judged, reason: MistrialReason) -> Judged:
-    return replace(judged, status=Status.MISTRIAL, reason=reason)
+    return replace(judged, reason=reason)
 
 
 def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Judged:
@@ -170,7 +178,7 @@ def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: 
     judged = replace(judged, isi_ms=isi_ms)
     if space.reference == "impact" and isi_ms < 0:
         return _mistrial(judged, MistrialReason.TMS_BEFORE_IMPACT)
-    tolerance = space.tolerance_ms if limits.isi_tolerance_ms is None else limits.isi_tolerance_ms
+    tolerance = min(space.tolerance_ms, limits.isi_tolerance_ms or math.inf)
     off = abs(isi_ms - stimulus.isi_ms) > tolerance
     return _mistrial(judged, MistrialReason.ISI_OFF) if off else judged
 

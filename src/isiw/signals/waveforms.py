@@ -1,4 +1,4 @@
-"""What every detector needs: checked waveforms, the level and noise at rest, and crossings refined to a fraction of a sample.
+"""What every detector needs: checked waveforms, level and noise at rest, crossings to a fraction of a sample.
 
 All of it works on many sweeps at once, one waveform a row, shape (n, w).
 """
