@@ -1,0 +1,98 @@
+"""Information about the unknowns in the next MEP.
+
+`mutual_information` is with all unknowns of the model (Houlsby et al., arXiv:1112.5745, BALD). `window_gain` is about
+the window alone: how much the next MEP is expected to reduce the variance of each ISI's membership in the window
+(stepwise uncertainty reduction for excursion sets: Bect et al., Stat. Comput. 22, 2012; Chevalier et al., Technometrics
+56, 2014).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import torch
+
+from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesWindows, Tensor
+
+__all__ = ["MutualInformation", "WindowGain", "mutual_information", "window_gain"]
+
+
+def _entropy(mass: Tensor) -> Tensor:
+    return -torch.special.xlogy(mass, mass).sum(-1)
+
+
+def mutual_information(weights: Tensor, mass: Tensor) -> Tensor:
+    """Mutual information of the next MEP and all unknowns [nat].
+
+    Args:
+        weights: of the posterior samples, shape (b, s).
+        mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
+
+    Returns:
+        Shape (b, t).
+    """
+    mixture = torch.einsum("bs,bsty->bty", weights, mass)
+    return _entropy(mixture) - torch.einsum("bs,bst->bt", weights, _entropy(mass))
+
+
+def window_gain(weights: Tensor, mass: Tensor, masks: Tensor) -> Tensor:
+    """Expected reduction of the summed variance of membership in the window.
+
+    Args:
+        weights: of the posterior samples, shape (b, s).
+        mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
+        masks: the samples' windows on a grid, shape (b, s, g).
+
+    Returns:
+        Shape (b, t).
+    """
+    people, _, candidates, outcomes = mass.shape
+    joint = (weights[..., None, None] * mass).flatten(2).transpose(1, 2)
+    probability = joint.sum(-1).clamp_min(1e-12)
+    inside = joint @ masks
+    # Summed over outcomes, P(y) m(1 - m) is P(in) - sum of P(y, in)^2 / P(y): only the second part depends on the ISI.
+    sharpness = (inside.square() / probability.unsqueeze(-1)).sum(-1).view(people, candidates, outcomes).sum(-1)
+    prior = torch.einsum("bs,bsg->bg", weights, masks).square().sum(-1, keepdim=True)
+    return sharpness - prior
+
+
+@dataclass(frozen=True)
+class MutualInformation:
+    """Mutual information of the next MEP and all unknowns."""
+
+    needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes,)
+
+    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return mutual_information(*posterior.outcome_mass(isi_ms))
+
+    def settings(self) -> Mapping[str, Any]:
+        """No settings."""
+        return {}
+
+    @classmethod
+    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
+        """The acquisition function that has these settings."""
+        return cls(**settings)
+
+
+@dataclass(frozen=True)
+class WindowGain:
+    """Expected reduction of the uncertainty about which ISIs are in the window."""
+
+    needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
+
+    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return window_gain(*posterior.outcome_mass(isi_ms), posterior.window_masks(isi_ms))
+
+    def settings(self) -> Mapping[str, Any]:
+        """No settings."""
+        return {}
+
+    @classmethod
+    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
+        """The acquisition function that has these settings."""
+        return cls(**settings)

@@ -1,0 +1,91 @@
+"""What a device must answer, in the words that instrument people know, and what it says about itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol, TypeAlias, runtime_checkable
+
+from isiw.errors import DeviceError, InvalidValueError
+from isiw.trials import Measurement, Stimulus, Sweep
+from isiw.types import Reference
+
+__all__ = ["Answer", "Device", "DeviceInfo", "HasMemory", "require_staged"]
+
+Answer: TypeAlias = Sweep | Measurement
+"""What came of a stimulus: waveforms, or the MEP as the device measured it."""
+
+
+@dataclass(frozen=True)
+class DeviceInfo:
+    """What a device says about itself; the log keeps it.
+
+    Args:
+        name: what it is, in a few words.
+        reference: the event that its ISIs count from.
+        simulated: True where nothing is delivered to anybody; such a session does not wait between trials.
+        channels: the unit of each waveform by the channel's name; empty for a device that measures the MEP itself.
+        version: firmware or software version, as text.
+        detection_limit_mv: amplitudes below it are reported as 0 [mV]; None where there is no such limit.
+
+    Raises:
+        InvalidValueError: an unknown reference or a detection limit that is not positive.
+    """
+
+    name: str
+    reference: Reference
+    simulated: bool = False
+    channels: Mapping[str, str] = field(default_factory=dict)
+    version: str = ""
+    detection_limit_mv: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.reference not in {"impact", "valve"}:
+            raise InvalidValueError(
+                "DeviceInfo.reference is unknown", got=self.reference, expected='"impact" or "valve"'
+            )
+        if self.detection_limit_mv is not None and not 0 < self.detection_limit_mv < float("inf"):
+            raise InvalidValueError("a detection limit must be positive", got=self.detection_limit_mv)
+
+
+@runtime_checkable
+class Device(Protocol):
+    """Delivers pairs of stimuli and reports what came of them."""
+
+    def describe(self) -> DeviceInfo:
+        """What the device is; may be called at any time and delivers nothing."""
+
+    def stage(self) -> None:
+        """Get ready and arm. Delivers nothing."""
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
+        """Deliver one pair of stimuli and report what came of it.
+
+        Args:
+            stimulus: what to deliver; an ISI of None is TMS alone.
+            timeout_s: the longest the call may take [s].
+
+        Raises:
+            DeviceTimeoutError: no answer in time.
+            DeviceError: not staged, or anything else went wrong.
+        """
+
+    def stop(self) -> None:
+        """Disarm, whatever state the device is in; calling it again is harmless."""
+
+    def unstage(self) -> None:
+        """Let go of what `stage` took; calling it again is harmless."""
+
+
+@runtime_checkable
+class HasMemory(Protocol):
+    """Capability: a device whose answers depend on the stimuli before, as simulated and replayed ones do."""
+
+    def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
+        """Come into the state of having delivered these stimuli since the session's beginning."""
+
+
+def require_staged(name: str, *, staged: bool) -> None:
+    """Raise a DeviceError where a device is told to deliver without being armed."""
+    if not staged:
+        raise DeviceError(f"{name} is not staged, so it delivers nothing", remedy="Call stage() first.")

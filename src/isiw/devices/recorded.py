@@ -1,0 +1,183 @@
+"""A device whose sweeps are recorded EMG, put together anew: semi-synthetic, for tests of the whole chain.
+
+A simulated person answers the stimulus with an amplitude. The sweep is a really recorded one without a MEP, plus a
+really recorded MEP, scaled so that the sum has the person's amplitude from 15 to 35 ms. Noise, offset, artefact and
+waveform are therefore real; *whether and how strongly* a MEP follows is simulated. The recordings (University of Eastern
+Finland, BSD-3-Clause) are not part of the package; see the repository NeuromodulationUEF/MEPFeatX.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import brentq
+
+from isiw.devices.protocol import DeviceInfo, require_staged
+from isiw.devices.simulated import Respond, SimulatedPerson
+from isiw.errors import DeviceError, InvalidValueError
+from isiw.trials import Channel, Stimulus, Sweep
+from isiw.types import BoolArray, FloatArray, Reference
+
+__all__ = ["RecordedDevice", "Recordings", "load_recordings"]
+
+PATTERN = "uef_*_ECR_epochs_uV_3kHz.csv.gz"
+MEP_WINDOW_MS = (15.0, 35.0)
+QUIET_MV = 0.02  # recorded floors reach 20 µV peak-to-peak; the smallest recorded MEP here has 80 µV
+CLEAR_MV = 0.2  # a scaled-down MEP brings its own noise along, so only large ones are templates
+BACKGROUND_UNTIL_MS = -2.0  # the artefact begins here
+ONSET_MS = (10.0, 14.0)  # forearm MEPs begin 17.5 ms after the pulse: the template is faded in before
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """Recorded sweeps sorted into those without a MEP and MEPs.
+
+    Args:
+        time_ms: time from the magnetic pulse [ms], shape (w,).
+        quiet_mv: sweeps without a MEP, as recorded [mV], shape (n, w).
+        mep_mv: MEPs alone, offset taken out and faded in before their onset [mV], shape (m, w).
+
+    Raises:
+        InvalidValueError: no sweep of one of the two kinds.
+    """
+
+    time_ms: FloatArray
+    quiet_mv: FloatArray
+    mep_mv: FloatArray
+
+    def __post_init__(self) -> None:
+        if not len(self.quiet_mv) or not len(self.mep_mv):
+            raise InvalidValueError(
+                "the recordings hold no sweep without a MEP, or none with a clear one",
+                got=(len(self.quiet_mv), len(self.mep_mv)),
+            )
+
+    @property
+    def rate_hz(self) -> float:
+        """Sampling rate [Hz]; the recorded times are rounded, their span is not."""
+        return 1e3 * (len(self.time_ms) - 1) / float(self.time_ms[-1] - self.time_ms[0])
+
+    @property
+    def in_mep_window(self) -> BoolArray:
+        """Which samples lie 15–35 ms after the pulse, shape (w,)."""
+        return (self.time_ms >= MEP_WINDOW_MS[0]) & (self.time_ms <= MEP_WINDOW_MS[1])
+
+    def sweep_mv(self, mep_mv: float, rng: np.random.Generator) -> FloatArray:
+        """A recorded sweep plus a recorded MEP, together of this amplitude [mV], shape (w,).
+
+        The recorded floor is part of the amplitude and is not counted twice: the MEP is scaled until the *sum* has it.
+        An amplitude below the floor is the quiet sweep alone.
+
+        Args:
+            mep_mv: peak-to-peak amplitude, 15–35 ms after the pulse [mV].
+            rng: chooses the two sweeps.
+        """
+        quiet = self.quiet_mv[rng.integers(len(self.quiet_mv))]
+        template = self.mep_mv[rng.integers(len(self.mep_mv))]
+        floor, unit = quiet[self.in_mep_window], template[self.in_mep_window]
+
+        def missing_mv(scale: float) -> float:
+            return float(np.ptp(floor + scale * unit)) - mep_mv
+
+        if missing_mv(0.0) >= 0:
+            return quiet
+        # The sum's amplitude is at least scale * ptp(unit) - ptp(floor), so this scale is enough.
+        enough = (mep_mv + np.ptp(floor)) / np.ptp(unit)
+        return np.asarray(quiet + brentq(missing_mv, 0.0, enough) * template, dtype=np.float64)
+
+
+def load_recordings(folder: str | os.PathLike[str]) -> Recordings:
+    """Read the recorded forearm sweeps.
+
+    Args:
+        folder: holds `uef_*_ECR_epochs_uV_3kHz.csv.gz`: a row a sweep [µV], columns named by their time from the
+            pulse [ms].
+
+    Raises:
+        DeviceError: no such file, or no usable one.
+    """
+    files = sorted(Path(folder).glob(PATTERN))
+    if not files:
+        raise DeviceError(
+            "the recorded sweeps were not found",
+            got=str(folder),
+            expected=f"a folder with {PATTERN}",
+            remedy="Give their folder with --data, or use --subject simulated.",
+        )
+    frames = [pd.read_csv(file, index_col="trial") for file in files]
+    time_ms = frames[0].columns.to_numpy().astype(np.float64)
+    if any(list(frame.columns) != list(frames[0].columns) for frame in frames):
+        raise DeviceError("the recorded files do not share their times", got=[file.name for file in files])
+    return _sorted_recordings(time_ms, np.concatenate([frame.to_numpy(dtype=np.float64) for frame in frames]) / 1e3)
+
+
+def _sorted_recordings(time_ms: FloatArray, sweeps_mv: FloatArray) -> Recordings:
+    in_window = (time_ms >= MEP_WINDOW_MS[0]) & (time_ms <= MEP_WINDOW_MS[1])
+    amplitude = np.ptp(sweeps_mv[:, in_window], axis=1)
+    offset = sweeps_mv[:, time_ms < BACKGROUND_UNTIL_MS].mean(axis=1, keepdims=True)
+    fade_in = np.clip((time_ms - ONSET_MS[0]) / (ONSET_MS[1] - ONSET_MS[0]), 0.0, 1.0)
+    clear = amplitude > CLEAR_MV
+    return Recordings(time_ms, sweeps_mv[amplitude < QUIET_MV], (sweeps_mv[clear] - offset[clear]) * fade_in)
+
+
+class RecordedDevice:
+    """Semi-synthetic: a simulated person's amplitudes in really recorded EMG; delivers nothing to anybody.
+
+    Args:
+        respond: answers a commanded ISI [ms] with the realised ISI and the MEP.
+        reference: the event that ISIs count from.
+        recordings: the recorded sweeps.
+        seed: seed of the choice of sweeps; the choice of a trial depends on the seed and the trial's number alone.
+    """
+
+    def __init__(self, respond: Respond, reference: Reference, recordings: Recordings, seed: int = 0) -> None:
+        self._person = SimulatedPerson(respond)
+        self._recordings, self._seed = recordings, seed
+        self._info = DeviceInfo(
+            name="simulated person in recorded EMG (semi-synthetic)",
+            reference=reference,
+            simulated=True,
+            channels={"emg": "mV"},
+        )
+        self._staged = False
+
+    def describe(self) -> DeviceInfo:
+        """What the device is."""
+        return self._info
+
+    def stage(self) -> None:
+        """Arm."""
+        self._staged = True
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Sweep:  # noqa: ARG002 - answers at once
+        """The sweep that follows one pair of stimuli; its clock is zero at the magnetic pulse."""
+        require_staged(self._info.name, staged=self._staged)
+        outcome = self._person.answer(stimulus.isi_ms)
+        rng = np.random.default_rng([self._seed, stimulus.trial])
+        emg_mv = self._recordings.sweep_mv(outcome.mep_mv, rng)
+        emg = Channel(emg_mv, self._recordings.rate_hz, "mV", t0_ms=float(self._recordings.time_ms[0]))
+        first_ms = None if outcome.isi_ms is None else -outcome.isi_ms
+        return Sweep(
+            {"emg": emg},
+            t_valve_ms=first_ms if self._info.reference == "valve" else None,
+            t_tms_ms=0.0,
+            t_hit_ms=first_ms if self._info.reference == "impact" else None,
+            isi_sd_ms=outcome.isi_sd_ms,
+        )
+
+    def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
+        """Bring the person to where they were after these stimuli."""
+        self._person.resume_after(stimuli)
+
+    def stop(self) -> None:
+        """Disarm."""
+        self._staged = False
+
+    def unstage(self) -> None:
+        """Disarm."""
+        self._staged = False

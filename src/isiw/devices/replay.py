@@ -1,0 +1,87 @@
+"""A device that answers from the trials of an earlier session, to try another strategy on the same data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from isiw.devices.protocol import DeviceInfo, require_staged
+from isiw.errors import DeviceError
+from isiw.trials import Measurement, Stimulus, Trial, TrialTable
+from isiw.types import Reference
+
+__all__ = ["ReplayDevice"]
+
+
+class ReplayDevice:
+    """Answers each stimulus with the recorded trial of the nearest ISI, each trial once.
+
+    A session that asks what was asked before gets the same answers; another one gets the nearest there are, at the ISIs
+    at which they were really recorded.
+
+    Args:
+        table: the recorded trials; only those that a strategy may learn from are used.
+        reference: the event that their ISIs count from.
+    """
+
+    def __init__(self, table: TrialTable, reference: Reference) -> None:
+        self._left: list[Trial] = list(table.told)
+        self._info = DeviceInfo(name="replay of recorded trials", reference=reference, simulated=True)
+        self._delivered = 0
+        self._staged = False
+
+    def describe(self) -> DeviceInfo:
+        """What the device is."""
+        return self._info
+
+    def stage(self) -> None:
+        """Arm."""
+        self._staged = True
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:  # noqa: ARG002 - answers at once
+        """The recorded answer nearest to one pair of stimuli.
+
+        Raises:
+            DeviceError: not staged, or no trial is left.
+        """
+        require_staged(self._info.name, staged=self._staged)
+        return self._take(stimulus)
+
+    def _take(self, stimulus: Stimulus) -> Measurement:
+        asked_ms = stimulus.isi_ms
+        fitting = [trial for trial in self._left if (trial.isi_ms is None) == (asked_ms is None)]
+        if not fitting:
+            raise DeviceError(
+                "no recorded trial is left to answer with", remedy="Stop earlier, or replay a longer recording."
+            )
+        trial = min(fitting, key=lambda candidate: _distance_ms(candidate, asked_ms))
+        self._left.remove(trial)
+        self._delivered += 1
+        return Measurement(
+            trial.mep_mv or 0.0,
+            trial.isi_ms,
+            trial.isi_sd_ms,
+            trial.background_rms_uv,
+            trial.t_valve_ms,
+            trial.t_hit_ms,
+            trial.t_tms_ms,
+        )
+
+    def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
+        """Use up the trials that answered these stimuli."""
+        for stimulus in stimuli[self._delivered :]:
+            self._take(stimulus)
+
+    def stop(self) -> None:
+        """Disarm."""
+        self._staged = False
+
+    def unstage(self) -> None:
+        """Disarm."""
+        self._staged = False
+
+
+def _distance_ms(trial: Trial, asked_ms: float | None) -> float:
+    """How far a trial lies from the ISI asked for, by what was commanded where that is known."""
+    at_ms = trial.isi_ms if trial.commanded_isi_ms is None else trial.commanded_isi_ms
+    return 0.0 if asked_ms is None or at_ms is None else math.fabs(at_ms - asked_ms)

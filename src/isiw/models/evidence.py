@@ -1,0 +1,111 @@
+"""What the trials so far say about each particle: the history, and its likelihood."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+
+from isiw.models.prior import Person
+from isiw.models.protocol import Tensor
+from isiw.models.response import NODES, Response, log_likelihood
+from isiw.models.shapes import facilitation
+
+__all__ = ["History", "in_pieces", "levels", "total_log_likelihood"]
+
+CHUNK_ELEMENTS = 1 << 16
+"""On a CPU the likelihood is worked through in pieces of this many nodes, which stay in its cache."""
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """The trials told so far; amplitudes are intervals of log mV, which are points where the amplitude is known.
+
+    Args:
+        isi_ms: realised ISIs [ms]; NaN is TMS alone, shape (b, n).
+        isi_sd_ms: their SDs [ms], shape (b, n).
+        log_mep: lower end of the log MEP, shape (b, n).
+        log_mep_high: upper end, shape (b, n).
+    """
+
+    isi_ms: Tensor
+    isi_sd_ms: Tensor
+    log_mep: Tensor
+    log_mep_high: Tensor
+
+    @classmethod
+    def empty(cls, people: int, device: torch.device) -> History:
+        """No trials."""
+        return cls(*(torch.empty((people, 0), device=device) for _ in range(4)))
+
+    @property
+    def columns(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """All of it, in order."""
+        return self.isi_ms, self.isi_sd_ms, self.log_mep, self.log_mep_high
+
+    def appended(self, trial: History) -> History:
+        """This history and one more trial."""
+        return History(*(torch.cat(pair, dim=-1) for pair in zip(self.columns, trial.columns, strict=True)))
+
+
+def levels(person: Person, isi_ms: Tensor, isi_sd_ms: Tensor | None = None) -> Tensor:
+    """Facilitation of each particle, shape (b, p, n).
+
+    Args:
+        person: particles, fields of shape (b, p).
+        isi_ms: ISIs [ms], shape (b or 1, n); NaN is TMS alone.
+        isi_sd_ms: their SDs [ms], same shape. Such an ISI is averaged over three nodes of its Gaussian.
+    """
+    isi = isi_ms.unsqueeze(-2)
+    level = facilitation(person.shape, isi)
+    if isi_sd_ms is not None and bool((isi_sd_ms > 0).any()):
+        reach = math.sqrt(3.0) * isi_sd_ms.unsqueeze(-2)
+        sides = facilitation(person.shape, isi - reach) + facilitation(person.shape, isi + reach)
+        level = level * (2 / 3) + sides / 6
+    return torch.where(person.present.unsqueeze(-1) & ~isi.isnan(), level, 0.0)
+
+
+def total_log_likelihood(person: Person, history: History) -> Tensor:
+    """Log likelihood of a history under each particle, shape (b, p).
+
+    Args:
+        person: particles, fields of shape (b, p).
+        history: trials of b people.
+    """
+    level = levels(person, history.isi_ms, history.isi_sd_ms)
+    low, high = history.log_mep.unsqueeze(-2), history.log_mep_high.unsqueeze(-2)
+
+    def piece(response: Response, level: Tensor, low: Tensor, high: Tensor) -> Tensor:
+        return log_likelihood(response, level, low, high).sum(-1)
+
+    return in_pieces(piece, person.response, (level, low, high), NODES * history.isi_ms.shape[-1])
+
+
+def in_pieces(function: Callable[..., Tensor], response: Response, others: tuple[Tensor, ...], elements: int) -> Tensor:
+    """Apply a function of particles piece by piece on a CPU, where its intermediate values then stay in the cache.
+
+    Args:
+        function: maps a response (fields (b, p)) and the others to a tensor of shape (b, p, ...).
+        response: response parameters, fields of shape (b, p).
+        others: tensors of shape (b, p or 1, ...).
+        elements: size of the intermediate values for one particle.
+    """
+    if response.log_floor.is_cuda:
+        return function(response, *others)
+    people, particles = response.log_floor.shape
+    step = max(1, CHUNK_ELEMENTS // max(1, elements))
+    rows = []
+    for b in range(people):
+        one = slice(b, b + 1)
+        pieces = [slice(first, first + step) for first in range(0, particles, step)]
+        parts = [
+            function(
+                Response(*(field[one, piece] for field in response)),
+                *(x[one, piece] if x.shape[1] == particles else x[one] for x in others),
+            )
+            for piece in pieces
+        ]
+        rows.append(torch.cat(parts, dim=1))
+    return torch.cat(rows, dim=0)

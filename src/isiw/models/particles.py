@@ -1,0 +1,290 @@
+"""The particle posterior: sequential Monte Carlo over people, b sessions at once.
+
+Every trial multiplies the particles' weights by its likelihood. When the effective sample size falls, the particles are
+resampled, and moved by Markov chain steps (resample-move: Gilks and Berzuini, J. R. Stat. Soc. B 63, 2001).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from typing import Any, Self
+
+import torch
+
+from isiw.design import DesignSpace
+from isiw.models.evidence import History, in_pieces, levels, total_log_likelihood
+from isiw.models.moves import Mover
+from isiw.models.prior import Latents, Person, Prior
+from isiw.models.protocol import Observation, Tensor
+from isiw.models.response import NODES, Response, evoked_mean, outcome_density
+from isiw.models.windows import best_window, edge_samples
+from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, WindowEstimate
+
+__all__ = ["ParticleModel", "ParticlePosterior"]
+
+LEVELS = 12
+"""Facilitations at which responses are worked out; what lies between is interpolated."""
+
+OUTCOMES = 32
+"""Values of the log MEP on which predictive distributions live."""
+
+PROFILE_POINTS = 101
+"""ISIs at which the expected MEP and its band are reported."""
+
+
+@dataclass(frozen=True)
+class ParticleModel:
+    """A particle posterior over profile, recruitment and noise; the default model.
+
+    Args:
+        beliefs: the prior over people.
+        particles: how many particles a person has.
+        thinned: how many of them represent the posterior where every candidate ISI is scored.
+        moves: sweeps of Markov chain moves after each resampling.
+        min_ess: effective sample size, as a share of the particles, below which they are resampled.
+        detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
+        response_threshold_mv: what a told response is known to be above [mV].
+        device: torch device.
+    """
+
+    beliefs: Prior = field(default_factory=Prior)
+    particles: int = 1000
+    thinned: int = 256
+    moves: int = 2
+    min_ess: float = 0.5
+    detection_limit_mv: float = 0.005
+    response_threshold_mv: float = 0.02
+    device: str = "cpu"
+
+    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
+        """The posterior before the first trial."""
+        latents = self.beliefs.sample(people, self.particles, _generator(self.device, seed, 0))
+        size, device = latents.present.shape, latents.present.device
+        return ParticlePosterior(
+            model=self,
+            space=space,
+            seed=seed,
+            latents=latents,
+            log_weights=torch.full(size, -math.log(self.particles), device=device),
+            log_likelihood=torch.zeros(size, device=device),
+            history=History.empty(people, device),
+        )
+
+    def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
+        """The posterior after one more trial."""
+        trial = self._trial(observation)
+        history = posterior.history.appended(trial)
+        gain = total_log_likelihood(posterior.person, trial)
+        log_weights = torch.log_softmax(posterior.log_weights + gain, dim=-1)
+        after = replace(
+            posterior, log_weights=log_weights, log_likelihood=posterior.log_likelihood + gain, history=history
+        )
+        ess = torch.exp(-torch.logsumexp(2.0 * log_weights, dim=-1))
+        return self._rejuvenated(after) if bool((ess < self.min_ess * self.particles).any()) else after
+
+    def _rejuvenated(self, posterior: ParticlePosterior) -> ParticlePosterior:
+        generator = _generator(self.device, posterior.seed, posterior.history.isi_ms.shape[-1])
+        picks = systematic(posterior.log_weights, self.particles)
+        # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
+        picks = picks[:, torch.randperm(self.particles, generator=generator, device=generator.device)]
+        latents = Latents(*(_take(x, picks) for x in posterior.latents))
+        log_likelihood = _take(posterior.log_likelihood, picks)
+        mover = Mover(self.beliefs, posterior.space, posterior.history, generator)
+        for _ in range(self.moves):
+            latents, log_likelihood = mover.sweep(latents, log_likelihood)
+        even = torch.full_like(posterior.log_weights, -math.log(self.particles))
+        return replace(posterior, latents=latents, log_weights=even, log_likelihood=log_likelihood)
+
+    def _trial(self, observation: Observation) -> History:
+        seen, silent = observation.response == 1, observation.response == 0
+        log_mep = torch.log(observation.mep_mv)
+        limit, threshold = math.log(self.detection_limit_mv), math.log(self.response_threshold_mv)
+        low = torch.where(seen, threshold, torch.where(silent, -torch.inf, log_mep))
+        high = torch.where(seen, torch.inf, torch.where(silent, threshold, log_mep))
+        high = torch.where(observation.mep_mv == 0, limit, high)
+        columns = (observation.isi_ms, observation.isi_sd_ms, low, high)
+        return History(*(column.to(self.device, torch.float32).unsqueeze(-1) for column in columns))
+
+    def settings(self) -> Mapping[str, Any]:
+        """The model's settings as TOML values."""
+        return asdict(self) | {"beliefs": self.beliefs.settings()}
+
+    @classmethod
+    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
+        """The model that has these settings."""
+        beliefs = Prior.from_settings(settings.get("beliefs", {}))
+        return cls(**(dict(settings) | {"beliefs": beliefs}))
+
+
+@dataclass(frozen=True, eq=False)
+class ParticlePosterior:
+    """What is believed about b people.
+
+    Args:
+        model: the model's settings.
+        space: the design space.
+        seed: seed of all randomness.
+        latents: the particles, fields of shape (b, p).
+        log_weights: their normalised log weights, shape (b, p).
+        log_likelihood: of the history under each of them, shape (b, p).
+        history: the trials so far.
+    """
+
+    model: ParticleModel
+    space: DesignSpace
+    seed: int
+    latents: Latents
+    log_weights: Tensor
+    log_likelihood: Tensor
+    history: History
+
+    @cached_property
+    def person(self) -> Person:
+        """What the particles mean."""
+        return self.model.beliefs.person(self.latents, self.space)
+
+    @cached_property
+    def _thinned(self) -> _Sample:
+        picks = systematic(self.log_weights, self.model.thinned)
+        return _Sample(_pick_person(self.person, picks))
+
+    def outcome_mass(self, isi_ms: Tensor) -> tuple[Tensor, Tensor]:
+        """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
+        return self._thinned.outcome_mass(isi_ms.to(self.log_weights.device))
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows; see `SamplesWindows`."""
+        return self._thinned.window_masks(isi_ms.to(self.log_weights.device))
+
+    def estimate(self, person: int = 0) -> WindowEstimate:
+        """The window of one person."""
+        one = slice(person, person + 1)
+        picks = systematic(self.log_weights[one], self.model.particles)
+        sample = _Sample(_pick_person(_rows(self.person, one), picks))
+        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=picks.device)
+        masks = sample.window_masks(grid)[0]
+        masks = masks[masks.any(-1)]
+        probability = len(masks) / self.model.particles
+        profile_grid = grid[:: max(1, len(grid) // PROFILE_POINTS)]
+        profiles = _Sample(_rows(self._thinned.person, one)).expected_mep_mv(profile_grid)[0]
+        levels_of = torch.tensor([0.05, 0.5, 0.95], device=picks.device)
+        edges = edge_samples(masks, self.space)
+        start, end = edges.median(0).values.tolist() if len(masks) else (None, None)
+        return WindowEstimate(
+            probability=probability,
+            window=best_window(masks, self.space.grid_ms) if probability >= 0.5 else None,
+            start_ms=start,
+            end_ms=end,
+            grid_ms=profile_grid.double().cpu().numpy(),
+            edge_samples_ms=edges.double().cpu().numpy(),
+            profile_quantiles_mv=torch.quantile(profiles, levels_of, dim=0).double().cpu().numpy(),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sample:
+    """Equally weighted particles, fields of shape (b, s), and what they say about the next MEP and the window."""
+
+    person: Person
+
+    @cached_property
+    def _levels(self) -> Tensor:
+        """Facilitations of the tables, denser where responses begin, shape (1, 1, l)."""
+        device = self.person.present.device
+        return torch.linspace(0.0, 1.0, LEVELS, device=device).square()[None, None, :]
+
+    def _hats(self, level: Tensor) -> Tensor:
+        """Weights of the tables' levels that interpolate at each facilitation, shape (b, s, t, l)."""
+        position = level.clamp(0.0, 1.0).sqrt() * (LEVELS - 1)
+        return (1.0 - (position.unsqueeze(-1) - torch.arange(LEVELS, device=level.device)).abs()).clamp_min(0.0)
+
+    @cached_property
+    def _evoked(self) -> Tensor:
+        """Expected MEP above the floor at the tables' levels, in floors, shape (b, s, l)."""
+        return evoked_mean(self.person.response, self._levels)
+
+    @cached_property
+    def edge_level(self) -> Tensor:
+        """Facilitation at a window's edge by the 0.135 rule; above 1 where there is no window, shape (b, s)."""
+        response = self.person.response
+        excess = self._evoked - self._evoked[..., :1]
+        peak = excess[..., -1]
+        floor_mv = response.log_floor.exp()
+        baseline_mv = floor_mv * (torch.exp(0.5 * response.floor_log_sd.square()) + self._evoked[..., 0])
+        enough = peak * floor_mv >= (MIN_EXCESS_OF_BASELINE * baseline_mv).clamp_min(MIN_EXCESS_MV)
+        share = (excess / peak.clamp_min(1e-12).unsqueeze(-1)).contiguous()
+        right = torch.searchsorted(share, torch.full_like(share[..., :1], EDGE_LEVEL)).clamp(1, LEVELS - 1)
+        low, high = share.gather(-1, right - 1), share.gather(-1, right)
+        position = (right - 1 + (EDGE_LEVEL - low) / (high - low).clamp_min(1e-12)).squeeze(-1) / (LEVELS - 1)
+        return torch.where(enough & self.person.present, position.square(), 2.0)
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows as 0 or 1, shape (b, s, t)."""
+        level = levels(self.person, isi_ms.unsqueeze(0))
+        return (level >= self.edge_level.unsqueeze(-1)).to(level.dtype)
+
+    def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
+        """Expected MEP [mV], shape (b, s, t)."""
+        response = self.person.response
+        evoked = (self._hats(levels(self.person, isi_ms.unsqueeze(0))) @ self._evoked.unsqueeze(-1)).squeeze(-1)
+        rest = torch.exp(0.5 * response.floor_log_sd.square()).unsqueeze(-1)
+        return response.log_floor.exp().unsqueeze(-1) * (evoked + rest)
+
+    @cached_property
+    def _outcome_table(self) -> Tensor:
+        """Probability of each outcome at the tables' levels, shape (b, s, l, y)."""
+        response = self.person.response
+        top = response.log_floor + torch.log1p(self._evoked.amax(-1))
+        low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
+        high = torch.quantile(top, 0.95, dim=-1) + 1.5
+        share = torch.linspace(0.0, 1.0, OUTCOMES, device=low.device)
+        log_mep = (low.unsqueeze(-1) + share * (high - low).unsqueeze(-1)).unsqueeze(-2)
+        density = in_pieces(
+            lambda r, grid: outcome_density(r, self._levels, grid), response, (log_mep,), LEVELS * OUTCOMES * NODES
+        )
+        return density / density.sum(-1, keepdim=True)
+
+    def outcome_mass(self, isi_ms: Tensor) -> tuple[Tensor, Tensor]:
+        """Weights of the samples (b, s), and the predictive distribution of each, shape (b, s, t, y)."""
+        hats = self._hats(levels(self.person, isi_ms.unsqueeze(0)))
+        weights = torch.full_like(self.person.response.log_floor, 1.0 / self.person.present.shape[-1])
+        return weights, hats @ self._outcome_table
+
+
+def _generator(device: str, seed: int, step: int) -> torch.Generator:
+    """A stream of its own for each step, so that a posterior depends on its seed and its trials alone."""
+    return torch.Generator(device=device).manual_seed(seed * 1_000_003 + step)
+
+
+def systematic(log_weights: Tensor, size: int) -> Tensor:
+    """Evenly spaced picks of weighted particles, in order.
+
+    Args:
+        log_weights: normalised, shape (b, p).
+        size: how many picks.
+
+    Returns:
+        Indices, shape (b, size).
+    """
+    cumulative = log_weights.double().softmax(-1).cumsum(-1)
+    points = (torch.arange(size, device=log_weights.device, dtype=torch.double) + 0.5) / size
+    picks = torch.searchsorted(cumulative, points.expand(len(cumulative), -1).contiguous())
+    return picks.clamp_max(log_weights.shape[-1] - 1)
+
+
+def _take(values: Tensor, picks: Tensor) -> Tensor:
+    index = picks.unsqueeze(-1).expand(-1, -1, values.shape[-1]) if values.dim() > picks.dim() else picks
+    return torch.gather(values, 1, index)
+
+
+def _pick_person(person: Person, picks: Tensor) -> Person:
+    shape, response = ([_take(f, picks) for f in part] for part in (person.shape, person.response))
+    return Person(type(person.shape)(*shape), Response(*response), _take(person.present, picks))
+
+
+def _rows(person: Person, rows: slice) -> Person:
+    shape, response = ([f[rows] for f in part] for part in (person.shape, person.response))
+    return Person(type(person.shape)(*shape), Response(*response), person.present[rows])

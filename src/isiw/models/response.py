@@ -1,0 +1,226 @@
+"""How a person's MEP depends on facilitation, as believed: one mixture that holds both kinds of noise.
+
+Given input noise z, the evoked MEP relative to the EMG floor is `ratio * sigmoid(drive + spread(z))` with log-normal
+output noise. A recruitment curve has a drive that is linear in the facilitation and noise on that drive (Goetz et al.;
+the cohorts' `recruitment`). Noise of constant CV is the same formula far below saturation, with the logarithm of the
+facilitation as the drive and log-gamma noise. The noise on the input is integrated out on equidistant nodes, whose
+error is negligible because the output noise smooths between them.
+
+    mep / floor = floor noise + ratio * sigmoid(drive + spread_q) * output noise,     q = 1 ... Q with weights w_q
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import NamedTuple
+
+import torch
+
+from isiw.models.protocol import Tensor
+
+__all__ = ["NoiseKind", "Response", "evoked_mean", "log_likelihood", "node_weights", "outcome_density"]
+
+NODES = 16
+NODE_REACH = 2.8
+FAR_BELOW = 15.0
+"""How far below saturation the constant-CV response sits, in logits: the sigmoid is an exponential there."""
+
+GAMMA_KERNEL = 0.25
+"""Share of the log-gamma noise that the output kernel takes over from the nodes, natural log."""
+
+OUTLIER_PROBABILITY = 0.03
+OUTLIER_LOG_RANGE = (math.log(2.0), math.log(200.0))
+"""Artefacts and false positives: log-uniform between these multiples of the floor."""
+
+
+class NoiseKind(IntEnum):
+    """Where the noise enters."""
+
+    GAIN = 0
+    MISSING = 1
+    RECRUITMENT = 2
+
+
+class Response(NamedTuple):
+    """Response parameters of many particles; all fields have the particles' shape (..., p).
+
+    Args:
+        kind: one of `NoiseKind`.
+        log_floor: natural log of the median EMG floor [mV].
+        floor_log_sd: SD of the floor from trial to trial, natural log.
+        log_ratio: natural log of the largest evoked MEP over the floor (recruitment), or of the expected evoked MEP at
+            the best ISI over the floor (constant CV).
+        spread: SD of the input noise in logits (recruitment), or the CV.
+        output_log_sd: SD of the output noise, natural log (recruitment).
+        boost: shift of the drive at the best ISI, in logits (recruitment).
+        rest: drive without a tap, in logits (recruitment).
+        max_probability: probability of a response at the best ISI (missing responses).
+    """
+
+    kind: Tensor
+    log_floor: Tensor
+    floor_log_sd: Tensor
+    log_ratio: Tensor
+    spread: Tensor
+    output_log_sd: Tensor
+    boost: Tensor
+    rest: Tensor
+    max_probability: Tensor
+
+
+def _nodes(like: Tensor) -> Tensor:
+    return torch.linspace(-NODE_REACH, NODE_REACH, NODES, device=like.device, dtype=like.dtype)
+
+
+def node_weights(like: Tensor) -> Tensor:
+    """Weights of the nodes of the input noise, shape (q,)."""
+    density = torch.exp(-0.5 * _nodes(like).square())
+    return density / density.sum()
+
+
+def _log_gamma_nodes(cv: Tensor) -> Tensor:
+    """Nodes of the log of gamma noise with mean 1, less what the output kernel adds, shape (..., p, q).
+
+    The quantiles are Wilson and Hilferty's; they are drawn in so that nodes and kernel together have the variance of
+    the quantiles, and shifted so that the mean is 1.
+    """
+    cv = cv.unsqueeze(-1)
+    root = (1.0 - cv.square() / 9.0 + _nodes(cv) * cv / 3.0).clamp_min(0.02)
+    log_quantiles = 3.0 * torch.log(root)
+    weights = node_weights(cv)
+    centre = (log_quantiles * weights).sum(-1, keepdim=True)
+    variance = ((log_quantiles - centre).square() * weights).sum(-1, keepdim=True)
+    nodes = centre + (log_quantiles - centre) * (1.0 - GAMMA_KERNEL**2 / variance).clamp_min(0.0).sqrt()
+    mean = (nodes.exp() * weights).sum(-1, keepdim=True)
+    return nodes - torch.log(mean) - 0.5 * GAMMA_KERNEL**2
+
+
+class _Curve(NamedTuple):
+    """The nodes' view of a response: evoked/floor at node q is exp(log_scale) * sigmoid(drive + spread_q)."""
+
+    scale: Tensor  # (..., p, 1)
+    spread: Tensor  # (..., p, q)
+    kernel: Tensor  # (..., p, 1)
+
+
+def _curve(response: Response) -> _Curve:
+    recruits = (response.kind == NoiseKind.RECRUITMENT).unsqueeze(-1)
+    input_noise = response.spread.unsqueeze(-1) * _nodes(response.spread)
+    spread = torch.where(recruits, input_noise, _log_gamma_nodes(response.spread) - FAR_BELOW)
+    log_scale = response.log_ratio.unsqueeze(-1) + torch.where(recruits, 0.0, FAR_BELOW)
+    kernel = torch.where(recruits, response.output_log_sd.unsqueeze(-1), GAMMA_KERNEL)
+    return _Curve(log_scale.exp(), spread, kernel)
+
+
+def _drive(response: Response, level: Tensor) -> Tensor:
+    """Drive in logits by facilitation (..., p, t)."""
+    recruits = (response.kind == NoiseKind.RECRUITMENT).unsqueeze(-1)
+    linear = response.rest.unsqueeze(-1) + response.boost.unsqueeze(-1) * level
+    return torch.where(recruits, linear, torch.log(level.clamp_min(1e-9)))
+
+
+def _response_probability(response: Response, level: Tensor) -> Tensor:
+    missing = (response.kind == NoiseKind.MISSING).unsqueeze(-1)
+    return torch.where(missing, response.max_probability.unsqueeze(-1) * level.sqrt(), 1.0)
+
+
+def evoked_mean(response: Response, level: Tensor) -> Tensor:
+    """Expected MEP above the floor, in multiples of the median floor.
+
+    Args:
+        response: response parameters, fields of shape (..., p).
+        level: facilitation in 0–1, shape (..., p, t).
+
+    Returns:
+        Shape (..., p, t).
+    """
+    curve = _curve(response)
+    by_node = torch.sigmoid(_drive(response, level).unsqueeze(-1) + curve.spread.unsqueeze(-2))
+    mean = curve.scale * (by_node @ node_weights(level)) * torch.exp(0.5 * curve.kernel.square())
+    return mean * _response_probability(response, level)
+
+
+def _components(response: Response, level: Tensor) -> tuple[Tensor, Tensor]:
+    """Mean and precision of log(mep / floor) at each node, shapes (..., p, t, q)."""
+    curve = _curve(response)
+    drive = _drive(response, level).unsqueeze(-1) + curve.spread.unsqueeze(-2)
+    evoked = drive.sigmoid_().mul_(curve.scale.unsqueeze(-1))
+    total = evoked.add(1.0)
+    share = evoked.div_(total)
+    floor_variance = response.floor_log_sd.square()[..., None, None]
+    variance = share.square().mul_(curve.kernel.square().unsqueeze(-1))
+    variance.add_(share.sub_(1.0).square_().mul_(floor_variance))
+    return total.log_(), variance.reciprocal_()
+
+
+def _mix(response: Response, level: Tensor, log_relative: Tensor, evoked: Tensor) -> Tensor:
+    """Density of log(mep / floor) from the density of trials that respond: missing responses and outliers added."""
+    floor_sd = response.floor_log_sd.unsqueeze(-1)
+    silent = torch.exp(-0.5 * (log_relative / floor_sd).square()) / (floor_sd * math.sqrt(2 * math.pi))
+    low, high = OUTLIER_LOG_RANGE
+    outlier = ((log_relative > low) & (log_relative < high)).to(evoked.dtype) / (high - low) + 1e-6
+    responds = _response_probability(response, level)
+    density = responds * evoked + (1.0 - responds) * silent
+    return (1.0 - OUTLIER_PROBABILITY) * density + OUTLIER_PROBABILITY * outlier
+
+
+def log_likelihood(response: Response, level: Tensor, log_mep: Tensor, log_mep_high: Tensor) -> Tensor:
+    """Log likelihood of MEPs, trial by trial: a density of the log MEP, or the probability of an interval.
+
+    Args:
+        response: response parameters, fields of shape (..., p).
+        level: facilitation of each trial, shape (..., p, n).
+        log_mep: natural log of the MEPs [mV], or the lower end of what is known of them, shape (..., 1 or p, n).
+        log_mep_high: the upper end; equal to `log_mep` where the amplitude is known, same shape.
+
+    Returns:
+        Shape (..., p, n).
+    """
+    low, high = (end - response.log_floor.unsqueeze(-1) for end in (log_mep, log_mep_high))
+    mean, precision = _components(response, level)
+    censored = log_mep != log_mep_high
+    inside = _interval_likelihood(response, level, (low, high), mean, precision) if bool(censored.any()) else None
+    root = precision.sqrt()
+    terms = mean.sub_(low.unsqueeze(-1)).square_().mul_(precision).mul_(-0.5).exp_().mul_(root)
+    evoked = (terms @ node_weights(level)) / math.sqrt(2 * math.pi)
+    likelihood = torch.log(_mix(response, level, low, evoked))
+    return likelihood if inside is None else torch.where(censored, inside, likelihood)
+
+
+def _interval_likelihood(
+    response: Response, level: Tensor, ends: tuple[Tensor, Tensor], mean: Tensor, precision: Tensor
+) -> Tensor:
+    """Log probability that log(mep / floor) lies between two ends, shape (..., p, n)."""
+
+    def below(end: Tensor) -> Tensor:
+        evoked = torch.special.ndtr((end.unsqueeze(-1) - mean) * precision.sqrt()) @ node_weights(level)
+        silent = torch.special.ndtr(end / response.floor_log_sd.unsqueeze(-1))
+        first, last = OUTLIER_LOG_RANGE
+        outlier = ((end - first) / (last - first)).clamp(0.0, 1.0)
+        responds = _response_probability(response, level)
+        mixed = responds * evoked + (1.0 - responds) * silent
+        return (1.0 - OUTLIER_PROBABILITY) * mixed + OUTLIER_PROBABILITY * outlier
+
+    low, high = ends
+    return torch.log((below(high) - below(low)).clamp_min(1e-9))
+
+
+def outcome_density(response: Response, level: Tensor, log_mep: Tensor) -> Tensor:
+    """Density of log MEPs at given levels of facilitation, for every combination.
+
+    Args:
+        response: response parameters, fields of shape (..., p).
+        level: facilitation, shape (..., p, t).
+        log_mep: natural log of MEPs [mV], shape (..., 1, y).
+
+    Returns:
+        Shape (..., p, t, y).
+    """
+    log_relative = log_mep - response.log_floor.unsqueeze(-1)
+    mean, precision = _components(response, level)
+    gap = mean.unsqueeze(-2) - log_relative[..., None, :, None]
+    terms = gap.square_().mul_(precision.mul(-0.5).unsqueeze(-2)).exp_()
+    evoked = (terms @ (precision.sqrt() * node_weights(level)).unsqueeze(-1)).squeeze(-1) / math.sqrt(2 * math.pi)
+    flat = Response(*(field.unsqueeze(-1) for field in response))
+    return _mix(flat, level.unsqueeze(-1), log_relative.unsqueeze(-2), evoked)

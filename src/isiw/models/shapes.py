@@ -1,0 +1,71 @@
+"""Facilitation by ISI, as believed: one family of profiles in torch that is flexible enough for skew, plateau and two peaks.
+
+The simulated people of `isiw.profiles` have shapes of their own; this is the model's view of any person.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import torch
+
+from isiw.models.protocol import Tensor
+
+__all__ = ["Shape", "ShapeKind", "facilitation"]
+
+PEAKS_AT = (0.27, 0.73)
+PEAK_SD = 1 / 7.5
+
+
+class ShapeKind(IntEnum):
+    """Families of profiles."""
+
+    GAUSSIAN = 0
+    SKEWED = 1
+    PLATEAU = 2
+    TWO_PEAK = 3
+
+
+class Shape(NamedTuple):
+    """Profiles of many particles; all fields have the particles' shape (..., p).
+
+    Args:
+        kind: the family, one of `ShapeKind`.
+        start_ms: where the rising flank has exp(-2) of the peak [ms].
+        width_ms: width of the span [ms].
+        form: what the family leaves open, in -1..1: position of the peak, flatness, or the heights of two peaks.
+    """
+
+    kind: Tensor
+    start_ms: Tensor
+    width_ms: Tensor
+    form: Tensor
+
+
+def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:
+    """Facilitation in 0–1.
+
+    Args:
+        shape: profiles, fields of shape (..., p).
+        isi_ms: ISIs [ms], shape (..., 1 or p, t).
+
+    Returns:
+        Facilitation, shape (..., p, t).
+    """
+    kind, form = shape.kind.unsqueeze(-1), shape.form.unsqueeze(-1)
+    share = (isi_ms - shape.start_ms.unsqueeze(-1)) / shape.width_ms.unsqueeze(-1)
+    peak_at = torch.where(kind == ShapeKind.SKEWED, 0.5 + 0.33 * form, 0.5)
+    exponent = torch.where(kind == ShapeKind.PLATEAU, 2.0 * torch.exp(0.75 * (form + 1.0)), 2.0)
+    offset = share - peak_at
+    flank = torch.where(offset < 0, peak_at, 1.0 - peak_at)
+    one = torch.exp(-2.0 * (offset.abs() / flank).clamp(1e-6, 1e3).pow(exponent))
+    if not bool((kind == ShapeKind.TWO_PEAK).any()):
+        return one
+    lower = 1.0 - 0.7 * form.abs()
+    first, second = torch.where(form < 0, lower, 1.0), torch.where(form < 0, 1.0, lower)
+    two = sum(
+        height * torch.exp(-0.5 * ((share - at) / PEAK_SD).square())
+        for height, at in zip((first, second), PEAKS_AT, strict=True)
+    )
+    return torch.where(kind == ShapeKind.TWO_PEAK, two, one)
