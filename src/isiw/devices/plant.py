@@ -199,7 +199,7 @@ class Taps:
 
 
 def draw_taps(geometry: Geometry, n: int, rng: np.random.Generator) -> Taps:
-    """n taps with the variation of a geometry."""
+    """Taps with the variation of a geometry, n of them."""
     z = rng.standard_normal((4, n))
     fault = rng.uniform(size=(3, n))
     stuck = np.where(fault[2] < geometry.stuck_probability, math.nan, 0.0)

@@ -24,7 +24,8 @@ __all__ = [
     "force_n",
     "mep_mv",
     "mep_shape",
-    "record",
+    "record_emg",
+    "record_robot",
     "sample_times_ms",
     "tap_artefact_mv",
     "tms_artefact_mv",
@@ -58,24 +59,13 @@ def sample_times_ms(rate_hz: float, duration_ms: float, valve_ms: float) -> Floa
     return np.arange(round(duration_ms * rate_hz / 1000)) * (1000 / rate_hz) - valve_ms
 
 
-def record(
-    since_valve_ms: FloatArray,
-    rate_hz: float,
-    taps: Taps,
-    rng: np.random.Generator,
-    *,
-    pulse_ms: FloatArray | None = None,
-    evoked_mv: FloatArray | None = None,
-) -> dict[str, FloatArray]:
-    """What the sensors record of n taps, by channel in the units of `UNITS`, each of shape (n, w).
+def record_robot(since_valve_ms: FloatArray, taps: Taps, rng: np.random.Generator) -> dict[str, FloatArray]:
+    """What the robot's sensors record of n taps, by channel in the units of `UNITS`, each of shape (n, w).
 
     Args:
         since_valve_ms: times of the samples after the valve command [ms], shape (w,).
-        rate_hz: their rate [Hz].
         taps: what the robot does.
         rng: source of the sensors' noise.
-        pulse_ms: the magnetic pulse [ms after the valve command], NaN for none, shape (n,).
-        evoked_mv: peak-to-peak amplitude of the MEP [mV], shape (n,).
     """
     noise, shape = taps.geometry.noise, (len(taps.hit_ms), len(since_valve_ms))
     times = np.broadcast_to(since_valve_ms, shape)
@@ -84,31 +74,39 @@ def record(
         "valve": valve_v(times, taps.late_ms) + noise.valve_v * rng.standard_normal(shape),
         "pressure": chamber_kpa(times, taps) + noise.pressure_kpa * rng.standard_normal(shape),
         "acceleration": np.clip(moved, -ACCELEROMETER_M_S2, ACCELEROMETER_M_S2),
-        "emg": _emg_mv(times, rate_hz, taps, rng, pulse_ms, evoked_mv),
     }
     if taps.geometry.load_cell:
         channels["force"] = force_n(times, taps) + noise.force_n * rng.standard_normal(shape)
     return channels
 
 
-def _emg_mv(
+def record_emg(
     since_valve_ms: FloatArray,
     rate_hz: float,
     taps: Taps,
     rng: np.random.Generator,
-    pulse_ms: FloatArray | None,
-    evoked_mv: FloatArray | None,
+    *,
+    pulse_ms: FloatArray,
+    evoked_mv: FloatArray,
 ) -> FloatArray:
-    n, samples = since_valve_ms.shape
-    emg = emg_noise_uv(n, samples, rate_hz, taps.geometry.noise.emg_uv, rng) / 1000
+    """The EMG of n taps and pulses: noise, both artefacts, and the MEP [mV], shape (n, w).
+
+    Args:
+        since_valve_ms: times of the samples after the valve command [ms], shape (w,).
+        rate_hz: their rate [Hz].
+        taps: what the robot does.
+        rng: source of the noise, of the pulse's artefact, and of the MEP's latency and length.
+        pulse_ms: the magnetic pulse [ms after the valve command], NaN for none, shape (n,).
+        evoked_mv: peak-to-peak amplitude of the MEP [mV], shape (n,).
+    """
+    n = len(taps.hit_ms)
+    emg = emg_noise_uv(n, len(since_valve_ms), rate_hz, taps.geometry.noise.emg_uv, rng) / 1000
     emg += tap_artefact_mv(since_valve_ms - taps.memg_ms[:, None], taps.geometry.artefact_mv)
-    if pulse_ms is not None:
-        since_pulse = since_valve_ms - pulse_ms[:, None]
-        sign, size = rng.choice((-1.0, 1.0), n), rng.uniform(*PULSE_ARTEFACT_MV, n)
-        emg += tms_artefact_mv(since_pulse, sign * size)
-        shift, stretch = LATENCY_SD_MS * rng.standard_normal(n), 1 + STRETCH_SD * rng.standard_normal(n)
-        emg += mep_mv(since_pulse, np.zeros(n) if evoked_mv is None else evoked_mv, shift, stretch)
-    return emg
+    since_pulse = since_valve_ms - pulse_ms[:, None]
+    sign, size = rng.choice((-1.0, 1.0), n), rng.uniform(*PULSE_ARTEFACT_MV, n)
+    emg += tms_artefact_mv(since_pulse, sign * size)
+    shift, stretch = LATENCY_SD_MS * rng.standard_normal(n), 1 + STRETCH_SD * rng.standard_normal(n)
+    return emg + mep_mv(since_pulse, evoked_mv, shift, stretch)
 
 
 def valve_v(since_valve_ms: FloatArray, late_ms: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, TypeAlias
 
@@ -13,21 +13,19 @@ import numpy as np
 from isiw.devices.plant import Geometry, Taps, draw_taps
 from isiw.devices.presets import preset
 from isiw.devices.protocol import DeviceInfo, require_staged
-from isiw.devices.rendering import UNITS, record, sample_times_ms
+from isiw.devices.rendering import UNITS, record_emg, record_robot, sample_times_ms
 from isiw.errors import DeviceError, InvalidValueError
-from isiw.signals.impact import VALVE_MS, impact_time
+from isiw.signals.impact import DETECTION_LATENCY_MS, VALVE_MS, impact_time
 from isiw.trials import Channel, Stimulus, Sweep
-from isiw.types import Reference
+from isiw.types import FloatArray, Reference
 
-__all__ = ["DETECTION_LATENCY_MS", "HitDelay", "Tapper", "TapperSettings", "Trigger"]
+__all__ = ["HitDelay", "Tapper", "TapperSettings", "Trigger"]
 
 Trigger: TypeAlias = Literal["open-loop", "impact"]
 
 SWEEP_MS = 1000.0
 AFTER_PULSE_MS = 60.0
 ALONE_MS = 200.0  # TMS alone comes as late after the (silent) valve command as a usual pulse
-DETECTION_LATENCY_MS = 2.0
-"""The least time from an impact to a pulse that it triggers: the fall must leave the hysteresis band."""
 
 
 class Evoked(Protocol):
@@ -47,8 +45,9 @@ class TapperSettings:
         trigger: "open-loop" schedules the pulse from the predicted impact, "impact" triggers it by the detected one.
         accelerometer: whether the hammer has one; without it the impact is predicted, never measured.
         rate_hz: sampling rate of all channels [Hz].
-        expected_hit_ms: what is known of the hit delay before the first tap: its mean [ms].
-        expected_hit_sd_ms: and the SD of a single tap about it, person to person and tap to tap [ms].
+        expected_hit_ms: what is known of a person's hit delay before the first tap [ms].
+        expected_hit_sd_ms: SD from person to person about it [ms].
+        expected_tap_sd_ms: SD from tap to tap [ms].
 
     Raises:
         InvalidValueError: an unknown word, a value that is not positive, or an impact trigger without accelerometer.
@@ -59,7 +58,8 @@ class TapperSettings:
     accelerometer: bool = True
     rate_hz: float = 5000.0
     expected_hit_ms: float = 180.0
-    expected_hit_sd_ms: float = 6.5
+    expected_hit_sd_ms: float = 6.0
+    expected_tap_sd_ms: float = 2.5
 
     def __post_init__(self) -> None:
         if self.reference not in {"impact", "valve"} or self.trigger not in {"open-loop", "impact"}:
@@ -68,25 +68,30 @@ class TapperSettings:
                 got=(self.reference, self.trigger),
                 expected='"impact" or "valve", and "open-loop" or "impact"',
             )
-        for name in ("rate_hz", "expected_hit_ms", "expected_hit_sd_ms"):
+        for name in ("rate_hz", "expected_hit_ms", "expected_hit_sd_ms", "expected_tap_sd_ms"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidValueError(f"TapperSettings.{name} must be positive", got=getattr(self, name))
         if self.trigger == "impact" and not self.accelerometer:
             raise InvalidValueError("the impact cannot trigger a pulse without an accelerometer to find it")
+
+    @property
+    def blind_isi_sd_ms(self) -> float:
+        """SD of an ISI whose impact is not measured [ms]; from the valve command only the taps vary, not the person."""
+        person_ms = self.expected_hit_sd_ms if self.reference == "impact" else 0.0
+        return math.hypot(person_ms, self.expected_tap_sd_ms)
 
 
 class HitDelay:
     """The running estimate of the delay from the valve command to the impact.
 
     Args:
-        expected_ms: its mean before the first measured hit [ms].
-        expected_sd_ms: the SD of a hit about it [ms].
+        expected_ms: what it is taken for before the first measured hit [ms].
     """
 
     LAST = 21
 
-    def __init__(self, expected_ms: float, expected_sd_ms: float) -> None:
-        self._expected_ms, self._expected_sd_ms = expected_ms, expected_sd_ms
+    def __init__(self, expected_ms: float) -> None:
+        self._expected_ms = expected_ms
         self._hits_ms: deque[float] = deque(maxlen=self.LAST)
 
     def measured(self, delay_ms: float) -> None:
@@ -97,11 +102,6 @@ class HitDelay:
     def mean_ms(self) -> float:
         """The hit delay to reckon with [ms]: the median of the last hits, which a few late valves do not move."""
         return float(np.median(self._hits_ms)) if self._hits_ms else self._expected_ms
-
-    @property
-    def sd_ms(self) -> float:
-        """SD of the next hit about it [ms]; what was expected, until there are hits enough to know."""
-        return float(np.std(self._hits_ms, ddof=1)) if len(self._hits_ms) >= 5 else self._expected_sd_ms
 
 
 class Tapper:
@@ -124,7 +124,7 @@ class Tapper:
     ) -> None:
         self.geometry = preset(geometry) if isinstance(geometry, str) else geometry
         self.settings = settings or TapperSettings()
-        self.hit_delay = HitDelay(self.settings.expected_hit_ms, self.settings.expected_hit_sd_ms)
+        self.hit_delay = HitDelay(self.settings.expected_hit_ms)
         self._respond, self._seed = respond, seed
         self._staged, self._delivered = False, 0
 
@@ -192,51 +192,62 @@ class Tapper:
         return self._pulse_alone(taps, rng) if stimulus.isi_ms is None else self._pair(taps, stimulus.isi_ms, rng)
 
     def _pulse_alone(self, taps: Taps, rng: np.random.Generator) -> Sweep:
-        return self._sweep(taps.none(), ALONE_MS, self._respond(None), rng, valve=False)
+        silent, times = taps.none(), self._times_ms(ALONE_MS)
+        channels = self._channels(times, silent, rng)
+        channels["emg"] = self._emg(times, silent, ALONE_MS, rng)
+        return Sweep(channels, t_tms_ms=VALVE_MS + ALONE_MS)
 
     def _pair(self, taps: Taps, isi_ms: float, rng: np.random.Generator) -> Sweep:
-        hit_ms = float(taps.hit_ms[0])
-        pulse_ms = self._pulse_ms(taps, isi_ms)
-        tapped = not math.isnan(hit_ms)
-        evoked = None if pulse_ms is None else self._respond(pulse_ms - hit_ms if tapped else None)
-        return self._sweep(taps, pulse_ms, evoked, rng)
-
-    def _pulse_ms(self, taps: Taps, isi_ms: float) -> float | None:
-        """When the pulse comes [ms after the valve command]; None where no impact triggers it."""
         after_impact_ms = self._after_impact_ms(isi_ms)
-        if self.settings.trigger == "open-loop":
-            return self.hit_delay.mean_ms + after_impact_ms
-        hit_ms = float(taps.hit_ms[0])
-        return None if math.isnan(hit_ms) else hit_ms + after_impact_ms
-
-    def _sweep(
-        self, taps: Taps, pulse_ms: float | None, evoked: Evoked | None, rng: np.random.Generator, *, valve: bool = True
-    ) -> Sweep:
-        rate_hz = self.settings.rate_hz
-        duration_ms = max(SWEEP_MS, VALVE_MS + (pulse_ms or 0.0) + AFTER_PULSE_MS)
-        times = sample_times_ms(rate_hz, duration_ms, VALVE_MS)
-        pulses = None if pulse_ms is None else np.array([pulse_ms])
-        evoked_mv = None if evoked is None else np.array([evoked.mep_mv])
-        waves = record(times, rate_hz, taps, rng, pulse_ms=pulses, evoked_mv=evoked_mv)
-        channels = {
-            name: Channel(wave[0], rate_hz, UNITS[name]) for name, wave in waves.items() if self._has.get(name, True)
-        }
-        predicted = valve and not self.settings.accelerometer
-        sweep = Sweep(
+        predicted_ms = self.hit_delay.mean_ms
+        times = self._times_ms(predicted_ms + after_impact_ms)
+        channels = self._channels(times, taps, rng)
+        measured_ms = self._measured_hit_ms(channels)
+        start_ms = predicted_ms if self.settings.trigger == "open-loop" else measured_ms
+        pulse_ms = None if start_ms is None else start_ms + after_impact_ms
+        channels["emg"] = self._emg(times, taps, pulse_ms, rng)
+        if measured_ms is not None:
+            self.hit_delay.measured(measured_ms)
+        blind = not self.settings.accelerometer
+        return Sweep(
             channels,
-            t_valve_ms=VALVE_MS if valve else None,
+            t_valve_ms=VALVE_MS,
             t_tms_ms=None if pulse_ms is None else VALVE_MS + pulse_ms,
-            t_hit_ms=VALVE_MS + self.hit_delay.mean_ms if predicted else None,
-            isi_sd_ms=self.hit_delay.sd_ms if predicted else 0.0,
+            t_hit_ms=VALVE_MS + predicted_ms if blind else None,
+            isi_sd_ms=self.settings.blind_isi_sd_ms if blind else 0.0,
         )
-        self._learn(sweep)
-        return sweep
 
-    def _learn(self, sweep: Sweep) -> None:
-        """Correct the hit delay by what the accelerometer shows of this tap."""
-        if sweep.t_valve_ms is None or "acceleration" not in sweep.channels:
-            return
-        channel = sweep.channels["acceleration"]
-        hit_ms = impact_time(channel.values, channel.rate_hz, sweep.t_valve_ms)
-        if hit_ms is not None:
-            self.hit_delay.measured(hit_ms - sweep.t_valve_ms)
+    def _times_ms(self, pulse_ms: float) -> FloatArray:
+        """A sweep of 1 s, or longer where the pulse comes late [ms after the valve command]."""
+        return sample_times_ms(
+            self.settings.rate_hz, max(SWEEP_MS, VALVE_MS + pulse_ms + AFTER_PULSE_MS), valve_ms=VALVE_MS
+        )
+
+    def _channels(self, times_ms: FloatArray, taps: Taps, rng: np.random.Generator) -> dict[str, Channel]:
+        waves = record_robot(times_ms, taps, rng)
+        return {name: self._channel(name, wave[0]) for name, wave in waves.items() if self._has.get(name, True)}
+
+    def _channel(self, name: str, values: FloatArray) -> Channel:
+        return Channel(values, self.settings.rate_hz, UNITS[name])
+
+    def _measured_hit_ms(self, channels: Mapping[str, Channel]) -> float | None:
+        """The impact that the accelerometer shows [ms after the valve command]."""
+        if not self.settings.accelerometer:
+            return None
+        hit_ms = impact_time(channels["acceleration"].values, self.settings.rate_hz, VALVE_MS)
+        return None if hit_ms is None else hit_ms - VALVE_MS
+
+    def _emg(self, times_ms: FloatArray, taps: Taps, pulse_ms: float | None, rng: np.random.Generator) -> Channel:
+        hit_ms = float(taps.hit_ms[0])
+        evoked_mv = 0.0
+        if pulse_ms is not None:
+            evoked_mv = self._respond(None if math.isnan(hit_ms) else pulse_ms - hit_ms).mep_mv
+        wave = record_emg(
+            times_ms,
+            self.settings.rate_hz,
+            taps,
+            rng,
+            pulse_ms=np.array([math.nan if pulse_ms is None else pulse_ms]),
+            evoked_mv=np.array([evoked_mv]),
+        )
+        return self._channel("emg", wave[0])

@@ -16,7 +16,7 @@ from isiw.errors import InvalidValueError
 from isiw.signals.waveforms import as_waveforms, rest_level
 from isiw.types import ArrayLike, FloatArray, IntArray
 
-__all__ = ["HYSTERESIS_SD", "VALVE_MS", "impact_time", "impact_times"]
+__all__ = ["DETECTION_LATENCY_MS", "HYSTERESIS_SD", "VALVE_MS", "impact_time", "impact_times"]
 
 VALVE_MS = 500.0
 """The valve command in a trial of 1 s (dissertation, 4.2)."""
@@ -26,7 +26,8 @@ HYSTERESIS_SD = 6.0
 
 FALL_MS = 2.0
 MOTION_MS = 10.0
-DECELERATION_MS = 5.0
+DETECTION_LATENCY_MS = 5.0
+"""How much of the deceleration is seen before an impact is called one; nothing can be triggered sooner."""
 
 
 def impact_time(acceleration: ArrayLike, rate_hz: float, after_ms: float = VALVE_MS) -> float | None:
@@ -66,7 +67,7 @@ def impact_times(acceleration: ArrayLike, rate_hz: float, after_ms: float = VALV
     steps = round(FALL_MS * rate_hz / 1000)
     fall = _samples(above_rest, rows, falls, -steps, 1)
     motion = _samples(above_rest, rows, falls, -steps - round(MOTION_MS * rate_hz / 1000), -steps).mean(axis=-1)
-    deceleration = -_samples(above_rest, rows, falls, 0, round(DECELERATION_MS * rate_hz / 1000)).min(axis=-1)
+    deceleration = -_samples(above_rest, rows, falls, 0, round(DETECTION_LATENCY_MS * rate_hz / 1000)).min(axis=-1)
     impact = (fall.max(axis=-1) > band[rows]) & (motion > band[rows]) & (deceleration > motion)
     times = np.full(len(waves), math.nan)
     hit_rows, first = np.unique(rows[impact], return_index=True)  # the candidates ascend within a row

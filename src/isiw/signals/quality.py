@@ -41,7 +41,8 @@ class SignalLimits:
         mep_window_ms: where the MEP is sought [ms after the pulse]; `MEP_WINDOWS_MS` has one for each muscle group.
         background_uv: the most EMG at rest before the pulse [µV RMS]; above it the muscle was not relaxed.
         full_scale_mv: the largest EMG that the amplifier can show [mV]; None to look for flat tops only.
-        isi_tolerance_ms: how far the realised ISI may be from the commanded one [ms]; the space's tolerance is the most.
+        isi_tolerance_ms: how far the realised ISI may be from the commanded one [ms], where that is less than the
+            space's tolerance.
         tap_artefact_ms: how long the artefact of the tap lasts in the EMG [ms]; what it covers of the MEP window does
             not count.
 
