@@ -11,8 +11,16 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOME = {
+    "CallbackDevice": "devices.callback",
     "DesignSpace": "design",
+    "Device": "devices.protocol",
+    "DeviceInfo": "devices.protocol",
     "IMPACT_SPACE": "design",
+    "Limits": "devices.limits",
+    "RecordedDevice": "devices.recorded",
+    "ReplayDevice": "devices.replay",
+    "Session": "session",
+    "SimulatedDevice": "devices.simulated",
     "VALVE_SPACE": "design",
     "Window": "window",
     "WindowEstimate": "window",
@@ -22,8 +30,13 @@ _HOME = {
     "Sweep": "trials",
     "Trial": "trials",
     "TrialTable": "trials",
+    "exclude": "resumption",
+    "list_strategies": "catalogue",
+    "make_strategy": "catalogue",
+    "read_session": "log.reader",
+    "resume": "resumption",
 }
-_MODULES = {"errors", "metrics", "signals", "subjects"}
+_MODULES = {"config", "errors", "metrics", "plots", "report", "signals", "subjects"}
 
 __all__ = ["__version__", *sorted(_HOME), *sorted(_MODULES)]  # noqa: PLE0604 - the names are strings, listed above
 

@@ -12,7 +12,7 @@ from typing import Protocol
 from isiw.errors import InvalidValueError
 from isiw.window import WindowEstimate
 
-__all__ = ["AnyOf", "Budget", "CredibleWidth", "NoWindow", "Progress", "StopDecision", "StoppingRule"]
+__all__ = ["AnyOf", "Budget", "CredibleWidth", "NoWindow", "Progress", "StopDecision", "StoppingRule", "stimuli_left"]
 
 
 @dataclass(frozen=True)
@@ -139,3 +139,17 @@ class AnyOf:
             if decision.stop:
                 return decision
         return StopDecision(stop=False, reason=" ".join(decision.reason for decision in decisions))
+
+
+def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:
+    """How many stimuli a rule's budget still allows; None where it sets none.
+
+    Args:
+        rule: the stopping rule.
+        delivered: stimuli delivered so far.
+    """
+    if isinstance(rule, Budget):
+        return max(0, rule.max_trials - delivered)
+    if isinstance(rule, AnyOf):
+        return min((left for r in rule.rules if (left := stimuli_left(r, delivered)) is not None), default=None)
+    return None

@@ -2,7 +2,7 @@
 
 A simulated person answers the stimulus with an amplitude. The sweep is a really recorded one without a MEP, plus a
 really recorded MEP, scaled so that the sum has the person's amplitude from 15 to 35 ms. Noise, offset, artefact and
-waveform are therefore real; *whether and how strongly* a MEP follows is simulated. The recordings (University of Eastern
+waveform are therefore real; whether a MEP follows, and how large, is simulated. The recordings (University of Eastern
 Finland, BSD-3-Clause) are not part of the package; see the repository NeuromodulationUEF/MEPFeatX.
 """
 
@@ -85,7 +85,7 @@ class Recordings:
             return float(np.ptp(floor + scale * unit)) - mep_mv
 
         if missing_mv(0.0) >= 0:
-            return quiet
+            return np.asarray(quiet)
         # The sum's amplitude is at least scale * ptp(unit) - ptp(floor), so this scale is enough.
         enough = (mep_mv + np.ptp(floor)) / np.ptp(unit)
         return np.asarray(quiet + brentq(missing_mv, 0.0, enough) * template, dtype=np.float64)

@@ -73,6 +73,7 @@ class Judged:
     """What a sweep came to: accepted, or a mistrial with its reason. All times are on the sweep's clock.
 
     Args:
+        status: accepted or mistrial.
         reason: why it is a mistrial; None where accepted.
         isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone or where unknown.
         isi_sd_ms: SD of the realised ISI [ms]; 0 where both of its events were measured.
@@ -83,6 +84,7 @@ class Judged:
         t_tms_ms: the magnetic pulse [ms].
     """
 
+    status: Status = Status.ACCEPTED
     reason: MistrialReason | None = None
     isi_ms: float | None = None
     isi_sd_ms: float = 0.0
@@ -91,16 +93,6 @@ class Judged:
     t_valve_ms: float | None = None
     t_hit_ms: float | None = None
     t_tms_ms: float | None = None
-
-    @property
-    def accepted(self) -> bool:
-        """Whether the trial may be told."""
-        return self.reason is None
-
-    @property
-    def status(self) -> Status:
-        """Accepted or mistrial."""
-        return Status.ACCEPTED if self.accepted else Status.MISTRIAL
 
 
 def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Judged:
@@ -157,7 +149,7 @@ def _longest_run(mask: FloatArray) -> int:
 
 
 def _mistrial(judged: Judged, reason: MistrialReason) -> Judged:
-    return replace(judged, reason=reason)
+    return replace(judged, status=Status.MISTRIAL, reason=reason)
 
 
 def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Judged:

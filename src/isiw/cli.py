@@ -1,0 +1,153 @@
+"""The command line. Everything else is loaded only once a command runs, so that `--help` is there at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+import isiw
+
+if TYPE_CHECKING:
+    from isiw.session import Session, SessionUpdate
+
+__all__ = ["app"]
+
+DAMAGED = 3
+INTERRUPTED = 130  # what shells report for Ctrl-C
+
+app = typer.Typer(
+    name="isiw",
+    help="Find the inter-stimulus intervals at which a tap enhances the MEP, with as few stimuli as possible.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+_WIDTHS = (6, 9, 30, 10, 16, 10, 10, 5)
+_NO_DEFAULT = {"show_default": False}
+
+Log = Annotated[Path, typer.Argument(help="A session's log.", **_NO_DEFAULT)]
+Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **_NO_DEFAULT)]
+Seed = Annotated[int | None, typer.Option(help="Seed of the person, the trials and the strategy.", **_NO_DEFAULT)]
+
+
+@app.command()
+def run(
+    config: Annotated[Path | None, typer.Argument(help="A configuration file (TOML).", **_NO_DEFAULT)] = None,
+    subject: Annotated[
+        str | None,
+        typer.Option(help="simulated, or recorded: a simulated person's MEPs in recorded EMG.", **_NO_DEFAULT),
+    ] = None,
+    data: Data = None,
+    seed: Seed = None,
+    log: Annotated[Path | None, typer.Option(help="Where to log; by default a new file in isiw-sessions.")] = None,
+) -> None:
+    """Run a session with a simulated person, and say what was found."""
+    with _errors_reported():
+        settings = isiw.config.load_config(config).with_overrides(seed=seed, log=log, subject=subject, data=data)
+        _run_to_the_end(isiw.config.session_for(settings, on_trial=_show_progress))
+
+
+@app.command()
+def resume(
+    log: Log,
+    data: Data = None,
+    verify: Annotated[bool, typer.Option(help="Check that the strategy asks again what it asked then.")] = True,  # noqa: FBT002 - a flag of the command line
+) -> None:
+    """Go on with a session that was interrupted."""
+    with _errors_reported():
+        settings = isiw.config.config_of_log(isiw.read_session(log)).with_overrides(data=data)
+        device = isiw.config.device_for(settings)
+        _run_to_the_end(isiw.resume(log, device, on_trial=_show_progress, verify=verify))
+
+
+@app.command()
+def show(log: Log) -> None:
+    """List a session's trials and say what was found; works on a damaged log, too."""
+    with _errors_reported():
+        record = isiw.read_session(log)
+        for row in (isiw.report.TRIAL_HEADINGS, *isiw.report.trial_rows(record)):
+            _print_row(row)
+        for event in record.events:
+            _print(f"{event.kind}, trial {event.trial}: {event.text}")
+        _print(isiw.report.final_statement(record), style="bold")
+        _exit_if_damaged(record.losses)
+
+
+@app.command()
+def plot(
+    log: Log,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Where to: .png, .pdf, .svg …")],
+) -> None:
+    """Draw a session: profile, trials, window, and how they came."""
+    with _errors_reported():
+        record = isiw.read_session(log)
+        truth = isiw.config.true_window(record) if record.header.config else None
+        _print(f"picture: {isiw.plots.save_session_plot(record, output, truth=truth)}")
+        _exit_if_damaged(record.losses)
+
+
+@app.command()
+def exclude(
+    log: Log,
+    trial: Annotated[int, typer.Argument(help="The trial's number, as in isiw show.")],
+    reason: Annotated[str, typer.Option(help="Why, for whoever reads the log.")],
+) -> None:
+    """Exclude a trial afterwards; nothing is erased, and resuming learns without it."""
+    with _errors_reported():
+        isiw.exclude(log, trial, reason)
+        _print(f"Trial {trial} is excluded: {reason}")
+
+
+def _run_to_the_end(session: Session) -> None:
+    _print(f"log: {session.log_path}")
+    _print_row(isiw.report.PROGRESS_HEADINGS)
+    try:
+        result = session.run()
+    except BaseException:
+        _print(f"The session ended early. Its log is safe; go on with: isiw resume {session.log_path}")
+        raise
+    record = isiw.read_session(result.log)
+    truth = isiw.config.true_window(record)
+    picture = isiw.plots.save_session_plot(record, result.log.with_suffix(".png"), truth=truth)
+    _print(f"\n{isiw.report.final_statement(record)}", style="bold")
+    _print(isiw.report.truth_sentence(record, truth))
+    _print(f"log:     {result.log}\npicture: {picture}")
+
+
+def _show_progress(update: SessionUpdate) -> None:
+    _print_row(isiw.report.progress_row(update))
+
+
+def _print_row(cells: Sequence[str]) -> None:
+    _print("".join(cell.ljust(width) for cell, width in zip(cells, _WIDTHS, strict=False)).rstrip())
+
+
+def _print(text: str, *, style: str | None = None, stderr: bool = False) -> None:
+    """Print, coloured where the output is a terminal."""
+    Console(stderr=stderr, highlight=False, soft_wrap=True).print(text, style=style, markup=False)
+
+
+def _exit_if_damaged(losses: Sequence[str]) -> None:
+    for loss in losses:
+        _print(loss, style="red")
+    if losses:
+        raise typer.Exit(DAMAGED)
+
+
+@contextmanager
+def _errors_reported() -> Iterator[None]:
+    """Turn what isiw raises into a message and an exit code."""
+    try:
+        yield
+    except isiw.errors.IsiwError as error:
+        _print(f"error: {error}", style="red", stderr=True)
+        raise typer.Exit(DAMAGED if isinstance(error, isiw.errors.DamagedLogError) else 1) from error
+    except KeyboardInterrupt as error:
+        _print("Interrupted: the device is stopped and the log is closed.", style="red", stderr=True)
+        raise typer.Exit(INTERRUPTED) from error

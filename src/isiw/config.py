@@ -1,0 +1,249 @@
+"""Configuration files: read, checked, and turned into a session.
+
+Every key may be left out. Example:
+
+    seed = 7
+    [subject]
+    kind = "recorded"
+    data = "recordings/uef"
+    [strategy]
+    settings = { max_trials = 40 }
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import difflib
+import itertools
+import tomllib
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from isiw.catalogue import make_strategy
+from isiw.design import DesignSpace
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import Device
+from isiw.devices.recorded import RecordedDevice, load_recordings
+from isiw.devices.simulated import SimulatedDevice
+from isiw.errors import ConfigError
+from isiw.log.reader import SessionRecord
+from isiw.session import Session, SessionUpdate
+from isiw.subjects import SimulatedSubject, cohort
+from isiw.types import Reference
+from isiw.window import Window
+
+__all__ = [
+    "RunConfig",
+    "config_of_log",
+    "device_for",
+    "fresh_log_path",
+    "load_config",
+    "session_for",
+    "subject_for",
+    "true_window",
+]
+
+SESSIONS = Path("isiw-sessions")
+"""Where sessions are logged that were given no path."""
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class SubjectConfig(_Section):
+    """Who is stimulated: a simulated person, whose MEPs may be put into recorded EMG."""
+
+    kind: Literal["simulated", "recorded"] = "simulated"
+    cohort: str = "recruitment"
+    number: int = Field(default=0, ge=0)
+    data: Path | None = None
+
+
+class SpaceConfig(_Section):
+    """The design space, as in `isiw.DesignSpace`."""
+
+    low_ms: float = 0.0
+    high_ms: float = 500.0
+    step_ms: float = 1.0
+    reference: Reference = "valve"
+    tolerance_ms: float = 10.0
+
+
+class StrategyConfig(_Section):
+    """The strategy: a name from `isiw.list_strategies()` and its settings."""
+
+    name: str = "default"
+    settings: dict[str, Any] = Field(default_factory=dict)
+
+
+class LimitsConfig(_Section):
+    """The limits, as in `isiw.Limits`; the ISI is limited to the design space."""
+
+    min_iti_s: float = Field(default=5.0, ge=0.0, allow_inf_nan=False)
+    max_pulses: int = Field(default=200, ge=1)
+
+
+class RunConfig(_Section):
+    """Everything that `isiw run` can be told."""
+
+    seed: int = Field(default=0, ge=0)
+    log: Path | None = None
+    subject: SubjectConfig = SubjectConfig()
+    space: SpaceConfig = SpaceConfig()
+    strategy: StrategyConfig = StrategyConfig()
+    limits: LimitsConfig = LimitsConfig()
+
+    def with_overrides(
+        self,
+        *,
+        seed: int | None = None,
+        log: Path | None = None,
+        subject: str | None = None,
+        data: Path | None = None,
+    ) -> RunConfig:
+        """The same, with what was given on the command line."""
+        values = self.model_dump()
+        values |= {key: value for key, value in {"seed": seed, "log": log}.items() if value is not None}
+        about = {"kind": subject, "data": data}
+        values["subject"] |= {key: value for key, value in about.items() if value is not None}
+        return _validated(values, "the command line")
+
+
+def load_config(path: str | Path | None = None) -> RunConfig:
+    """Read a configuration file; without one, the defaults.
+
+    Args:
+        path: a TOML file.
+
+    Raises:
+        ConfigError: it cannot be read, or has an unknown key or a bad value; the message names file, key and value.
+    """
+    if path is None:
+        return RunConfig()
+    try:
+        values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(
+            f"the configuration cannot be read: {error.strerror}", got=str(path), remedy="Check the path."
+        ) from error
+    except ValueError as error:  # not TOML, or not UTF-8
+        raise ConfigError(f"{path} is not valid TOML: {error}", remedy="Mend the line that it names.") from error
+    return _validated(values, str(path))
+
+
+def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
+    try:
+        return RunConfig.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        if first["type"] == "extra_forbidden":
+            known = _known_keys(first["loc"][:-1])
+            close = difflib.get_close_matches(str(first["loc"][-1]), known, n=1)
+            guess = f"Did you mean {close[0]}? " if close else ""
+            raise ConfigError(
+                f"{source}: the key {key} is unknown",
+                got=first["input"],
+                expected=f"one of {', '.join(known)}",
+                remedy=f"{guess}Correct it or remove it.",
+            ) from error
+        raise ConfigError(
+            f"{source}: the value of {key} cannot be used",
+            got=first["input"],
+            expected=_expectation(first["msg"]),
+            remedy="Correct it, or remove the key to have its default.",
+        ) from error
+
+
+def _expectation(message: str) -> str:
+    return message.removeprefix("Input should be ").removeprefix("Value error, ")
+
+
+def _known_keys(section: tuple[int | str, ...]) -> list[str]:
+    kind: type[BaseModel] = RunConfig
+    for name in section:
+        inner = kind.model_fields[str(name)].annotation
+        if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+            return []
+        kind = inner
+    return sorted(kind.model_fields)
+
+
+def config_of_log(record: SessionRecord) -> RunConfig:
+    """The configuration that a logged session was run with.
+
+    Raises:
+        ConfigError: it was run by other software than `isiw run`.
+    """
+    if not record.header.config:
+        raise ConfigError(
+            "the session was not run by isiw run, so its device is not known here",
+            got=record.header.device.name,
+            remedy="Resume it from the software that ran it: isiw.resume(path, device).run()",
+        )
+    return _validated(record.header.config, str(record.path))
+
+
+def fresh_log_path(config: RunConfig) -> Path:
+    """A path in the default folder at which there is no log yet."""
+    stem = f"{dt.datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}_seed{config.seed}"
+    names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
+    paths = (SESSIONS / f"{name}.mcap" for name in names)
+    return next(path for path in paths if not path.exists() and not path.with_name(f"{path.name}.part").exists())
+
+
+def subject_for(config: RunConfig) -> SimulatedSubject:
+    """The simulated person."""
+    return cohort(config.subject.cohort, config.subject.number + 1, config.seed)[-1]
+
+
+def true_window(record: SessionRecord) -> Window | None:
+    """The true window of the simulated person in a log; None where there is none.
+
+    Raises:
+        ConfigError: the person is not simulated.
+    """
+    return subject_for(config_of_log(record)).window(record.header.space)
+
+
+def device_for(config: RunConfig) -> Device:
+    """The device: a simulated person, in recorded EMG where asked for.
+
+    Raises:
+        ConfigError: recorded EMG without its folder.
+        DeviceError: no recordings in the folder.
+    """
+    reference = config.space.reference
+    respond = partial(subject_for(config).begin(config.seed).respond, reference=reference)
+    if config.subject.kind == "simulated":
+        return SimulatedDevice(respond, reference)
+    if config.subject.data is None:
+        raise ConfigError(
+            "subject.data is missing: recorded EMG is not part of the package",
+            expected="the folder with the recordings",
+            remedy="Give it with --data DIR.",
+        )
+    return RecordedDevice(respond, reference, load_recordings(config.subject.data), config.seed)
+
+
+def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:
+    """The session that a configuration describes, ready to run."""
+    space = DesignSpace(**config.space.model_dump())
+    log = config.log or fresh_log_path(config)
+    kept = config.model_dump(mode="json", exclude_none=True, exclude={"log"})
+    if config.subject.data is not None:
+        kept["subject"]["data"] = str(config.subject.data.resolve())
+    return Session(
+        device_for(config),
+        make_strategy(config.strategy.name, space=space, seed=config.seed, **config.strategy.settings),
+        log=log,
+        limits=Limits.of_space(space, **config.limits.model_dump()),
+        on_trial=on_trial,
+        subject=f"{config.subject.cohort}-{config.seed}-{config.subject.number}",
+        config=kept,
+    )

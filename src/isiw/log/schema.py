@@ -1,0 +1,268 @@
+"""What is in a log: one kind of record a topic, as JSON with a JSON schema.
+
+    /header     who, with what, and how: everything needed to make the strategy again
+    /intent     about to be delivered; an intent without a trial was interrupted
+    /trial      what came of it
+    /emg …      the waveforms of a trial, one topic a channel
+    /estimate   what was believed after the trial, and what is asked next
+    /event      an exclusion, a limit, a fault, a resumption, a fallback
+
+JSON knows no infinity: where a number is not finite it is one of the strings "Infinity", "-Infinity" and "NaN".
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self, TypeAlias
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, WithJsonSchema
+
+from isiw.design import DesignSpace
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import DeviceInfo
+from isiw.errors import InvalidValueError
+from isiw.signals.quality import SignalLimits
+from isiw.stopping import StopDecision
+from isiw.trials import Channel, Trial
+from isiw.types import FloatArray
+from isiw.window import Window, WindowEstimate
+
+__all__ = [
+    "CHANNEL_NAMES",
+    "SCHEMA_VERSION",
+    "TOPICS",
+    "Estimate",
+    "Event",
+    "EventKind",
+    "Header",
+    "Intent",
+    "Record",
+    "StrategyRecipe",
+    "Waveform",
+    "adapter",
+    "decode",
+    "encode",
+    "json_schema",
+    "topic_of",
+]
+
+SCHEMA_VERSION = 1
+CHANNEL_NAMES = ("emg", "acceleration", "pressure", "force", "valve")
+PROFILE_DECIMALS = 6  # a nanovolt; the profile is a picture of the posterior, not a measurement
+
+Number: TypeAlias = Annotated[float, WithJsonSchema({"type": ["number", "string"]})]
+Numbers: TypeAlias = Annotated[
+    tuple[float, ...], WithJsonSchema({"type": "array", "items": {"type": ["number", "string"]}})
+]
+
+
+class _Record(BaseModel):
+    """A frozen record; keys that a newer version added are ignored."""
+
+    model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", extra="ignore")
+
+
+class StrategyRecipe(_Record):
+    """How the strategy was made; an empty name means from a user's own objects."""
+
+    name: str
+    seed: int
+    settings: dict[str, Any] = Field(default_factory=dict)
+
+
+class Header(_Record):
+    """What a session is, written before anything else."""
+
+    schema_version: int = SCHEMA_VERSION
+    isiw_version: str
+    created: str
+    subject: str = ""
+    seed: int
+    strategy: StrategyRecipe
+    space: DesignSpace
+    limits: Limits
+    device: DeviceInfo
+    signals: SignalLimits
+    versions: dict[str, str] = Field(default_factory=dict)
+    config: dict[str, Any] = Field(default_factory=dict)
+
+
+class Intent(_Record):
+    """A pair of stimuli that is about to be delivered."""
+
+    trial: int
+    isi_ms: float | None
+    t_s: float = 0.0
+
+
+class Waveform(_Record):
+    """One waveform of one trial."""
+
+    trial: int
+    t0_ms: float
+    rate_hz: float
+    unit: str
+    values: Numbers
+
+    @classmethod
+    def of(cls, trial: int, channel: Channel) -> Self:
+        """The record of a channel."""
+        return cls(
+            trial=trial,
+            t0_ms=channel.t0_ms,
+            rate_hz=channel.rate_hz,
+            unit=channel.unit,
+            values=tuple(channel.values.tolist()),
+        )
+
+    def channel(self) -> Channel:
+        """The channel as it was recorded."""
+        return Channel(np.asarray(self.values), self.rate_hz, self.unit, self.t0_ms)
+
+
+class Estimate(_Record):
+    """What was believed after a trial, whether to stop, and what is asked next."""
+
+    trial: int
+    probability: float | None
+    segments_ms: tuple[float, ...] = ()
+    start_ms: Number | None = None
+    end_ms: Number | None = None
+    start_low_ms: Number | None = None
+    start_high_ms: Number | None = None
+    end_low_ms: Number | None = None
+    end_high_ms: Number | None = None
+    grid_ms: tuple[float, ...] = ()
+    profile_mv: Numbers = ()
+    band_low_mv: Numbers = ()
+    band_high_mv: Numbers = ()
+    next_isi_ms: float | None = None
+    stop: bool = False
+    reason: str = ""
+
+    @classmethod
+    def of(cls, trial: int, estimate: WindowEstimate, decision: StopDecision, next_isi_ms: float | None) -> Self:
+        """The record of an estimate, with its 90 % intervals."""
+        segments = () if estimate.window is None else tuple(itertools.chain(*estimate.window.segments))
+        start, end = estimate.interval(0.9) or ((None, None), (None, None))
+        return cls(
+            trial=trial,
+            probability=estimate.probability,
+            segments_ms=segments,
+            start_ms=estimate.start_ms,
+            end_ms=estimate.end_ms,
+            start_low_ms=start[0],
+            start_high_ms=start[1],
+            end_low_ms=end[0],
+            end_high_ms=end[1],
+            next_isi_ms=next_isi_ms,
+            stop=decision.stop,
+            reason=decision.reason,
+            **_profile(estimate),
+        )
+
+    @property
+    def window(self) -> Window | None:
+        """The reported window."""
+        edges = self.segments_ms
+        pairs = tuple(zip(edges[::2], edges[1::2], strict=True))
+        return Window(edges[0], edges[-1], pairs) if pairs else None
+
+    @property
+    def decision(self) -> StopDecision:
+        """Whether the session stops here, and why."""
+        return StopDecision(self.stop, self.reason)
+
+
+def _profile(estimate: WindowEstimate) -> Mapping[str, tuple[float, ...]]:
+    band = None if estimate.grid_ms is None else estimate.profile(estimate.grid_ms)
+    if band is None or estimate.grid_ms is None:
+        return {}
+    return {
+        "grid_ms": tuple(estimate.grid_ms.tolist()),
+        "profile_mv": _rounded(band.median_mv),
+        "band_low_mv": _rounded(band.low_mv),
+        "band_high_mv": _rounded(band.high_mv),
+    }
+
+
+def _rounded(values: FloatArray) -> tuple[float, ...]:
+    return tuple(np.asarray(values, dtype=np.float64).round(PROFILE_DECIMALS).tolist())
+
+
+EventKind: TypeAlias = Literal["exclusion", "limit", "fault", "resume", "fallback"]
+
+
+class Event(_Record):
+    """Something that happened to a session or to one of its trials."""
+
+    kind: EventKind
+    trial: int | None = None
+    text: str = ""
+
+
+Record: TypeAlias = Header | Intent | Trial | Waveform | Estimate | Event
+
+_KINDS: dict[str, type[Any]] = {
+    "/header": Header,
+    "/intent": Intent,
+    "/trial": Trial,
+    "/estimate": Estimate,
+    "/event": Event,
+}
+_TOPIC_OF_KIND = {kind: topic for topic, kind in _KINDS.items()}
+
+TOPICS = (*_KINDS, *(f"/{name}" for name in CHANNEL_NAMES))
+"""The topics of every log, in the order of their channel numbers from 1."""
+
+_ADAPTERS: dict[str, TypeAdapter[Any]] = {topic: TypeAdapter(kind) for topic, kind in _KINDS.items()}
+_WAVEFORM: TypeAdapter[Any] = TypeAdapter(Waveform)
+
+
+def adapter(topic: str) -> TypeAdapter[Any]:
+    """What turns a topic's records into JSON and back; any topic that is not isiw's own holds waveforms."""
+    return _ADAPTERS.get(topic, _WAVEFORM)
+
+
+def topic_of(record: Record, channel_name: str | None = None) -> str:
+    """The topic of a record.
+
+    Args:
+        record: any record.
+        channel_name: the channel, for a waveform.
+
+    Raises:
+        InvalidValueError: a waveform without a channel's name, or with one that isiw uses for itself.
+    """
+    if not isinstance(record, Waveform):
+        return _TOPIC_OF_KIND[type(record)]
+    topic = f"/{channel_name or ''}"
+    if topic == "/" or topic in _KINDS:
+        raise InvalidValueError(
+            "a waveform's channel cannot have this name", got=channel_name, remedy="Rename it in the device."
+        )
+    return topic
+
+
+def encode(topic: str, record: Record) -> bytes:
+    """A record as JSON."""
+    return adapter(topic).dump_json(record)
+
+
+def decode(topic: str, data: bytes) -> Record:
+    """The record that was encoded.
+
+    Raises:
+        ValueError: not such a record.
+    """
+    record: Record = adapter(topic).validate_json(data)
+    return record
+
+
+def json_schema(topic: str) -> tuple[str, bytes]:
+    """Name and JSON schema of a topic's records; the root is an object."""
+    kind = _KINDS.get(topic, Waveform)
+    return f"isiw.{kind.__name__}", json.dumps(adapter(topic).json_schema(mode="serialization")).encode()

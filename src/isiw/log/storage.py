@@ -1,0 +1,153 @@
+"""Files that survive a crash: synced, locked while they are written, and renamed in one step."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import IO
+
+from isiw.errors import LogError
+
+if sys.platform != "win32":
+    import fcntl
+
+__all__ = ["DurableFile", "interrupts_deferred", "log_of", "part_of", "refuse_if_locked", "sync_folder"]
+
+
+def part_of(path: Path) -> Path:
+    """Where a log is while it is being written."""
+    return path.with_name(f"{path.name}.part")
+
+
+def log_of(path: Path) -> Path:
+    """Where a log is once it is finished, from either of its names."""
+    return path.with_suffix("") if path.suffix == ".part" else path
+
+
+def sync_folder(folder: Path) -> None:
+    """Make a rename in this folder durable; Windows does so by itself."""
+    if sys.platform == "win32":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _lock(file: IO[bytes], path: Path) -> None:
+    """Claim a file until it is closed; Windows does not let an open file be replaced anyway.
+
+    Raises:
+        LogError: another process has it.
+    """
+    if sys.platform == "win32":
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise LogError(
+            "the log is being written by a running session", got=str(path), remedy="End that session first."
+        ) from error
+
+
+def refuse_if_locked(path: Path) -> None:
+    """Raise where another process writes to a file.
+
+    Raises:
+        LogError: it does.
+    """
+    with path.open("rb") as file:
+        _lock(file, path)
+
+
+@contextmanager
+def interrupts_deferred() -> Iterator[None]:
+    """Let Ctrl-C wait until the block is done, so that no record is written by half."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Python interrupts the main thread only
+        return
+    pending: list[tuple[int, FrameType | None]] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: pending.append((number, frame)))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before if before is not None else signal.default_int_handler)
+        if pending and callable(before):
+            before(*pending[0])
+
+
+@contextmanager
+def _disk_errors(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise LogError(
+            f"the log cannot be written: {error.strerror}",
+            got=str(path),
+            remedy="What was synced before is safe. Make room, then resume the session.",
+        ) from error
+
+
+class DurableFile:
+    """A new binary file that can be renamed while it is written.
+
+    Args:
+        path: where it is; must not exist.
+
+    Raises:
+        LogError: it exists, or cannot be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: IO[bytes] = path.open("xb")
+        except OSError as error:
+            raise LogError(
+                f"the log cannot be made: {error.strerror}", got=str(path), remedy="Choose another path."
+            ) from error
+        self.path = path
+        _lock(self._file, path)
+
+    def write(self, data: bytes) -> int:
+        """Append."""
+        with _disk_errors(self.path):
+            return self._file.write(data)
+
+    def tell(self) -> int:
+        """Size so far."""
+        return self._file.tell()
+
+    def flush(self) -> None:
+        """Hand everything to the operating system."""
+        with _disk_errors(self.path):
+            self._file.flush()
+
+    def sync(self) -> None:
+        """Make everything so far durable."""
+        with _disk_errors(self.path):
+            self._file.flush()
+            os.fsync(self._file.fileno())
+
+    def move_to(self, path: Path) -> None:
+        """Take another file's place in one step, and go on there."""
+        self.close()
+        self.path.replace(path)
+        sync_folder(path.parent)
+        self.path = path
+        self._file = path.open("r+b")
+        self._file.seek(0, os.SEEK_END)
+        _lock(self._file, path)
+
+    def close(self) -> None:
+        """Make everything durable and close."""
+        if not self._file.closed:
+            self.sync()
+            self._file.close()

@@ -1,0 +1,186 @@
+"""Writing a log: every record is appended, and durable once `sync` has returned."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self, cast
+
+import tomli_w
+from mcap.writer import Writer
+
+from isiw.errors import LogError
+from isiw.log.salvage import Message, Salvage
+from isiw.log.schema import TOPICS, Header, Record, encode, json_schema, topic_of
+from isiw.log.storage import DurableFile, interrupts_deferred, log_of, part_of, refuse_if_locked, sync_folder
+
+__all__ = ["CONFIGURATION", "LogWriter"]
+
+CONFIGURATION = "configuration.toml"
+"""The attachment that holds the header once more, as TOML."""
+
+
+class LogWriter:
+    """One session's log: `FILE.part` while it is written, `FILE` once it is closed.
+
+    Use `LogWriter.create` or `LogWriter.continuing`; as a context manager it closes itself.
+
+    Args:
+        path: where the log will be.
+        file: the empty file to write to.
+    """
+
+    def __init__(self, path: Path, file: DurableFile) -> None:
+        self.path = path
+        self._file = file
+        # Its annotation asks for a whole file; write, tell and flush are what it uses.
+        self._writer = Writer(cast("IO[bytes]", file), enable_data_crcs=True)
+        self._channels: dict[str, int] = {}
+        self._records = 0
+        self._log_time_ns = 0
+        self._replaces = False
+        self._writer.start(profile="isiw", library="isiw")
+        for topic in TOPICS:
+            self._register(topic)
+
+    @classmethod
+    def create(cls, path: str | Path, header: Header) -> Self:
+        """Start a new log with its header.
+
+        Raises:
+            LogError: there is one already, finished or not; it is never overwritten.
+        """
+        target = Path(path)
+        for existing in (target, part_of(target)):
+            if existing.exists():
+                raise LogError(
+                    "there is a log already, and it is never overwritten",
+                    got=str(existing),
+                    remedy=f"Choose another path, or continue it: isiw resume {target}",
+                )
+        log = cls(target, DurableFile(part_of(target)))
+        log.begin(header)
+        log.append(header)
+        log.sync()
+        sync_folder(target.parent)
+        return log
+
+    @classmethod
+    def continuing(cls, path: str | Path, salvage: Salvage, header: Header) -> Self:
+        """Go on with a log: everything that was salvaged, and then what comes.
+
+        The old file keeps its place until the copy is durable. Where something was lost it is kept for good, as
+        `FILE.damaged`.
+
+        Args:
+            path: the log, with or without `.part`.
+            salvage: what was read from it.
+            header: its header.
+
+        Raises:
+            LogError: it is still being written.
+        """
+        target = log_of(Path(path))
+        refuse_if_locked(salvage.path)
+        copy = target.with_name(f"{target.name}.resuming")
+        if copy.exists():  # an earlier attempt was killed before it took over; its source is still whole
+            refuse_if_locked(copy)
+            copy.unlink()
+        fresh = DurableFile(copy)
+        log = cls(target, fresh)
+        log._replaces = True
+        log.begin(header)
+        if not any(message.topic == "/header" for message in salvage.messages):
+            log.append(header)
+        for message in salvage.messages:
+            log._copy(message)
+        log.sync()
+        if salvage.losses:
+            _keep(salvage.path, target)
+        fresh.move_to(part_of(target))
+        return log
+
+    def begin(self, header: Header) -> None:
+        """Write what is no message: metadata for whoever lists files, and the header as TOML."""
+        facts = {
+            "isiw_version": header.isiw_version,
+            "schema_version": str(header.schema_version),
+            "subject": header.subject,
+            "seed": str(header.seed),
+            "created": header.created,
+        }
+        text = tomli_w.dumps(header.model_dump(mode="json", exclude_none=True))
+        now_ns = time.time_ns()
+        self._writer.add_metadata("session", facts)
+        self._writer.add_attachment(now_ns, now_ns, CONFIGURATION, "application/toml", text.encode())
+
+    def append(self, record: Record, channel_name: str | None = None) -> None:
+        """Append a record; it is durable after the next `sync`.
+
+        Args:
+            record: what to append.
+            channel_name: the channel, for a waveform.
+        """
+        topic = topic_of(record, channel_name)
+        self._copy(Message(topic, encode(topic, record), time.time_ns()))
+
+    def sync(self) -> None:
+        """Return when everything appended is on the disk."""
+        with interrupts_deferred():
+            self._writer.flush()
+            self._file.sync()
+
+    def close(self) -> None:
+        """Finish the log and give it its name.
+
+        Raises:
+            LogError: somebody has put a file there meanwhile; the log stays `FILE.part`.
+        """
+        with interrupts_deferred():
+            self._writer.finish()
+            self._file.close()
+            if self.path.exists() and not self._replaces:
+                raise LogError(
+                    "another file has taken the log's place",
+                    got=str(self.path),
+                    remedy=f"The log is complete and stays at {self._file.path}.",
+                )
+            self._file.path.replace(self.path)
+            sync_folder(self.path.parent)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _copy(self, message: Message) -> None:
+        with interrupts_deferred():
+            self._log_time_ns = max(self._log_time_ns, message.log_time_ns)
+            channel = self._register(message.topic)
+            self._writer.add_message(channel, self._log_time_ns, message.data, self._log_time_ns, self._records)
+            self._records += 1
+
+    def _register(self, topic: str) -> int:
+        if topic not in self._channels:
+            name, schema = json_schema(topic)
+            self._channels[topic] = self._writer.register_channel(
+                topic, "json", self._writer.register_schema(name, "jsonschema", schema)
+            )
+        return self._channels[topic]
+
+
+def _keep(damaged: Path, target: Path) -> None:
+    """Keep a damaged file's bytes under a name of their own."""
+    number = 0
+    while True:
+        kept = target.with_name(f"{target.name}.damaged{number or ''}")
+        try:
+            kept.hardlink_to(damaged)
+        except FileExistsError:
+            number += 1
+        else:
+            return

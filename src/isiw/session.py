@@ -1,0 +1,282 @@
+"""The closed loop: ask, log the intent, deliver, judge, log the trial, tell.
+
+What is on disk is always ahead of what happens next: the intent before its stimulus, the trial before it is told.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime as dt
+import importlib.metadata
+import platform
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from isiw.asktell import Strategy
+from isiw.design import DesignSpace
+from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
+from isiw.devices.limits import LimitedDevice, Limits
+from isiw.devices.protocol import Answer, Device
+from isiw.errors import DeviceError, LimitExceededError
+from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform
+from isiw.log.writer import LogWriter
+from isiw.signals.quality import Judged, SignalLimits, judge
+from isiw.stopping import StopDecision, stimuli_left
+from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Sweep, Trial, TrialTable
+from isiw.window import WindowEstimate
+
+__all__ = ["Session", "SessionResult", "SessionUpdate", "learn"]
+
+_PACKAGES = ("numpy", "torch", "botorch", "gpytorch")
+
+
+@dataclass(frozen=True)
+class SessionUpdate:
+    """What is known after one trial.
+
+    Args:
+        trial: the trial.
+        estimate: what is believed about the window.
+        decision: whether the session stops here, and why.
+        next_isi_ms: what is asked next [ms]; None where the session stops.
+        stimuli_left: how many stimuli the budget and the limits still allow.
+    """
+
+    trial: Trial
+    estimate: WindowEstimate
+    decision: StopDecision
+    next_isi_ms: float | None
+    stimuli_left: int
+
+
+@dataclass(frozen=True)
+class SessionResult:
+    """How a session ended.
+
+    Args:
+        estimate: what is believed about the window.
+        decision: why it ended.
+        trials: all its trials.
+        log: its log.
+    """
+
+    estimate: WindowEstimate
+    decision: StopDecision
+    trials: TrialTable
+    log: Path
+
+
+def learn(strategy: Strategy, trial: Trial) -> None:
+    """Tell a strategy one trial, or count it where there is nothing to tell."""
+    if trial.told:
+        strategy.tell(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
+    else:
+        strategy.count_mistrial()
+
+
+class Session:
+    """One person's session, from the first ask to the decision.
+
+    Args:
+        device: delivers the stimuli; its ISIs count from the same event as the strategy's space.
+        strategy: proposes ISIs and learns.
+        log: where the log will be; must not exist yet.
+        limits: what may be delivered; the strategy's space, 5 s between stimuli and 200 pulses by default.
+        clock: tells the time and waits; a virtual one by default where the device is simulated.
+        on_trial: called after every trial, when it is safely on disk.
+        subject: the person's code, for the log.
+        signals: what a sweep must keep to be accepted.
+        config: anything that should be kept in the log, as TOML values.
+        timeout_s: how long the device may take for one delivery [s].
+
+    Raises:
+        DeviceError: the device counts its ISIs from another event than the space.
+    """
+
+    def __init__(  # noqa: PLR0913 - the public surface of the design; all but two are keyword-only
+        self,
+        device: Device,
+        strategy: Strategy,
+        *,
+        log: str | Path,
+        limits: Limits | None = None,
+        clock: Clock | None = None,
+        on_trial: Callable[[SessionUpdate], None] | None = None,
+        subject: str = "",
+        signals: SignalLimits | None = None,
+        config: Mapping[str, Any] | None = None,
+        timeout_s: float = 30.0,
+    ) -> None:
+        space, info = strategy.space, device.describe()
+        if info.reference != space.reference:
+            raise DeviceError(
+                "the device and the design space count ISIs from different events",
+                got=info.reference,
+                expected=space.reference,
+                remedy="Give the DesignSpace the device's reference.",
+            )
+        self.strategy = strategy
+        self.trials = TrialTable()
+        self.log_path = Path(log)
+        self._raw_device = device
+        self._limits = limits or Limits.of_space(space)
+        self._clock = clock or (VirtualClock() if info.simulated else MonotonicClock())
+        self._signals = signals or SignalLimits()
+        self._on_trial, self._timeout_s = on_trial, timeout_s
+        recipe = strategy.recipe
+        self._header = Header(
+            isiw_version=importlib.metadata.version("isiw"),
+            created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+            subject=subject,
+            seed=recipe.seed,
+            strategy=StrategyRecipe(name=recipe.name, seed=recipe.seed, settings=dict(recipe.settings)),
+            space=space,
+            limits=self._limits,
+            device=info,
+            signals=self._signals,
+            versions={"python": platform.python_version()} | {p: importlib.metadata.version(p) for p in _PACKAGES},
+            config=dict(config or {}),
+        )
+        self._open_log: Callable[[], LogWriter] = lambda: LogWriter.create(log, self._header)
+        self._first_records: Sequence[Record] = ()
+
+    def continue_from(
+        self, trials: TrialTable, open_log: Callable[[], LogWriter], first_records: Sequence[Record]
+    ) -> None:
+        """Begin where another run ended; `isiw.resume` does this for you.
+
+        Args:
+            trials: what was delivered before; the strategy has learned it.
+            open_log: opens the log that goes on.
+            first_records: what it holds next.
+        """
+        self.trials, self._open_log, self._first_records = trials, open_log, first_records
+
+    def run(self) -> SessionResult:
+        """Run to the end, and close the log whatever happens.
+
+        Raises:
+            DeviceError: the device failed; it is stopped, and the trial is a mistrial "outcome unknown".
+            LimitExceededError: a stimulus was refused; nothing was delivered.
+            LogError: the log cannot be written; nothing is delivered without a log.
+        """
+        with self._open_log() as self._log:
+            try:
+                self._log_beginning()
+                with self._armed():
+                    decision = self._loop()
+            except BaseException as error:
+                self._log_failure(error)
+                raise
+        return SessionResult(self.strategy.estimate(), decision, self.trials, self._log.path)
+
+    @contextmanager
+    def _armed(self) -> Iterator[None]:
+        self._device = LimitedDevice(self._raw_device, self._limits, self._clock, delivered=len(self.trials))
+        try:
+            self._device.stage()
+            yield
+        finally:
+            try:
+                self._device.stop()
+            finally:
+                self._device.unstage()
+
+    def _log_beginning(self) -> None:
+        for record in self._first_records:
+            self._log.append(record)
+        if self.trials:
+            self._log_estimate(len(self.trials) - 1)
+
+    def _log_failure(self, error: BaseException) -> None:
+        kind: EventKind = "limit" if isinstance(error, LimitExceededError) else "fault"
+        text = "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else ""
+        self._log.append(Event(kind=kind, trial=len(self.trials), text=text or f"{type(error).__name__}: {error}"))
+
+    def _loop(self) -> StopDecision:
+        decision = self.strategy.decision()
+        while not decision.stop:
+            if not self._device.pulses_left:
+                decision = StopDecision(stop=True, reason=f"The limit of {self._limits.max_pulses} pulses is reached.")
+                self._log.append(Event(kind="limit", trial=len(self.trials), text=decision.reason))
+                return decision
+            decision = self._one_trial()
+        return decision
+
+    def _one_trial(self) -> StopDecision:
+        stimulus = Stimulus(len(self.trials), self.strategy.ask())
+        trial = self._delivered(stimulus)
+        learn(self.strategy, trial)
+        decision, next_isi_ms = self._log_estimate(trial.index)
+        if self._on_trial is not None:
+            update = SessionUpdate(trial, self.strategy.estimate(), decision, next_isi_ms, self._stimuli_left())
+            self._on_trial(update)
+        return decision
+
+    def _log_estimate(self, trial: int) -> tuple[StopDecision, float | None]:
+        """Put what is believed after a trial on disk; the decision and the next ISI [ms]."""
+        estimate, decision = self.strategy.estimate(), self.strategy.decision()
+        next_isi_ms = None if decision.stop else self.strategy.ask()
+        self._log.append(Estimate.of(trial, estimate, decision, next_isi_ms))
+        self._log.sync()
+        return decision, next_isi_ms
+
+    def _stimuli_left(self) -> int:
+        budget = stimuli_left(self.strategy.stopping, len(self.trials))
+        return self._device.pulses_left if budget is None else min(budget, self._device.pulses_left)
+
+    def _delivered(self, stimulus: Stimulus) -> Trial:
+        """Deliver, with the intent on disk before and the trial after, whatever the device does."""
+        self._clock.sleep_s(self._device.wait_s())
+        self._device.check(stimulus)
+        self._log.append(Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=self._clock.now_s()))
+        self._log.sync()
+        trial = _unknown(stimulus)
+        try:
+            answer = self._device.deliver(stimulus, self._timeout_s)
+            self._log_waveforms(stimulus, answer)
+            trial = self._judged(stimulus, answer)
+        finally:
+            self._log.append(trial)
+            self._log.sync()
+            self.trials = self.trials.appended(trial)
+        return trial
+
+    def _log_waveforms(self, stimulus: Stimulus, answer: Answer) -> None:
+        if isinstance(answer, Sweep):
+            for name, channel in answer.channels.items():
+                self._log.append(Waveform.of(stimulus.trial, channel), name)
+
+    def _judged(self, stimulus: Stimulus, answer: Answer) -> Trial:
+        space = self.strategy.space
+        if isinstance(answer, Sweep):
+            judged = judge(answer, stimulus, space, self._signals)
+        elif isinstance(answer, Measurement):
+            judged = _judge_measurement(answer, stimulus, space, self._signals)
+        else:
+            raise DeviceError("the device's answer is no answer", got=answer, expected="a Sweep or a Measurement")
+        return Trial(index=stimulus.trial, commanded_isi_ms=stimulus.isi_ms, **dataclasses.asdict(judged))
+
+
+def _unknown(stimulus: Stimulus) -> Trial:
+    return Trial(stimulus.trial, Status.MISTRIAL, stimulus.isi_ms, MistrialReason.OUTCOME_UNKNOWN)
+
+
+def _judge_measurement(answer: Measurement, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Judged:
+    """What `judge` says of a sweep, for a device that measured the MEP itself."""
+    if (answer.isi_ms is None) != (stimulus.isi_ms is None):
+        raise DeviceError(
+            "the device reports another kind of trial than it was told to deliver",
+            got=f"a realised ISI of {answer.isi_ms}",
+            expected=f"one for the commanded ISI of {stimulus.isi_ms}",
+        )
+    reason = None
+    if (answer.background_rms_uv or 0.0) > limits.background_uv:
+        reason = MistrialReason.BACKGROUND_ACTIVITY
+    if answer.isi_ms is not None and stimulus.isi_ms is not None:
+        off = abs(answer.isi_ms - stimulus.isi_ms) > space.tolerance_ms
+        reason = MistrialReason.ISI_OFF if off else reason
+    return Judged(Status.MISTRIAL if reason else Status.ACCEPTED, reason, **dataclasses.asdict(answer))
