@@ -82,8 +82,8 @@ def response_counts(isi_ms: ArrayLike, mep_mv: ArrayLike, threshold_mv: float) -
         raise InvalidValueError("ISIs and MEPs must be finite", remedy="Leave mistrials out.")
     if not 0 < threshold_mv < np.inf:
         raise InvalidValueError("the response threshold must be positive", got=threshold_mv)
-    counts = pd.DataFrame({"isi_ms": isi, "response": mep > threshold_mv}).groupby("isi_ms")["response"]
-    table = counts.agg(trials="count", responses="sum")
+    trials = pd.DataFrame({"isi_ms": isi, "response": mep > threshold_mv})
+    table = trials.groupby("isi_ms").agg(trials=("response", "count"), responses=("response", "sum"))
     table["share"] = table["responses"] / table["trials"]
     return table
 

@@ -21,7 +21,7 @@ from isiw.devices.plant import Geometry, draw_taps
 from isiw.devices.presets import preset
 from isiw.devices.rendering import record_emg, record_robot, sample_times_ms
 from isiw.errors import InvalidValueError
-from isiw.signals.events import TapEvents, detect_events
+from isiw.signals.events import TapEvents, detect_events, sweep_events
 from isiw.signals.impact import VALVE_MS
 from isiw.trials import Sweep
 from isiw.types import FloatArray
@@ -85,8 +85,8 @@ def event_table(events: TapEvents) -> pd.DataFrame:
     for name, times in events.columns().items():
         found = times[~np.isnan(times)]
         if found.size:
-            rows[name] = (found.mean(), found.std(ddof=1) if found.size > 1 else 0.0, found.min(), found.max())
-            rows[name] += (found.size,)
+            sd_ms = found.std(ddof=1) if found.size > 1 else 0.0
+            rows[name] = (found.mean(), sd_ms, found.min(), found.max(), found.size)
     table = pd.DataFrame.from_dict(rows, orient="index", columns=["mean_ms", "sd_ms", "low_ms", "high_ms", "n"])
     return table.rename_axis("event")
 
@@ -106,10 +106,13 @@ def error_table(commanded_ms: FloatArray, realised_ms: FloatArray) -> pd.DataFra
     trials = pd.DataFrame({"isi_ms": commanded_ms, "error_ms": realised_ms - commanded_ms})
     trials["mistrial"] = ~(realised_ms >= 0)
     trials = trials.dropna(subset="isi_ms")
-    errors = trials["error_ms"].mask(trials["mistrial"]).groupby(trials["isi_ms"])
-    table = errors.agg(n="count", mean_ms="mean", sd_ms="std")
-    table["mistrials"] = trials["mistrial"].groupby(trials["isi_ms"]).sum()
-    return table
+    trials["accepted_ms"] = trials["error_ms"].mask(trials["mistrial"])
+    return trials.groupby("isi_ms").agg(
+        n=("accepted_ms", "count"),
+        mean_ms=("accepted_ms", "mean"),
+        sd_ms=("accepted_ms", "std"),
+        mistrials=("mistrial", "sum"),
+    )
 
 
 def study_preset(
@@ -156,7 +159,7 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
     """
     parts, realised = [], []
     for sweep in sweeps:
-        parts.append(_events_of(sweep))
+        parts.append(sweep_events(sweep))
         realised.append(np.nan if sweep.t_tms_ms is None else sweep.t_tms_ms - parts[-1].hit_ms[0])
     if not parts:
         raise InvalidValueError("a study needs sweeps", got=0)
@@ -169,34 +172,8 @@ def _tap(geometry: Geometry, pulse_ms: FloatArray, rate_hz: float, rng: np.rando
     taps = draw_taps(geometry, len(pulse_ms), rng)
     times = sample_times_ms(rate_hz, TRIAL_MS, valve_ms=VALVE_MS)
     waves = record_robot(times, taps, rng)
-    emg = record_emg(
-        times, rate_hz, taps, rng, pulse_ms=pulse_ms - VALVE_MS, evoked_mv=np.zeros(len(pulse_ms))
-    )
+    emg = record_emg(times, rate_hz, taps, rng, pulse_ms=pulse_ms - VALVE_MS, evoked_mv=np.zeros(len(pulse_ms)))
     return detect_events(waves["acceleration"], rate_hz, pressure=waves["pressure"], emg=emg, t_tms_ms=pulse_ms)
-
-
-def _events_of(sweep: Sweep) -> TapEvents:
-    """The events of one sweep, on its own clock."""
-    channel = sweep.channels.get("acceleration")
-    if channel is None or sweep.t_valve_ms is None:
-        raise InvalidValueError(
-            "the timing of a tap needs its acceleration and the time of the valve command",
-            got=sorted(sweep.channels),
-            expected="a channel named acceleration, and t_valve_ms",
-        )
-    others = {
-        name: other.values
-        for name, other in sweep.channels.items()
-        if name in {"pressure", "emg"} and other.values.shape == channel.values.shape
-    }
-    found = detect_events(
-        channel.values,
-        channel.rate_hz,
-        valve_ms=sweep.t_valve_ms - channel.t0_ms,
-        t_tms_ms=None if sweep.t_tms_ms is None else sweep.t_tms_ms - channel.t0_ms,
-        **others,
-    )
-    return TapEvents(*(times + channel.t0_ms for times in found.columns().values()))
 
 
 def _joined(parts: Iterable[TapEvents]) -> TapEvents:

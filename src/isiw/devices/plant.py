@@ -128,7 +128,7 @@ class Geometry:
     @property
     def kinetic_share(self) -> float:
         """Kinetic friction, as a share of the supply pressure."""
-        return _pressure_share(self.descent_ms) - BREAK_AWAY_M_S2 / DRIVE_M_S2
+        return float(_pressure_share(self.descent_ms)) - BREAK_AWAY_M_S2 / DRIVE_M_S2
 
     @property
     def hit_speed_m_s(self) -> float:

@@ -56,7 +56,7 @@ MEP_TURNS = ((-0.60, 21.3, 1.5), (-0.16, 25.3, 1.2), (0.33, 29.9, 1.7), (0.10, 3
 
 def sample_times_ms(rate_hz: float, duration_ms: float, valve_ms: float) -> FloatArray:
     """Times of a sweep's samples after its valve command [ms], shape (w,)."""
-    return np.arange(round(duration_ms * rate_hz / 1000)) * (1000 / rate_hz) - valve_ms
+    return np.arange(round(duration_ms * rate_hz / 1000), dtype=np.float64) * (1000 / rate_hz) - valve_ms
 
 
 def record_robot(since_valve_ms: FloatArray, taps: Taps, rng: np.random.Generator) -> dict[str, FloatArray]:

@@ -1,6 +1,6 @@
 """From waveforms to numbers: impact, MEP, background, and the judgement of a trial."""
 
-from isiw.signals.events import TapEvents, detect_events
+from isiw.signals.events import TapEvents, detect_events, sweep_events
 from isiw.signals.impact import impact_time, impact_times
 from isiw.signals.mep import (
     MEP_WINDOWS_MS,
@@ -29,4 +29,5 @@ __all__ = [
     "mep_onset",
     "mep_onsets",
     "mep_present",
+    "sweep_events",
 ]

@@ -14,9 +14,10 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.signals.impact import HYSTERESIS_SD, VALVE_MS, impact_times
 from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, per_waveform, rest_level
+from isiw.trials import Channel, Sweep
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = ["TapEvents", "detect_events", "tap_artefact_times"]
+__all__ = ["TapEvents", "detect_events", "sweep_events", "tap_artefact_times"]
 
 ONSET_SD = 3.0
 ARTEFACT_SEARCH_MS = (12.0, 30.0)  # four people: 18 to 23 ms after the impact, SD below 2 (Table 3.2)
@@ -81,6 +82,41 @@ def detect_events(
         if emg is None
         else tap_artefact_times(_like(emg, waves, rate_hz, "EMG"), rate_hz, hit, valve_ms=valve_ms, t_tms_ms=t_tms_ms),
     )
+
+
+def sweep_events(sweep: Sweep) -> TapEvents:
+    """Find the events of one recorded tap, in ms of the sweep's own clock.
+
+    Args:
+        sweep: with an acceleration and the valve's time; pressure and EMG where they have the same samples.
+
+    Raises:
+        InvalidValueError: no acceleration, no valve time, or a waveform that is no recording.
+    """
+    channel = sweep.channels.get("acceleration")
+    if channel is None or sweep.t_valve_ms is None:
+        raise InvalidValueError(
+            "the timing of a tap needs its acceleration and the time of the valve command",
+            got=sorted(sweep.channels),
+            expected="a channel named acceleration, and t_valve_ms",
+        )
+    pressure, emg = (_same_samples(sweep.channels.get(name), channel) for name in ("pressure", "emg"))
+    found = detect_events(
+        channel.values,
+        channel.rate_hz,
+        pressure=pressure,
+        emg=emg,
+        valve_ms=sweep.t_valve_ms - channel.t0_ms,
+        t_tms_ms=None if sweep.t_tms_ms is None else sweep.t_tms_ms - channel.t0_ms,
+    )
+    return TapEvents(*(times + channel.t0_ms for times in found.columns().values()))
+
+
+def _same_samples(channel: Channel | None, other: Channel) -> FloatArray | None:
+    """The samples of a channel, where it was recorded at the same times as another."""
+    if channel is None or (channel.rate_hz, channel.t0_ms) != (other.rate_hz, other.t0_ms):
+        return None
+    return channel.values if channel.values.shape == other.values.shape else None
 
 
 def _like(values: ArrayLike, waves: FloatArray, rate_hz: float, name: str) -> FloatArray:

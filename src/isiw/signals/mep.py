@@ -20,6 +20,9 @@ from isiw.types import ArrayLike, BoolArray, FloatArray
 __all__ = [
     "MEP_WINDOWS_MS",
     "MEP_WINDOW_MS",
+    "MIN_BACKGROUND_MS",
+    "PULSE_GUARD_MS",
+    "TAP_SPAN_MS",
     "background_rms",
     "mep_amplitude",
     "mep_amplitudes",
@@ -36,9 +39,16 @@ MEP_WINDOWS_MS: Mapping[str, tuple[float, float]] = MappingProxyType({"forearm":
 
 PRESENT_MV = 0.05  # the field's convention; in a sham window 1.7 % of resting sweeps exceed it
 BACKGROUND_MS = 100.0
+
 MIN_BACKGROUND_MS = 40.0
+"""The least EMG at rest that says how relaxed the muscle is."""
+
 TAP_SPAN_MS = 50.0
+"""How long after an impact the EMG may show it: the artefact, begun within 30 ms, and its end."""
+
 PULSE_GUARD_MS = 1.0
+"""How long before the nominal pulse its artefact may begin."""
+
 SURE_SHARE = 0.2
 SURE_SD = 6.0
 ONSET_SD = 4.0

@@ -17,7 +17,14 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.signals.events import tap_artefact_times
 from isiw.signals.impact import impact_time
-from isiw.signals.mep import MEP_WINDOW_MS, background_rms, mep_amplitudes
+from isiw.signals.mep import (
+    MEP_WINDOW_MS,
+    MIN_BACKGROUND_MS,
+    PULSE_GUARD_MS,
+    TAP_SPAN_MS,
+    background_rms,
+    mep_amplitudes,
+)
 from isiw.trials import Channel, MistrialReason, Status, Stimulus, Sweep
 from isiw.types import ArrayLike, FloatArray
 
@@ -29,7 +36,6 @@ EMG_UNITS_MV: Mapping[str, float] = MappingProxyType({"V": 1e3, "mV": 1.0, "uV":
 ACCELERATION_UNITS = frozenset({"m/s^2", "m/s²", "g", "V", "mV"})
 """Units of the acceleration; the impact is found in any of them."""
 
-MIN_BACKGROUND_MS = 40.0
 FLAT_MS = 1.0
 
 
@@ -118,7 +124,9 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
     timed = replace(timed, background_rms_uv=_background_uv(emg_mv, emg, timed))
     if is_saturated(emg_mv, emg.rate_hz, limits.full_scale_mv):
         return _mistrial(timed, MistrialReason.SATURATION)
-    if timed.background_rms_uv is None or timed.background_rms_uv > limits.background_uv:
+    if timed.background_rms_uv is None:
+        return _mistrial(timed, MistrialReason.MISSING_CHANNEL)
+    if timed.background_rms_uv > limits.background_uv:
         return _mistrial(timed, MistrialReason.BACKGROUND_ACTIVITY)
     mep_mv = _mep_mv(emg_mv, emg, timed, limits)
     return _mistrial(timed, MistrialReason.OUTCOME_UNKNOWN) if math.isnan(mep_mv) else replace(timed, mep_mv=mep_mv)
@@ -226,13 +234,18 @@ def _on_channel(time_ms: float | None, channel: Channel) -> float:
 
 
 def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Judged) -> float | None:
-    rest_end = _on_channel(timed.t_tms_ms, emg)
-    if timed.t_hit_ms is None and timed.t_valve_ms is not None:
-        # Somewhere after the valve command there is the artefact of the tap, nobody knows where.
-        rest_end = min(rest_end, _on_channel(timed.t_valve_ms, emg))
-    if rest_end < MIN_BACKGROUND_MS + 1:
-        return None
-    return float(1000 * background_rms(emg_mv, emg.rate_hz, rest_end, _on_channel(timed.t_hit_ms, emg))[0])
+    """RMS of the EMG at rest, where possible of EMG that the tap cannot have touched; None where there is too little.
+
+    After the valve command the artefact of the tap may be anywhere if the impact is unknown. A short sweep may hold
+    nothing else, and then all of its EMG before the pulse is judged.
+    """
+    pulse, hit = _on_channel(timed.t_tms_ms, emg), _on_channel(timed.t_hit_ms, emg)
+    untouched = np.fmin(pulse, _on_channel(timed.t_valve_ms, emg)) if math.isnan(hit) else pulse
+    for end, tap in ((float(untouched), hit), (pulse, math.nan)):
+        touched = 0.0 if math.isnan(tap) else max(0.0, min(end, tap + TAP_SPAN_MS) - max(tap, 0.0))
+        if end - touched >= MIN_BACKGROUND_MS + 2 * PULSE_GUARD_MS:
+            return float(1000 * background_rms(emg_mv, emg.rate_hz, end, tap)[0])
+    return None
 
 
 def _mep_mv(emg_mv: FloatArray, emg: Channel, timed: Judged, limits: SignalLimits) -> float:
