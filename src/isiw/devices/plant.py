@@ -39,7 +39,7 @@ SUPPLY_KPA = 413.7
 LINE_DELAY_MS = 23.0  # t_fill of every preset; sound needs 22 ms for the 7.5 m line
 FILL_MS = 100.0  # time constant of the chamber
 DRIVE_M_S2 = 120.0  # acceleration of the hammer at the full supply pressure without friction
-BREAK_AWAY_M_S2 = 4.0  # what static friction exceeds kinetic friction by
+BREAK_AWAY_M_S2 = 6.0  # what static friction exceeds kinetic friction by
 DAMPING = 0.3  # of the contact, as a share of the critical one
 _ROOT = math.sqrt(1 - DAMPING**2)
 SEPARATION_RAD = (math.pi - math.atan2(2 * DAMPING * _ROOT, 1 - 2 * DAMPING**2)) / _ROOT
@@ -205,7 +205,9 @@ def draw_taps(geometry: Geometry, n: int, rng: np.random.Generator) -> Taps:
     stuck = np.where(fault[2] < geometry.stuck_probability, math.nan, 0.0)
     late = np.where(fault[0] < geometry.late_probability, geometry.late_ms[0] + fault[1] * np.ptp(geometry.late_ms), 0)
     kinetic = geometry.kinetic_share
-    descent = np.maximum(geometry.descent_ms + geometry.descent_sd_ms * z[0], LINE_DELAY_MS + 1.0)
+    # However low the static friction, nothing moves before the pressure exceeds the kinetic one.
+    earliest_ms = LINE_DELAY_MS - FILL_MS * math.log1p(-kinetic) + 1.0
+    descent = np.maximum(geometry.descent_ms + geometry.descent_sd_ms * z[0], earliest_ms)
     travel_sd_ms = geometry.travel_sd_ms or 0.0
     travel = geometry.travel_mm + geometry.hit_speed_m_s * travel_sd_ms * z[1]
     hit = _arrival(descent, travel, kinetic, geometry.hit_ms)

@@ -134,10 +134,10 @@ def mep_onsets(
     """
     waves = as_waveforms(emg_mv, rate_hz, "EMG")
     pulse = per_waveform(t_tms_ms, waves)
+    segment, times = _window(waves, rate_hz, pulse, (EARLIEST_ONSET_MS, window_ms[1]))
     rest = _quiet(waves, rate_hz, pulse, per_waveform(None, waves))
     level = np.nanmedian(rest, axis=-1, keepdims=True)
     noise = 1.4826 * np.nanmedian(np.abs(rest - level), axis=-1, keepdims=True)
-    segment, times = _window(waves, rate_hz, pulse, (EARLIEST_ONSET_MS, window_ms[1]))
     deviation = np.abs(segment - level)
     in_window = times - pulse[:, None] >= window_ms[0]
     amplitude = mep_amplitudes(waves, rate_hz, pulse, window_ms)[:, None]
@@ -221,6 +221,8 @@ def _window(
 def _quiet(waves: FloatArray, rate_hz: float, pulse_ms: FloatArray, hit_ms: FloatArray) -> FloatArray:
     """The last 100 ms of rest before each pulse, the rest of the columns NaN, shape (n, samples)."""
     reach = round((BACKGROUND_MS + TAP_SPAN_MS) * rate_hz / 1000)
+    if not np.isfinite(pulse_ms).all():
+        raise InvalidValueError("the time of the pulse must be finite", got=pulse_ms)
     stop = np.floor((pulse_ms - PULSE_GUARD_MS) * rate_hz / 1000).astype(np.int64)
     columns = (stop - reach)[:, None] + np.arange(reach)
     since_hit = columns * 1000 / rate_hz - hit_ms[:, None]
