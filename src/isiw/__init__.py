@@ -28,6 +28,8 @@ _HOME = {
     "Measurement": "trials",
     "Stimulus": "trials",
     "Sweep": "trials",
+    "Tapper": "devices.tapper",
+    "TapperSettings": "devices.tapper",
     "Trial": "trials",
     "TrialTable": "trials",
     "exclude": "resumption",
@@ -36,7 +38,18 @@ _HOME = {
     "read_session": "log.reader",
     "resume": "resumption",
 }
-_MODULES = {"config", "errors", "metrics", "plots", "report", "signals", "subjects"}
+_MODULES = {
+    "config",
+    "counts",
+    "errors",
+    "metrics",
+    "plots",
+    "plots_timing",
+    "report",
+    "signals",
+    "subjects",
+    "timing",
+}
 
 __all__ = ["__version__", *sorted(_HOME), *sorted(_MODULES)]  # noqa: PLE0604 - the names are strings, listed above
 

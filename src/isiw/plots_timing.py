@@ -63,13 +63,13 @@ def _draw_events(axes: Axes, study: TimingStudy) -> None:
         if name in table.index:
             mean, sd = table.loc[name, ["mean_ms", "sd_ms"]]
             label = f"{_NAMES[name]}  {mean:.0f} ± {sd:.1f} ms"
-            bins = np.arange(np.floor(np.nanmin(times)), np.ceil(np.nanmax(times)) + 1)
+            bins = np.arange(np.floor(np.nanmin(times)), np.ceil(np.nanmax(times)) + 1).tolist()
             axes.hist(times[~np.isnan(times)], bins=bins, color=_COLOURS[name], alpha=0.8, label=label)
     axes.set_yscale("log")
     axes.set_xlabel("time in the trial [ms]; valve command at 500", fontsize=9)
     axes.set_ylabel("taps per ms", fontsize=9)
     axes.set_title(f"{study.name}: {len(study.commanded_ms)} taps", fontsize=11, loc="left", color=INK)
-    axes.legend(fontsize=7.5, frameon=False)
+    axes.legend(fontsize=7.5, frameon=False, loc="upper left", bbox_to_anchor=(0.1, 1.0))
 
 
 def _draw_errors(axes: Axes, study: TimingStudy) -> None:

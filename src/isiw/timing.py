@@ -21,12 +21,22 @@ from isiw.devices.plant import Geometry, draw_taps
 from isiw.devices.presets import preset
 from isiw.devices.rendering import record_emg, record_robot, sample_times_ms
 from isiw.errors import InvalidValueError
+from isiw.log.reader import SessionRecord
 from isiw.signals.events import TapEvents, detect_events, sweep_events
 from isiw.signals.impact import VALVE_MS
 from isiw.trials import Sweep
 from isiw.types import FloatArray
 
-__all__ = ["STUDY_ISI_MS", "TimingStudy", "error_table", "event_table", "study_preset", "study_sweeps"]
+__all__ = [
+    "STUDY_ISI_MS",
+    "TimingStudy",
+    "error_table",
+    "event_table",
+    "study_preset",
+    "study_session",
+    "study_sweeps",
+    "timing_report",
+]
 
 STUDY_ISI_MS = (10.0, 30.0, 50.0, 51.0, 52.0, 53.0, 54.0, 70.0, 90.0)
 """The ISIs of the precision study [ms] (5.2.1)."""
@@ -165,6 +175,44 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
         raise InvalidValueError("a study needs sweeps", got=0)
     commanded = np.array([np.nan if isi is None else isi for isi in commanded_isi_ms])
     return TimingStudy(name, _joined(parts), commanded, np.array(realised))
+
+
+def study_session(record: SessionRecord) -> TimingStudy:
+    """Run the repeatability study on the taps of a logged session.
+
+    Args:
+        record: the session; its trials need an acceleration. Mistrials count, TMS alone does not.
+
+    Raises:
+        InvalidValueError: no trial with an acceleration.
+    """
+    from_impact = record.header.space.reference == "impact"
+    sweeps, commanded = [], []
+    for trial in record.table:
+        channels = {name: wave for (index, name), wave in record.waveforms.items() if index == trial.index}
+        if "acceleration" in channels and trial.t_valve_ms is not None:
+            sweeps.append(Sweep(channels, t_valve_ms=trial.t_valve_ms, t_tms_ms=trial.t_tms_ms))
+            commanded.append(trial.commanded_isi_ms if from_impact else None)
+    return study_sweeps(str(record.path), sweeps, commanded)
+
+
+def timing_report(study: TimingStudy) -> str:
+    """A study in words and tables, for people."""
+    events = study.event_table
+    lines = [f"{study.name}: {len(study.commanded_ms)} taps", "", "event      mean [ms]    SD   range            n"]
+    lines += [
+        f"t_{name:<8} {mean:8.1f} {sd:6.1f}   [{low:.0f}, {high:.0f}]   {n:7.0f}"
+        for name, mean, sd, low, high, n in events.itertuples()
+    ]
+    errors = study.error_table
+    if len(errors):
+        lines += ["", "ISI [ms]   mean error [ms]    SD      n   mistrials"]
+        lines += [
+            f"{isi:7g} {mean:14.2f} {sd:12.2f} {n:6.0f} {mistrials:8.0f}"
+            for isi, n, mean, sd, mistrials in errors.itertuples()
+        ]
+        lines += ["", f"Pooled SD of the ISI error: {study.pooled_sd_ms:.2f} ms. Mistrials: {study.mistrials}."]
+    return "\n".join(lines)
 
 
 def _tap(geometry: Geometry, pulse_ms: FloatArray, rate_hz: float, rng: np.random.Generator) -> TapEvents:
