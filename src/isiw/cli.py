@@ -130,7 +130,8 @@ def _run_to_the_end(session: Session) -> None:
     try:
         result = session.run()
     except BaseException:
-        _print(f"The session ended early. Its log is safe; go on with: isiw resume {session.log_path}")
+        if session.trials:
+            _print(f"The session ended early. Its log is safe; go on with: isiw resume {session.log_path}")
         raise
     record = isiw.read_session(result.log)
     truth = isiw.config.true_window(record)

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord
@@ -115,7 +116,9 @@ def _draw_trials(axes: Axes, record: SessionRecord) -> None:
 def _finish_profile(axes: Axes, record: SessionRecord) -> None:
     space, window = record.header.space, record.estimates[-1].window if record.estimates else None
     axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_xlim(space.low_ms, space.high_ms)
     axes.set_xlabel(_AXIS_NAME[space.reference], fontsize=9)
     axes.set_ylabel("MEP [µV]", fontsize=9)

@@ -22,6 +22,7 @@ from isiw.devices.limits import LimitedDevice, Limits
 from isiw.devices.protocol import Answer, Device
 from isiw.errors import DeviceError, LimitExceededError
 from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform
+from isiw.log.storage import interrupts_deferred
 from isiw.log.writer import LogWriter
 from isiw.signals.quality import Judged, SignalLimits, judge
 from isiw.stopping import StopDecision, stimuli_left
@@ -180,10 +181,11 @@ class Session:
             self._device.stage()
             yield
         finally:
-            try:
-                self._device.stop()
-            finally:
-                self._device.unstage()
+            with interrupts_deferred():  # an impatient second Ctrl-C must not leave the device armed
+                try:
+                    self._device.stop()
+                finally:
+                    self._device.unstage()
 
     def _log_beginning(self) -> None:
         for record in self._first_records:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import io
+import re
 import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO
+from typing import IO, cast
 
 import zstandard
 from mcap import records as mcap
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 
@@ -22,6 +25,9 @@ __all__ = ["Message", "Salvage", "current_file", "salvage"]
 
 _UNREADABLE = (McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, MemoryError, OverflowError)
 """What the MCAP reader raises on damaged bytes; a failed checksum is a ValueError."""
+
+_CHUNK_MARK = b"\x04\x00\x00\x00zstd"
+_CHUNK_MARK_AT = 8 + 8 + 8 + 4  # behind a chunk's two times, size and checksum
 
 _FOOTER_BYTES = 1 + 8 + 8 + 8 + 4
 _MAGIC = b"\x89MCAP0\r\n"
@@ -54,6 +60,7 @@ class Salvage:
         attachments: by name.
         losses: what could not be read, a sentence each; empty where nothing is missing.
         finished: whether the session closed its log.
+        topics: by channel number; known beforehand, in case the chunk that defines the channels is lost.
     """
 
     path: Path
@@ -61,6 +68,7 @@ class Salvage:
     attachments: dict[str, bytes] = field(default_factory=dict)
     losses: list[str] = field(default_factory=list)
     finished: bool = False
+    topics: dict[int, str] = field(default_factory=lambda: dict(enumerate(TOPICS, start=1)))
 
 
 def current_file(path: str | Path) -> Path:
@@ -95,8 +103,7 @@ def salvage(path: str | Path) -> Salvage:
             raise DamagedLogError("the log is empty", got=str(found.path), remedy="No trial was recorded in it.")
         file.seek(0)
         size = found.path.stat().st_size
-        reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size)
-        _read(reader, file, size, found)
+        _read(file, size, found)
         if found.finished:
             _check_summary(file, found)
     _report_gaps(found)
@@ -107,34 +114,64 @@ def salvage(path: str | Path) -> Salvage:
     return found
 
 
-def _read(reader: StreamReader, file: IO[bytes], size: int, found: Salvage) -> None:
+def _read(file: IO[bytes], size: int, found: Salvage) -> None:
     """Read record after record; a chunk that fails is left out, and reading goes on behind it."""
-    topics = dict(enumerate(TOPICS, start=1))  # what the channels are, even where the first chunk is lost
-    readable_to = 0
+    reader = StreamReader(cast("IO[bytes]", _Exact(file)), emit_chunks=True, validate_crcs=True, record_size_limit=size)
+    readable_to, sealed = 0, False
     try:
         for record in reader.records:
             if isinstance(record, mcap.Chunk):
-                _read_chunk(record, readable_to, topics, found)
+                _read_chunk(record, readable_to, found)
             elif isinstance(record, mcap.Attachment):
                 found.attachments[record.name] = record.data
             readable_to = file.tell()
+            sealed = sealed or isinstance(record, mcap.DataEnd)
             found.finished = found.finished or isinstance(record, mcap.Footer)
     except CRCValidationError:
-        found.finished = True
+        found.finished = sealed = True
         if not found.losses:
             found.losses.append("The checksum of the whole file fails, though every record's own is good.")
-    except EndOfFile:
-        if file.tell() != readable_to and not found.finished:
-            found.losses.append(_tear(readable_to, size))
-    except _UNREADABLE:
-        found.losses.append(_tear(readable_to, size))
+    except _UNREADABLE as error:
+        if isinstance(error, EndOfFile) and file.tell() == readable_to:
+            pass  # a session that never closed its log; nothing is torn
+        elif sealed:
+            found.losses.append("The index at the end of the file is damaged. No record is affected.")
+        else:
+            _search_chunks(file, found)
+            found.losses.insert(0, f"The log is torn or damaged at byte {readable_to} of {size}.")
+    if found.finished and not sealed:
+        found.losses.append("The mark behind the last record is damaged. No record is affected.")
 
 
-def _tear(readable_to: int, size: int) -> str:
-    return f"The log is unreadable from byte {readable_to} of {size} on; what was written there is lost."
+class _Exact:
+    """A file that raises where it ends too early; the reader would take half a record for a whole one."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+
+    def read(self, size: int) -> bytes:
+        data = self._file.read(size)
+        if len(data) < size:
+            raise EndOfFile
+        return data
 
 
-def _read_chunk(chunk: mcap.Chunk, offset: int, topics: dict[int, str], found: Salvage) -> None:
+def _search_chunks(file: IO[bytes], found: Salvage) -> None:
+    """Read all chunks of a file in which the records' lengths can no longer be followed from one to the next."""
+    found.messages.clear()
+    found.losses.clear()
+    file.seek(0)
+    data = file.read()
+    for match in re.finditer(re.escape(_CHUNK_MARK), data):
+        start = max(0, match.start() - _CHUNK_MARK_AT)
+        try:
+            chunk = mcap.Chunk.read(ReadDataStream(cast("IO[bytes]", _Exact(io.BytesIO(data[start:])))))
+        except _UNREADABLE:
+            continue  # torn; the numbers of the records tell what it held
+        _read_chunk(chunk, start, found)
+
+
+def _read_chunk(chunk: mcap.Chunk, offset: int, found: Salvage) -> None:
     try:
         contents = list(breakup_chunk(chunk, validate_crc=True))
     except _UNREADABLE:
@@ -142,9 +179,11 @@ def _read_chunk(chunk: mcap.Chunk, offset: int, topics: dict[int, str], found: S
         return
     for record in contents:
         if isinstance(record, mcap.Channel):
-            topics[record.id] = record.topic
-        elif isinstance(record, mcap.Message) and record.channel_id in topics:
-            found.messages.append(Message(topics[record.channel_id], record.data, record.log_time, record.sequence))
+            found.topics[record.id] = record.topic
+        elif isinstance(record, mcap.Message) and record.channel_id in found.topics:
+            found.messages.append(
+                Message(found.topics[record.channel_id], record.data, record.log_time, record.sequence)
+            )
 
 
 def _check_summary(file: IO[bytes], found: Salvage) -> None:

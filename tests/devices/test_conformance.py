@@ -1,0 +1,110 @@
+"""Our own devices pass the suite that others are given, and the suite finds what is broken."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from isiw.devices.callback import CallbackDevice
+from isiw.devices.clock import VirtualClock
+from isiw.devices.limits import LimitedDevice, Limits
+from isiw.devices.protocol import DeviceInfo
+from isiw.devices.recorded import RecordedDevice, Recordings
+from isiw.devices.replay import ReplayDevice
+from isiw.devices.simulated import SimulatedDevice
+from isiw.subjects import cohort
+from isiw.testing import check_device
+from isiw.trials import Measurement, Status, Trial, TrialTable
+
+
+def responder(reference="valve"):
+    begun = cohort("drift", 1, 0)[0].begin(5)
+    return lambda isi_ms: begun.respond(isi_ms, reference)
+
+
+def made_up_recordings():
+    time_ms = np.arange(-150, 301) / 3.0
+    rng = np.random.default_rng(0)
+    mep = 0.5 * np.sin((time_ms - 18) / 2) * ((time_ms > 18) & (time_ms < 30))
+    return Recordings(time_ms, 0.001 * rng.standard_normal((3, 451)), np.stack([mep, 2 * mep]))
+
+
+def table():
+    trials = [Trial(0, Status.ACCEPTED, None, mep_mv=0.01)]
+    trials += [Trial(1 + k, Status.ACCEPTED, isi, isi_ms=isi, mep_mv=isi / 1e3) for k, isi in enumerate((0, 66, 133, 200))]
+    return TrialTable(tuple(trials))
+
+
+def test_a_simulated_device_conforms(space):
+    check_device(lambda: SimulatedDevice(responder(), "valve"), space)
+
+
+def test_a_device_of_recorded_sweeps_conforms(space):
+    check_device(lambda: RecordedDevice(responder(), "valve", made_up_recordings(), seed=1), space)
+
+
+def test_a_replaying_device_conforms(space):
+    check_device(lambda: ReplayDevice(table(), "valve"), space)
+
+
+def test_a_device_of_functions_conforms(space):
+    info = DeviceInfo("functions", "valve")
+    check_device(lambda: CallbackDevice(lambda s, timeout_s: Measurement(timeout_s, s.isi_ms), info), space)
+
+
+def test_a_limited_device_conforms(space):
+    limits = Limits.of_space(space, min_iti_s=0.0)
+    device = SimulatedDevice(responder(), "valve")
+    check_device(lambda: LimitedDevice(device, limits, VirtualClock()), space)
+
+
+class Careless(SimulatedDevice):
+    """Fires although it is stopped."""
+
+    def __init__(self):
+        super().__init__(responder(), "valve")
+
+    def deliver(self, stimulus, timeout_s):
+        del timeout_s
+        return Measurement(0.1, stimulus.isi_ms)
+
+
+class Forgetful(SimulatedDevice):
+    """Begins anew instead of resuming."""
+
+    def resume_after(self, stimuli):
+        del stimuli
+
+
+class Inaccurate(SimulatedDevice):
+    """Fires too late."""
+
+    def deliver(self, stimulus, timeout_s):
+        answer = super().deliver(stimulus, timeout_s)
+        late_ms = None if answer.isi_ms is None else answer.isi_ms + 20
+        return Measurement(answer.mep_mv, late_ms)
+
+
+def test_the_suite_finds_a_device_that_fires_unarmed(space):
+    with pytest.raises(AssertionError, match=r"before stage\(\)"):
+        check_device(Careless, space)
+
+
+def test_the_suite_finds_a_device_that_cannot_resume(space):
+    with pytest.raises(AssertionError, match="never been interrupted"):
+        check_device(lambda: Forgetful(responder(), "valve"), space)
+
+
+def test_the_suite_finds_a_device_with_wrong_timing(space):
+    with pytest.raises(AssertionError, match="20 ms off"):
+        check_device(lambda: Inaccurate(responder(), "valve"), space)
+
+
+def test_the_suite_finds_a_device_on_another_reference(space):
+    with pytest.raises(AssertionError, match="reference"):
+        check_device(lambda: SimulatedDevice(responder("impact"), "impact"), space)
+
+
+def test_the_suite_finds_what_is_no_device(space):
+    with pytest.raises(AssertionError, match="describe, stage"):
+        check_device(object, space)

@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+from isiw.devices.simulated import SimulatedDevice
+from isiw.subjects import Response
+from isiw.trials import Stimulus
+
+
+def test_it_reports_what_the_person_answers_at_the_realised_isi():
+    device = SimulatedDevice(lambda isi_ms: Response(isi_ms + 1.5, 0.07, 2.0), "impact")
+    device.stage()
+    measured = device.deliver(Stimulus(0, 40.0), 1.0)
+    assert (measured.isi_ms, measured.mep_mv, measured.isi_sd_ms) == (41.5, 0.07, 2.0)
+
+
+def test_it_says_that_it_is_simulated():
+    info = SimulatedDevice(lambda isi_ms: Response(isi_ms, 0.0), "impact").describe()
+    assert info.simulated
+    assert info.reference == "impact"
+
+
+def test_resuming_answers_only_what_was_not_answered_before():
+    asked = []
+
+    def respond(isi_ms):
+        asked.append(isi_ms)
+        return Response(isi_ms, 0.01)
+
+    device = SimulatedDevice(respond, "valve")
+    device.stage()
+    device.deliver(Stimulus(0, 10.0), 1.0)
+    device.resume_after([Stimulus(0, 10.0), Stimulus(1, 20.0), Stimulus(2, None)])
+    assert asked == [10.0, 20.0, None]

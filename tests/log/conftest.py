@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from isiw.design import DesignSpace
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import DeviceInfo
+from isiw.log.schema import Header, Intent, StrategyRecipe, Waveform
+from isiw.log.writer import LogWriter
+from isiw.signals.quality import SignalLimits
+from isiw.trials import Channel, Status, Trial
+
+SPACE = DesignSpace(0, 200)
+
+
+def make_header(**changes):
+    values = {
+        "isiw_version": "0.1.0",
+        "created": "2026-11-21T10:00:00+00:00",
+        "subject": "P07",
+        "seed": 4,
+        "strategy": StrategyRecipe(name="default", seed=4, settings={"max_trials": 9}),
+        "space": SPACE,
+        "limits": Limits.of_space(SPACE),
+        "device": DeviceInfo("bench", "impact", channels={"emg": "mV"}),
+        "signals": SignalLimits(),
+        "config": {"nested": {"answer": 42}},
+    }
+    return Header(**(values | changes))
+
+
+def write_trials(log, trials):
+    """Write as a session does: intent, sync, waveform, trial, sync."""
+    rng = np.random.default_rng(0)
+    for k in trials:
+        log.append(Intent(trial=k, isi_ms=float(k)))
+        log.sync()
+        log.append(Waveform.of(k, Channel(rng.standard_normal(50), 3000.0, "mV")), "emg")
+        log.append(Trial(k, Status.ACCEPTED, float(k), isi_ms=float(k), mep_mv=0.01 * k))
+        log.sync()
+
+
+@pytest.fixture
+def header():
+    return make_header()
+
+
+@pytest.fixture
+def writes():
+    """Appends some trials to a log."""
+    return write_trials
+
+
+@pytest.fixture
+def finished_log(tmp_path, header):
+    """A closed log of eight trials."""
+    with LogWriter.create(tmp_path / "s.mcap", header) as log:
+        write_trials(log, range(8))
+    return tmp_path / "s.mcap"
+
+
+@pytest.fixture
+def broken_log(tmp_path, header):
+    """A log of eight trials as a killed session leaves it: never closed."""
+    log = LogWriter.create(tmp_path / "s.mcap", header)
+    write_trials(log, range(8))
+    log._file._file.close()
+    return tmp_path / "s.mcap.part"

@@ -1,0 +1,106 @@
+from __future__ import annotations
+
+import random
+import re
+
+import pytest
+
+from isiw.errors import DamagedLogError, LogError
+from isiw.log.reader import read_session
+from isiw.log.salvage import current_file, salvage
+
+
+def content(record):
+    waveforms = {key: (channel.values.tolist(), channel.rate_hz) for key, channel in record.waveforms.items()}
+    return record.header, record.history, waveforms
+
+
+@pytest.mark.parametrize("kind", ["finished_log", "broken_log"])
+def test_no_flipped_bit_changes_what_is_read_unnoticed(kind, request):
+    log = request.getfixturevalue(kind)
+    whole, original = log.read_bytes(), content(read_session(log))
+    rng = random.Random(20)
+    noticed = 0
+    for position in rng.sample(range(8 * len(whole)), 300):
+        flipped = bytearray(whole)
+        flipped[position // 8] ^= 1 << (position % 8)
+        log.write_bytes(flipped)
+        try:
+            record = read_session(log)
+        except DamagedLogError:
+            noticed += 1
+            continue
+        assert record.losses or content(record) == original
+        noticed += bool(record.losses)
+    # A finished log has a checksum over every byte; an unfinished one over every record, not over what lies between.
+    assert noticed == 300 if kind == "finished_log" else noticed > 150
+
+
+def test_a_flipped_bit_costs_no_more_than_its_own_block(finished_log):
+    whole, all_trials = finished_log.read_bytes(), set(range(8))
+    rng = random.Random(21)
+    for position in rng.sample(range(8 * len(whole)), 200):
+        flipped = bytearray(whole)
+        flipped[position // 8] ^= 1 << (position % 8)
+        finished_log.write_bytes(flipped)
+        kept = {trial.index for trial in read_session(finished_log).table}
+        assert len(all_trials - kept) <= 1
+
+
+def test_a_log_torn_anywhere_keeps_every_trial_before_the_tear(broken_log):
+    whole = broken_log.read_bytes()
+    ends = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
+    for size in random.Random(22).sample(range(ends[0] + 2000, len(whole)), 60):
+        broken_log.write_bytes(whole[:size])
+        record = read_session(broken_log)
+        complete = sum(end < size for end in ends) - 1  # the last block that began may be torn
+        assert len(record.table) >= (complete - 1) // 2
+        assert [trial.index for trial in record.table] == list(range(len(record.table)))
+        assert record.losses or record.unknown or len(record.table) == (complete + 1) // 2
+
+
+def test_a_session_that_was_killed_between_records_has_lost_nothing(broken_log):
+    record = read_session(broken_log)
+    assert (len(record.table), record.losses, record.finished) == (8, (), False)
+
+
+def test_what_is_lost_is_said_in_words(finished_log):
+    whole = bytearray(finished_log.read_bytes())
+    third = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)][5]
+    whole[third + 60] ^= 0xFF
+    finished_log.write_bytes(whole)
+    record = read_session(finished_log)
+    assert re.search(r"A block of \d+ bytes at byte \d+ fails its checksum and is lost", " ".join(record.losses))
+    assert re.search(r"Records? \d+", " ".join(record.losses))
+    assert len(record.table) + len(record.unknown) == 8
+
+
+def test_without_its_first_block_a_log_still_has_its_header(finished_log):
+    whole = bytearray(finished_log.read_bytes())
+    original = read_session(finished_log)
+    first = whole.find(b"\x04\x00\x00\x00zstd")
+    whole[first + 60] ^= 0xFF
+    finished_log.write_bytes(whole)
+    record = read_session(finished_log)
+    assert record.header == original.header
+    assert len(record.table) == 8
+    assert record.losses
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAP0\r\n", bytes(5000)])
+def test_what_is_no_log_is_refused(tmp_path, content):
+    (tmp_path / "s.mcap").write_bytes(content)
+    with pytest.raises(DamagedLogError):
+        read_session(tmp_path / "s.mcap")
+
+
+def test_a_log_that_does_not_exist_is_named(tmp_path):
+    with pytest.raises(LogError, match=r"no such log.*nowhere"):
+        salvage(tmp_path / "nowhere.mcap")
+
+
+def test_the_part_is_read_where_there_are_both(tmp_path):
+    for name in ("s.mcap", "s.mcap.part"):
+        (tmp_path / name).write_bytes(b"x")
+    for name in ("s.mcap", "s.mcap.part"):
+        assert current_file(tmp_path / name).name == "s.mcap.part"

@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.log.schema import TOPICS, Estimate, Event, Intent, Waveform, decode, encode, json_schema, topic_of
+from isiw.stopping import StopDecision
+from isiw.trials import Channel, MistrialReason, Status, Trial
+from isiw.window import Window, WindowEstimate
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        Intent(trial=3, isi_ms=0.1 + 0.2, t_s=1.5),
+        Intent(trial=3, isi_ms=None),
+        Trial(0, Status.ACCEPTED, 12.0, isi_ms=12.345678901234567, mep_mv=1e-17, background_rms_uv=3.0),
+        Trial(1, Status.MISTRIAL, None, MistrialReason.OUTCOME_UNKNOWN),
+        Estimate(trial=1, probability=None, start_ms=-math.inf, end_ms=math.inf, stop=True, reason="µ"),
+        Event(kind="fault", text="line one\nline two"),
+    ],
+)
+def test_a_record_survives_being_written_and_read(record):
+    topic = topic_of(record)
+    assert decode(topic, encode(topic, record)) == record
+
+
+def test_a_waveform_survives_with_what_is_not_finite():
+    channel = Channel(np.array([0.1, math.nan, math.inf, -math.inf, -0.0]), 3000.0, "mV", t0_ms=-50.0)
+    record = Waveform.of(7, channel)
+    again = decode("/emg", encode("/emg", record)).channel()
+    np.testing.assert_array_equal(again.values, channel.values)
+    assert (again.rate_hz, again.unit, again.t0_ms) == (3000.0, "mV", -50.0)
+
+
+def test_what_is_not_finite_is_written_as_a_string():
+    written = json.loads(encode("/estimate", Estimate(trial=0, probability=0.9, end_ms=math.inf)))
+    assert written["end_ms"] == "Infinity"
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_every_schema_is_an_object_without_references_to_elsewhere(topic):
+    _, schema = json_schema(topic)
+    root = json.loads(schema)
+    assert root["type"] == "object"
+    assert all(f'"$ref": "{outside}' not in schema.decode() for outside in ("http", "file"))
+
+
+def test_the_topics_are_those_of_the_format():
+    own = {"/header", "/intent", "/trial", "/estimate", "/event"}
+    assert set(TOPICS) == own | {"/emg", "/acceleration", "/pressure", "/force", "/valve"}
+
+
+@pytest.mark.parametrize("name", ["trial", "header", "", None])
+def test_a_channel_cannot_take_the_name_of_another_topic(name):
+    waveform = Waveform.of(0, Channel(np.zeros(3), 1000.0, "mV"))
+    with pytest.raises(InvalidValueError, match="channel cannot have this name"):
+        topic_of(waveform, name)
+
+
+def test_an_estimate_keeps_window_intervals_and_profile():
+    grid = np.arange(0.0, 50.0)
+    estimate = WindowEstimate(
+        probability=0.8,
+        window=Window(10, 40, ((10, 20), (30, 40))),
+        start_ms=10.5,
+        end_ms=math.inf,
+        grid_ms=grid,
+        edge_samples_ms=np.array([[9.0, 38.0], [10.0, math.inf], [11.0, math.inf]]),
+        profile_quantiles_mv=np.stack([grid, grid + 1, grid + 2]),
+    )
+    record = decode("/estimate", encode("/estimate", Estimate.of(4, estimate, StopDecision(stop=False, reason="r"), 7.0)))
+    assert record.window == estimate.window
+    assert (record.start_low_ms, record.start_high_ms, record.end_low_ms, record.end_high_ms) == (9, 11, 38, math.inf)
+    assert record.band_high_mv == tuple(grid + 2)
+    assert record.decision == StopDecision(stop=False, reason="r")
+    assert record.next_isi_ms == 7.0
+
+
+def test_an_estimate_of_a_method_without_posterior_has_gaps():
+    record = Estimate.of(0, WindowEstimate(None, Window(1, 2)), StopDecision(stop=True, reason=""), None)
+    assert record.window == Window(1, 2)
+    assert record.start_low_ms is None
+    assert record.grid_ms == ()
+
+
+def test_a_record_from_a_later_version_with_more_keys_is_read():
+    assert decode("/intent", b'{"trial": 1, "isi_ms": 2.0, "mood": "good"}') == Intent(trial=1, isi_ms=2.0)
+
+
+@pytest.mark.parametrize("data", [b"", b"{}", b'{"trial": "x", "isi_ms": 1}', b"\xff\xfe"])
+def test_what_is_no_record_is_refused(data):
+    with pytest.raises(ValueError, match="validation error"):
+        decode("/intent", data)

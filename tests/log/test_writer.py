@@ -1,0 +1,158 @@
+from __future__ import annotations
+
+import errno
+import os
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from isiw.errors import LogError
+from isiw.log.reader import read_session
+from isiw.log.salvage import salvage
+from isiw.log.schema import Event, Waveform
+from isiw.log.writer import LogWriter
+from isiw.trials import Channel
+
+
+def test_a_log_is_a_part_until_it_is_closed(tmp_path, header):
+    log = LogWriter.create(tmp_path / "s.mcap", header)
+    assert [path.name for path in tmp_path.iterdir()] == ["s.mcap.part"]
+    log.close()
+    assert [path.name for path in tmp_path.iterdir()] == ["s.mcap"]
+
+
+def test_the_header_is_on_disk_at_once(tmp_path, header):
+    log = LogWriter.create(tmp_path / "s.mcap", header)
+    assert read_session(tmp_path / "s.mcap").header == header
+    log.close()
+
+
+def test_what_was_synced_can_be_read_while_the_session_runs(tmp_path, header, writes):
+    log = LogWriter.create(tmp_path / "s.mcap", header)
+    for k in range(3):
+        writes(log, [k])
+        record = read_session(tmp_path / "s.mcap")
+        assert [trial.index for trial in record.table] == list(range(k + 1))
+        assert record.losses == ()
+        assert not record.finished
+    log.close()
+
+
+@pytest.mark.parametrize("name", ["s.mcap", "s.mcap.part"])
+def test_an_existing_log_is_never_overwritten(tmp_path, header, name):
+    (tmp_path / name).write_bytes(b"precious")
+    with pytest.raises(LogError, match=r"never overwritten.*isiw resume"):
+        LogWriter.create(tmp_path / "s.mcap", header)
+    assert (tmp_path / name).read_bytes() == b"precious"
+
+
+def test_a_file_that_appears_meanwhile_is_not_overwritten_at_the_end(tmp_path, header, writes):
+    log = LogWriter.create(tmp_path / "s.mcap", header)
+    writes(log, range(2))
+    (tmp_path / "s.mcap").write_bytes(b"precious")
+    with pytest.raises(LogError, match="another file"):
+        log.close()
+    assert (tmp_path / "s.mcap").read_bytes() == b"precious"
+    assert len(read_session(tmp_path / "s.mcap.part").table) == 2
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path, header):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(LogError, match="cannot be made"):
+        LogWriter.create(tmp_path / "file" / "s.mcap", header)
+
+
+def test_a_full_disk_is_an_error_and_what_was_synced_is_safe(tmp_path, header, writes, monkeypatch):
+    log = LogWriter.create(tmp_path / "s.mcap", header)
+    writes(log, range(3))
+
+    def full(_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", full)
+        with pytest.raises(LogError, match="No space left"):
+            writes(log, [3])
+    assert len(read_session(tmp_path / "s.mcap").table) >= 3
+    log.close()
+
+
+def test_any_mcap_reader_reads_a_finished_log(finished_log):
+    with finished_log.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        topics = [channel.topic for _, channel, _ in reader.iter_messages()]
+        metadata = {record.name: record.metadata for record in reader.iter_metadata()}
+        attachments = {attachment.name: attachment.data for attachment in reader.iter_attachments()}
+    assert topics[0] == "/header"
+    assert topics[1:4] == ["/intent", "/emg", "/trial"]
+    assert metadata["session"]["subject"] == "P07"
+    assert metadata["session"]["seed"] == "4"
+    assert b"answer = 42" in attachments["configuration.toml"]
+
+
+def test_the_times_of_the_records_never_run_backwards(finished_log):
+    with finished_log.open("rb") as file:
+        times = [message.log_time for _, _, message in make_reader(file).iter_messages(log_time_order=False)]
+    assert times == sorted(times)
+
+
+def test_a_channel_that_isiw_does_not_know_is_kept(tmp_path, header):
+    with LogWriter.create(tmp_path / "s.mcap", header) as log:
+        log.append(Waveform.of(0, Channel(np.arange(4.0), 100.0, "N")), "left_hand")
+    assert read_session(tmp_path / "s.mcap").sweep(0)["left_hand"].values.tolist() == [0, 1, 2, 3]
+
+
+def test_continuing_keeps_all_records_and_appends(finished_log):
+    before = read_session(finished_log)
+    with LogWriter.continuing(finished_log, salvage(finished_log), before.header) as log:
+        log.append(Event(kind="resume", trial=8))
+    after = read_session(finished_log)
+    assert after.history == (*before.history, Event(kind="resume", trial=8))
+    assert after.header == before.header
+    assert after.finished
+    assert list(finished_log.parent.iterdir()) == [finished_log]
+
+
+def test_continuing_twice_keeps_metadata_names_unique(broken_log, header):
+    for _ in range(2):
+        LogWriter.continuing(broken_log, salvage(broken_log), header).close()
+    finished = broken_log.with_suffix("")
+    with finished.open("rb") as file:
+        reader = make_reader(file)
+        assert [record.name for record in reader.iter_metadata()] == ["session"]
+        assert [attachment.name for attachment in reader.iter_attachments()] == ["configuration.toml"]
+
+
+def test_while_a_log_goes_on_it_holds_all_that_was_there_before(broken_log, header):
+    log = LogWriter.continuing(broken_log, salvage(broken_log), header)
+    assert len(read_session(broken_log).table) == 8
+    assert [path.name for path in broken_log.parent.iterdir()] == ["s.mcap.part"]
+    log.close()
+
+
+def test_a_copy_left_by_a_killed_resumption_is_no_obstacle(broken_log, header):
+    broken_log.with_name("s.mcap.resuming").write_bytes(b"half a copy")
+    LogWriter.continuing(broken_log, salvage(broken_log), header).close()
+    assert [path.name for path in broken_log.parent.iterdir()] == ["s.mcap"]
+    assert len(read_session(broken_log).table) == 8
+
+
+def test_a_damaged_file_is_kept_beside_what_was_salvaged(broken_log, header):
+    damaged = broken_log.read_bytes()[:-40]
+    for name in ("s.mcap.damaged", "s.mcap.damaged1"):
+        broken_log.write_bytes(damaged)
+        LogWriter.continuing(broken_log, salvage(broken_log), header).close()
+        assert broken_log.with_name(name).read_bytes() == damaged
+        broken_log.with_suffix("").rename(broken_log)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows does not let an open file be replaced anyway")
+def test_a_running_session_cannot_be_resumed_beside_itself(tmp_path, header, writes):
+    log = LogWriter.create(tmp_path / "s.mcap", header)
+    writes(log, range(2))
+    with pytest.raises(LogError, match="running session"):
+        LogWriter.continuing(tmp_path / "s.mcap", salvage(tmp_path / "s.mcap"), header)
+    writes(log, [2])
+    log.close()
+    assert len(read_session(tmp_path / "s.mcap").table) == 3
