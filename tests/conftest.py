@@ -49,7 +49,9 @@ class RememberingPosterior:
     @property
     def wanted_ms(self) -> float:
         scrambled = math.fsum((k + 1) * (isi + 1e3 * mep) for k, (isi, mep) in enumerate(self.told))
-        return self.space.low_ms + (37.0 * self.seed + 53.0 + 7.0 * scrambled) % (self.space.high_ms - self.space.low_ms)
+        return self.space.low_ms + (37.0 * self.seed + 53.0 + 7.0 * scrambled) % (
+            self.space.high_ms - self.space.low_ms
+        )
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,9 @@ def made_up_recordings():
 
 def table():
     trials = [Trial(0, Status.ACCEPTED, None, mep_mv=0.01)]
-    trials += [Trial(1 + k, Status.ACCEPTED, isi, isi_ms=isi, mep_mv=isi / 1e3) for k, isi in enumerate((0, 66, 133, 200))]
+    trials += [
+        Trial(1 + k, Status.ACCEPTED, isi, isi_ms=isi, mep_mv=isi / 1e3) for k, isi in enumerate((0, 66, 133, 200))
+    ]
     return TrialTable(tuple(trials))
 
 

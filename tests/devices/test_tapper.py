@@ -12,6 +12,8 @@ from isiw.devices.protocol import Device, HasMemory
 from isiw.devices.tapper import HitDelay, Tapper, TapperSettings
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals import impact_time, judge
+from isiw.subjects import cohort
+from isiw.testing import check_device
 from isiw.trials import MistrialReason, Stimulus
 
 IMPACT = DesignSpace(0, 320, reference="impact")
@@ -38,6 +40,17 @@ def test_it_is_a_device_with_a_memory():
     assert isinstance(device, Device)
     assert isinstance(device, HasMemory)
     assert device.describe().simulated
+
+
+@pytest.mark.parametrize(("trigger", "accelerometer"), [("open-loop", True), ("open-loop", False), ("impact", True)])
+def test_it_keeps_what_every_device_promises(trigger, accelerometer):
+    def made(reference):
+        subject = cohort("recruitment", 1, 0)[0].begin(1)
+        settings = TapperSettings(reference=reference, trigger=trigger, accelerometer=accelerometer)
+        return Tapper(lambda isi_ms: subject.respond(isi_ms, "impact"), "subject3", settings)
+
+    check_device(lambda: made("impact"), DesignSpace(5, 320, reference="impact"))
+    check_device(lambda: made("valve"), DesignSpace(200, 500, reference="valve"))
 
 
 def test_it_delivers_nothing_unless_staged():
