@@ -26,6 +26,7 @@ MIN_RATE_HZ = 1000.0
 """Below this a surface MEP and an impact are not resolved; recordings use 3–10 kHz."""
 
 MIN_REST_MS = 20.0
+REST_MS = 200.0  # the last part of the rest, where a baseline that drifts is nearest to what it will be
 MAD_TO_SD = 1.4826  # of a normal distribution
 
 
@@ -75,7 +76,7 @@ def rest_level(waves: FloatArray, stop: int, rate_hz: float) -> tuple[FloatArray
 
     Args:
         waves: shape (n, w).
-        stop: number of samples from the start that are at rest.
+        stop: number of samples from the start that are at rest; the last 200 ms of them are read.
         rate_hz: sampling rate [Hz].
 
     Returns:
@@ -91,7 +92,7 @@ def rest_level(waves: FloatArray, stop: int, rate_hz: float) -> tuple[FloatArray
             got=f"{1000 * stop / rate_hz:.1f} ms",
             expected=f"at least {MIN_REST_MS:g} ms before the first stimulus",
         )
-    rest = waves[:, :stop]
+    rest = waves[:, max(0, stop - round(REST_MS * rate_hz / 1000)) : stop]
     level = np.median(rest, axis=-1, keepdims=True)
     deviation = rest - level
     mad = np.median(np.abs(deviation), axis=-1, keepdims=True)
