@@ -18,7 +18,7 @@ from isiw.window import WindowEstimate
 
 __all__ = ["Recipe", "Strategy", "candidate_isis"]
 
-MAX_CANDIDATES = 128
+MAX_CANDIDATES = 101
 
 
 def candidate_isis(space: DesignSpace, max_candidates: int = MAX_CANDIDATES) -> Tensor:

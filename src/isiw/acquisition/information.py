@@ -1,4 +1,4 @@
-"""Information about the unknowns in the next MEP.
+"""Acquisition functions from information: what the next MEP is expected to say.
 
 `mutual_information` is with all unknowns of the model (Houlsby et al., arXiv:1112.5745, BALD). `window_gain` is about
 the window alone: how much the next MEP is expected to reduce the variance of each ISI's membership in the window
@@ -10,17 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Protocol, Self
 
 import torch
 
 from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesWindows, Tensor
 
-__all__ = ["MutualInformation", "WindowGain", "mutual_information", "window_gain"]
+__all__ = ["Alternating", "MutualInformation", "WindowGain", "mutual_information", "window_gain"]
+
+
+class _WindowPosterior(Posterior, PredictsOutcomes, SamplesWindows, Protocol):
+    """A posterior that has all that is needed here."""
 
 
 def _entropy(mass: Tensor) -> Tensor:
-    return -torch.special.xlogy(mass, mass).sum(-1)
+    entropy: Tensor = -torch.special.xlogy(mass, mass).sum(-1)
+    return entropy
 
 
 def mutual_information(weights: Tensor, mass: Tensor) -> Tensor:
@@ -64,7 +69,7 @@ class MutualInformation:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes,)
 
-    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
         return mutual_information(*posterior.outcome_mass(isi_ms))
 
@@ -84,9 +89,34 @@ class WindowGain:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
-    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
-        return window_gain(*posterior.outcome_mass(isi_ms), posterior.window_masks(isi_ms))
+        weights, mass = posterior.outcome_mass(isi_ms)
+        return window_gain(weights, mass, posterior.window_masks(isi_ms))
+
+    def settings(self) -> Mapping[str, Any]:
+        """No settings."""
+        return {}
+
+    @classmethod
+    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
+        """The acquisition function that has these settings."""
+        return cls(**settings)
+
+
+@dataclass(frozen=True)
+class Alternating:
+    """The window on one trial, all unknowns on the next.
+
+    What is not known of a person's responses costs certainty about the window later on, but never enough on any one
+    trial for `WindowGain` to ask for it; `MutualInformation` asks for little else.
+    """
+
+    needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
+
+    def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return MutualInformation()(posterior, isi_ms) if posterior.trials % 2 else WindowGain()(posterior, isi_ms)
 
     def settings(self) -> Mapping[str, Any]:
         """No settings."""

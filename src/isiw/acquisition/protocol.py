@@ -7,7 +7,7 @@ from typing import Any, Protocol, Self, runtime_checkable
 
 import torch
 
-from isiw.models.protocol import Posterior, Tensor
+from isiw.models.protocol import Tensor
 
 __all__ = ["AcquisitionFunction", "best_candidate"]
 
@@ -20,7 +20,7 @@ class AcquisitionFunction(Protocol):
     def needs(self) -> tuple[type, ...]:
         """The capability protocols that a posterior must have."""
 
-    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: Any, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs [ms], shape (t,), for each person, shape (b, t)."""
 
     def settings(self) -> Mapping[str, Any]:

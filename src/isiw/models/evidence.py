@@ -15,7 +15,7 @@ from isiw.models.shapes import facilitation
 
 __all__ = ["History", "in_pieces", "levels", "total_log_likelihood"]
 
-CHUNK_ELEMENTS = 1 << 16
+CHUNK_ELEMENTS = 1 << 18
 """On a CPU the likelihood is worked through in pieces of this many nodes, which stay in its cache."""
 
 

@@ -86,7 +86,7 @@ class ParticleModel:
         return self._rejuvenated(after) if bool((ess < self.min_ess * self.particles).any()) else after
 
     def _rejuvenated(self, posterior: ParticlePosterior) -> ParticlePosterior:
-        generator = _generator(self.device, posterior.seed, posterior.history.isi_ms.shape[-1])
+        generator = _generator(self.device, posterior.seed, posterior.trials)
         picks = systematic(posterior.log_weights, self.particles)
         # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
         picks = picks[:, torch.randperm(self.particles, generator=generator, device=generator.device)]
@@ -140,6 +140,11 @@ class ParticlePosterior:
     log_weights: Tensor
     log_likelihood: Tensor
     history: History
+
+    @property
+    def trials(self) -> int:
+        """How many trials of each person it has been told."""
+        return self.history.isi_ms.shape[-1]
 
     @cached_property
     def person(self) -> Person:

@@ -104,7 +104,8 @@ class Prior:
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any]) -> Self:
         """The prior that has these settings."""
-        return cls(**{key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()})
+        values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
+        return cls(**values)
 
     def sample_kinds(self, size: tuple[int, ...], generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
         """Shape, noise and presence of new particles, each of `size`."""
@@ -164,7 +165,8 @@ def _interpolate(x: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
     right = torch.searchsorted(xs, x.contiguous()).clamp(1, len(xs) - 1)
     left = right - 1
     share = (x - xs[left]) / (xs[right] - xs[left]).clamp_min(1e-12)
-    return ys[left] + share.clamp(0.0, 1.0) * (ys[right] - ys[left])
+    between: Tensor = ys[left] + share.clamp(0.0, 1.0) * (ys[right] - ys[left])
+    return between
 
 
 def _log_normal(z: Tensor, median_and_log_sd: tuple[float, float]) -> Tensor:
@@ -174,4 +176,5 @@ def _log_normal(z: Tensor, median_and_log_sd: tuple[float, float]) -> Tensor:
 
 def _even(z: Tensor) -> Tensor:
     """Uniform in -1..1."""
-    return 2.0 * torch.special.ndtr(z) - 1.0
+    even: Tensor = 2.0 * torch.special.ndtr(z) - 1.0
+    return even

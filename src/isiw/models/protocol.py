@@ -43,6 +43,10 @@ class Observation:
 class Posterior(Protocol):
     """What is believed about b people after the trials so far."""
 
+    @property
+    def trials(self) -> int:
+        """How many trials of each person it has been told."""
+
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
 

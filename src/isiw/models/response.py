@@ -182,7 +182,7 @@ def log_likelihood(response: Response, level: Tensor, log_mep: Tensor, log_mep_h
     censored = log_mep != log_mep_high
     inside = _interval_likelihood(response, level, (low, high), mean, precision) if bool(censored.any()) else None
     root = precision.sqrt()
-    terms = mean.sub_(low.unsqueeze(-1)).square_().mul_(precision).mul_(-0.5).exp_().mul_(root)
+    terms = mean.sub_(low.unsqueeze(-1)).square_().mul_(precision).mul_(-0.5).clamp_min_(-60.0).exp_().mul_(root)
     evoked = (terms @ node_weights(level)) / math.sqrt(2 * math.pi)
     likelihood = torch.log(_mix(response, level, low, evoked))
     return likelihood if inside is None else torch.where(censored, inside, likelihood)
@@ -194,12 +194,12 @@ def _interval_likelihood(
     """Log probability that log(mep / floor) lies between two ends, shape (..., p, n)."""
 
     def below(end: Tensor) -> Tensor:
-        evoked = torch.special.ndtr((end.unsqueeze(-1) - mean) * precision.sqrt()) @ node_weights(level)
+        evoked: Tensor = torch.special.ndtr((end.unsqueeze(-1) - mean) * precision.sqrt()) @ node_weights(level)
         silent = torch.special.ndtr(end / response.floor_log_sd.unsqueeze(-1))
         first, last = OUTLIER_LOG_RANGE
         outlier = ((end - first) / (last - first)).clamp(0.0, 1.0)
         responds = _response_probability(response, level)
-        mixed = responds * evoked + (1.0 - responds) * silent
+        mixed: Tensor = responds * evoked + (1.0 - responds) * silent
         return (1.0 - OUTLIER_PROBABILITY) * mixed + OUTLIER_PROBABILITY * outlier
 
     low, high = ends
@@ -220,7 +220,7 @@ def outcome_density(response: Response, level: Tensor, log_mep: Tensor) -> Tenso
     log_relative = log_mep - response.log_floor.unsqueeze(-1)
     mean, precision = _components(response, level)
     gap = mean.unsqueeze(-2) - log_relative[..., None, :, None]
-    terms = gap.square_().mul_(precision.mul(-0.5).unsqueeze(-2)).exp_()
+    terms = gap.square_().mul_(precision.mul(-0.5).unsqueeze(-2)).clamp_min_(-60.0).exp_()
     evoked = (terms @ (precision.sqrt() * node_weights(level)).unsqueeze(-1)).squeeze(-1) / math.sqrt(2 * math.pi)
     flat = Response(*(field.unsqueeze(-1) for field in response))
     return _mix(flat, level.unsqueeze(-1), log_relative.unsqueeze(-2), evoked)

@@ -1,4 +1,4 @@
-"""Facilitation by ISI, as believed: one family of profiles in torch that is flexible enough for skew, plateau and two peaks.
+"""Facilitation by ISI, as believed: profiles flexible enough for skew, plateau and two peaks, in torch.
 
 The simulated people of `isiw.profiles` have shapes of their own; this is the model's view of any person.
 """
