@@ -21,6 +21,7 @@ _HOME = {
     "ReplayDevice": "devices.replay",
     "Session": "session",
     "SimulatedDevice": "devices.simulated",
+    "StopDecision": "stopping",
     "VALVE_SPACE": "design",
     "Window": "window",
     "WindowEstimate": "window",
@@ -48,6 +49,7 @@ _MODULES = {
     "report",
     "signals",
     "subjects",
+    "testing",
     "timing",
 }
 

@@ -17,13 +17,14 @@ import difflib
 import itertools
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import asdict, fields, is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from isiw.catalogue import make_strategy
+from isiw.catalogue import StrategySettings, make_strategy
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
@@ -78,7 +79,7 @@ class StrategyConfig(_Section):
     """The strategy: a name from `isiw.list_strategies()` and its settings."""
 
     name: str = "default"
-    settings: dict[str, Any] = Field(default_factory=dict)
+    settings: StrategySettings = StrategySettings()
 
 
 class LimitsConfig(_Section):
@@ -142,7 +143,7 @@ def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        if first["type"] == "extra_forbidden":
+        if first["type"] in {"extra_forbidden", "unexpected_keyword_argument"}:
             known = _known_keys(first["loc"][:-1])
             close = difflib.get_close_matches(str(first["loc"][-1]), known, n=1)
             guess = f"Did you mean {close[0]}? " if close else ""
@@ -165,13 +166,10 @@ def _expectation(message: str) -> str:
 
 
 def _known_keys(section: tuple[int | str, ...]) -> list[str]:
-    kind: type[BaseModel] = RunConfig
+    kind: Any = RunConfig
     for name in section:
-        inner = kind.model_fields[str(name)].annotation
-        if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
-            return []
-        kind = inner
-    return sorted(kind.model_fields)
+        kind = kind.model_fields[str(name)].annotation
+    return sorted(f.name for f in fields(kind)) if is_dataclass(kind) else sorted(kind.model_fields)
 
 
 def config_of_log(record: SessionRecord) -> RunConfig:
@@ -240,7 +238,7 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         kept["subject"]["data"] = str(config.subject.data.resolve())
     return Session(
         device_for(config),
-        make_strategy(config.strategy.name, space=space, seed=config.seed, **config.strategy.settings),
+        make_strategy(config.strategy.name, space=space, seed=config.seed, **asdict(config.strategy.settings)),
         log=log,
         limits=Limits.of_space(space, **config.limits.model_dump()),
         on_trial=on_trial,

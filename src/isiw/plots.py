@@ -147,6 +147,7 @@ def _draw_edges(axes: Axes, record: SessionRecord, truth: Window | None) -> None
 def _draw_probability(axes: Axes, estimates: Sequence[Estimate]) -> None:
     axes.axhline(0.5, color=FAINT, lw=0.8, ls=":")
     axes.plot([e.trial + 1 for e in estimates], _column(estimates, "probability"), color=INK, lw=1.6)
+    axes.set_xlim(left=0)
     axes.set_ylim(0, 1.03)
     axes.set_yticks((0, 0.5, 1))
     axes.set_ylabel("P(window)", fontsize=9)

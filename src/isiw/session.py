@@ -21,8 +21,8 @@ from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
 from isiw.devices.protocol import Answer, Device
 from isiw.errors import DeviceError, LimitExceededError
+from isiw.interrupts import DeferredInterrupts
 from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform
-from isiw.log.storage import interrupts_deferred
 from isiw.log.writer import LogWriter
 from isiw.signals.quality import Judged, SignalLimits, judge
 from isiw.stopping import StopDecision, stimuli_left
@@ -164,7 +164,7 @@ class Session:
             LimitExceededError: a stimulus was refused; nothing was delivered.
             LogError: the log cannot be written; nothing is delivered without a log.
         """
-        with self._open_log() as self._log:
+        with DeferredInterrupts() as self._interrupts, self._open_log() as self._log:
             try:
                 self._log_beginning()
                 with self._armed():
@@ -178,14 +178,14 @@ class Session:
     def _armed(self) -> Iterator[None]:
         self._device = LimitedDevice(self._raw_device, self._limits, self._clock, delivered=len(self.trials))
         try:
-            self._device.stage()
+            with self._interrupts.allowed():
+                self._device.stage()
             yield
         finally:
-            with interrupts_deferred():  # an impatient second Ctrl-C must not leave the device armed
-                try:
-                    self._device.stop()
-                finally:
-                    self._device.unstage()
+            try:
+                self._device.stop()
+            finally:
+                self._device.unstage()
 
     def _log_beginning(self) -> None:
         for record in self._first_records:
@@ -232,13 +232,15 @@ class Session:
 
     def _delivered(self, stimulus: Stimulus) -> Trial:
         """Deliver, with the intent on disk before and the trial after, whatever the device does."""
-        self._clock.sleep_s(self._device.wait_s())
+        with self._interrupts.allowed():
+            self._clock.sleep_s(self._device.wait_s())
         self._device.check(stimulus)
         self._log.append(Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=self._clock.now_s()))
         self._log.sync()
         trial = _unknown(stimulus)
         try:
-            answer = self._device.deliver(stimulus, self._timeout_s)
+            with self._interrupts.allowed():
+                answer = self._device.deliver(stimulus, self._timeout_s)
             self._log_waveforms(stimulus, answer)
             trial = self._judged(stimulus, answer)
         finally:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -63,7 +65,9 @@ def finished_log(tmp_path, header):
 @pytest.fixture
 def broken_log(tmp_path, header):
     """A log of eight trials as a killed session leaves it: never closed."""
-    log = LogWriter.create(tmp_path / "s.mcap", header)
+    log = LogWriter.create(tmp_path / "running" / "s.mcap", header)
     write_trials(log, range(8))
-    log._file._file.close()
-    return tmp_path / "s.mcap.part"
+    part = shutil.copy(tmp_path / "running" / "s.mcap.part", tmp_path / "s.mcap.part")
+    log.close()
+    shutil.rmtree(tmp_path / "running")
+    return part

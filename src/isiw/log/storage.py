@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import IO
 
 from isiw.errors import LogError
@@ -17,7 +14,7 @@ from isiw.errors import LogError
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["DurableFile", "interrupts_deferred", "log_of", "part_of", "refuse_if_locked", "sync_folder"]
+__all__ = ["DurableFile", "log_of", "part_of", "refuse_if_locked", "sync_folder"]
 
 
 def part_of(path: Path) -> Path:
@@ -65,22 +62,6 @@ def refuse_if_locked(path: Path) -> None:
     """
     with path.open("rb") as file:
         _lock(file, path)
-
-
-@contextmanager
-def interrupts_deferred() -> Iterator[None]:
-    """Let Ctrl-C wait until the block is done, so that no record is written by half."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # Python interrupts the main thread only
-        return
-    pending: list[tuple[int, FrameType | None]] = []
-    before = signal.signal(signal.SIGINT, lambda number, frame: pending.append((number, frame)))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before if before is not None else signal.default_int_handler)
-        if pending and callable(before):
-            before(*pending[0])
 
 
 @contextmanager
@@ -148,6 +129,10 @@ class DurableFile:
 
     def close(self) -> None:
         """Make everything durable and close."""
-        if not self._file.closed:
+        if self._file.closed:
+            return
+        try:
             self.sync()
-            self._file.close()
+        finally:
+            with _disk_errors(self.path):
+                self._file.close()

@@ -13,7 +13,7 @@ from mcap.writer import Writer
 from isiw.errors import LogError
 from isiw.log.salvage import Message, Salvage
 from isiw.log.schema import TOPICS, Header, Record, encode, json_schema, topic_of
-from isiw.log.storage import DurableFile, interrupts_deferred, log_of, part_of, refuse_if_locked, sync_folder
+from isiw.log.storage import DurableFile, log_of, part_of, refuse_if_locked, sync_folder
 
 __all__ = ["CONFIGURATION", "LogWriter"]
 
@@ -127,9 +127,8 @@ class LogWriter:
 
     def sync(self) -> None:
         """Return when everything appended is on the disk."""
-        with interrupts_deferred():
-            self._writer.flush()
-            self._file.sync()
+        self._writer.flush()
+        self._file.sync()
 
     def close(self) -> None:
         """Finish the log and give it its name.
@@ -137,17 +136,18 @@ class LogWriter:
         Raises:
             LogError: somebody has put a file there meanwhile; the log stays `FILE.part`.
         """
-        with interrupts_deferred():
+        try:
             self._writer.finish()
+        finally:
             self._file.close()
-            if self.path.exists() and not self._replaces:
-                raise LogError(
-                    "another file has taken the log's place",
-                    got=str(self.path),
-                    remedy=f"The log is complete and stays at {self._file.path}.",
-                )
-            self._file.path.replace(self.path)
-            sync_folder(self.path.parent)
+        if self.path.exists() and not self._replaces:
+            raise LogError(
+                "another file has taken the log's place",
+                got=str(self.path),
+                remedy=f"The log is complete and stays at {self._file.path}.",
+            )
+        self._file.path.replace(self.path)
+        sync_folder(self.path.parent)
 
     def __enter__(self) -> Self:
         return self
@@ -158,11 +158,10 @@ class LogWriter:
         self.close()
 
     def _copy(self, message: Message) -> None:
-        with interrupts_deferred():
-            self._log_time_ns = max(self._log_time_ns, message.log_time_ns)
-            channel = self._register(message.topic)
-            self._writer.add_message(channel, self._log_time_ns, message.data, self._log_time_ns, self._records)
-            self._records += 1
+        self._log_time_ns = max(self._log_time_ns, message.log_time_ns)
+        channel = self._register(message.topic)
+        self._writer.add_message(channel, self._log_time_ns, message.data, self._log_time_ns, self._records)
+        self._records += 1
 
     def _register(self, topic: str) -> int:
         if topic not in self._channels:

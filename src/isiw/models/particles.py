@@ -43,7 +43,8 @@ class ParticleModel:
         beliefs: the prior over people.
         particles: how many particles a person has.
         thinned: how many of them represent the posterior where every candidate ISI is scored.
-        moves: sweeps of Markov chain moves after each resampling.
+        moves: sweeps of Markov chain moves after each trial.
+        max_trial_moves: sweeps times trials are at most this many, so that a tell stays fast late in a session.
         min_ess: effective sample size, as a share of the particles, below which they are resampled.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a told response is known to be above [mV].
@@ -53,7 +54,8 @@ class ParticleModel:
     beliefs: Prior = field(default_factory=Prior)
     particles: int = 1000
     thinned: int = 256
-    moves: int = 2
+    moves: int = 3
+    max_trial_moves: int = 240
     min_ess: float = 0.5
     detection_limit_mv: float = 0.005
     response_threshold_mv: float = 0.02
@@ -82,21 +84,30 @@ class ParticleModel:
         after = replace(
             posterior, log_weights=log_weights, log_likelihood=posterior.log_likelihood + gain, history=history
         )
+        generator = _generator(self.device, posterior.seed, after.trials)
         ess = torch.exp(-torch.logsumexp(2.0 * log_weights, dim=-1))
-        return self._rejuvenated(after) if bool((ess < self.min_ess * self.particles).any()) else after
+        if bool((ess < self.min_ess * self.particles).any()):
+            after = self._resampled(after, generator)
+        mover = Mover(self.beliefs, posterior.space, history, generator)
+        latents, log_likelihood = after.latents, after.log_likelihood
+        for _ in range(self._sweeps(after.trials)):
+            latents, log_likelihood = mover.sweep(latents, log_likelihood)
+        return replace(after, latents=latents, log_likelihood=log_likelihood)
 
-    def _rejuvenated(self, posterior: ParticlePosterior) -> ParticlePosterior:
-        generator = _generator(self.device, posterior.seed, posterior.trials)
+    def _sweeps(self, trials: int) -> int:
+        """As many sweeps as asked for, but fewer where the history has become long."""
+        return max(1, min(self.moves, self.max_trial_moves // max(1, trials)))
+
+    def _resampled(self, posterior: ParticlePosterior, generator: torch.Generator) -> ParticlePosterior:
         picks = systematic(posterior.log_weights, self.particles)
         # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
         picks = picks[:, torch.randperm(self.particles, generator=generator, device=generator.device)]
-        latents = Latents(*(_take(x, picks) for x in posterior.latents))
-        log_likelihood = _take(posterior.log_likelihood, picks)
-        mover = Mover(self.beliefs, posterior.space, posterior.history, generator)
-        for _ in range(self.moves):
-            latents, log_likelihood = mover.sweep(latents, log_likelihood)
-        even = torch.full_like(posterior.log_weights, -math.log(self.particles))
-        return replace(posterior, latents=latents, log_weights=even, log_likelihood=log_likelihood)
+        return replace(
+            posterior,
+            latents=Latents(*(_take(x, picks) for x in posterior.latents)),
+            log_weights=torch.full_like(posterior.log_weights, -math.log(self.particles)),
+            log_likelihood=_take(posterior.log_likelihood, picks),
+        )
 
     def _trial(self, observation: Observation) -> History:
         seen, silent = observation.response == 1, observation.response == 0

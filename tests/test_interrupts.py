@@ -1,0 +1,107 @@
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import pytest
+
+from isiw.interrupts import DeferredInterrupts
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+
+
+def interrupt(number=signal.SIGINT):
+    signal.raise_signal(number)
+
+
+def test_an_interrupt_waits_until_it_is_allowed():
+    done = []
+
+    def work():
+        with DeferredInterrupts() as interrupts:
+            interrupt()
+            done.append("record")
+            with interrupts.allowed():
+                done.append("never")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["record"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_where_allowed_it_comes_at_once(number):
+    done = []
+
+    def work():
+        with DeferredInterrupts() as interrupts, interrupts.allowed():
+            interrupt(number)
+            done.append("never")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == []
+
+
+def test_an_interrupt_that_found_no_moment_comes_at_the_end():
+    done = []
+
+    def work():
+        with DeferredInterrupts():
+            interrupt()
+            done.append("all")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["all"]
+
+
+def test_a_second_interrupt_does_not_cut_the_clearing_up_short():
+    done = []
+
+    def work():
+        with DeferredInterrupts() as interrupts:
+            try:
+                with interrupts.allowed():
+                    interrupt()
+            finally:
+                interrupt()
+                done.append("stopped")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["stopped"]
+
+
+def test_an_error_is_not_hidden_by_a_waiting_interrupt():
+    def work():
+        with DeferredInterrupts():
+            interrupt()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        work()
+
+
+def test_the_handlers_are_put_back():
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    with DeferredInterrupts():
+        assert signal.getsignal(signal.SIGINT) is not before[0]
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
+
+
+def test_outside_the_main_thread_it_does_nothing():
+    failures = []
+
+    def work():
+        try:
+            with DeferredInterrupts() as interrupts, interrupts.allowed():
+                pass
+        except ValueError as error:
+            failures.append(error)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert failures == []

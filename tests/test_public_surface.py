@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import isiw
+
+
+@pytest.mark.parametrize("name", isiw.__all__)
+def test_every_public_name_is_there(name):
+    assert getattr(isiw, name) is not None
+    assert name in dir(isiw)
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'windwo'"):
+        isiw.windwo  # noqa: B018
+
+
+def test_the_surface_that_lab_software_relies_on_is_pinned():
+    assert {
+        "CallbackDevice", "DesignSpace", "Device", "DeviceInfo", "Limits", "Measurement", "Session", "Stimulus",
+        "StopDecision", "Sweep", "Trial", "TrialTable", "Window", "WindowEstimate", "errors", "exclude",
+        "list_strategies", "make_strategy", "metrics", "read_session", "resume", "signals", "subjects", "testing",
+    } <= set(isiw.__all__)  # fmt: skip
+
+
+def test_importing_isiw_loads_nothing_heavy():
+    heavy = "{'torch', 'numpy', 'pandas', 'matplotlib', 'scipy', 'pydantic'}"
+    subprocess.run([sys.executable, "-c", f"import sys, isiw; assert not {heavy} & set(sys.modules)"], check=True)  # noqa: S603

@@ -1,0 +1,48 @@
+"""What the README shows works as it stands there."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from isiw.config import load_config
+
+ROOT = Path(__file__).parents[1]
+TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
+
+
+def test_the_python_examples_run_one_after_the_other(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert len(blocks("python")) == 3
+    for block in blocks("python"):
+        exec(compile(block, "README.md", "exec"), {"__name__": "readme"})  # noqa: S102 - the point of the test
+    printed = capsys.readouterr().out
+    assert "The budget of 8 stimuli is used up." in printed
+    assert "nothing is missing" in printed
+
+
+def test_the_examples_are_as_short_as_promised():
+    for block in blocks("python")[:1]:
+        assert len([line for line in block.splitlines() if line.strip()]) <= 20
+
+
+def test_the_configuration_is_valid(tmp_path):
+    (block,) = blocks("toml")
+    (tmp_path / "session.toml").write_text(block)
+    config = load_config(tmp_path / "session.toml")
+    assert config.strategy.settings.max_trials == tomllib.loads(block)["strategy"]["settings"]["max_trials"]
+
+
+def test_there_are_exactly_two_commands_to_set_up():
+    commands = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("pip")]
+    assert commands == ["pip install -e . && isiw run", 'pip install -e ".[test]" && pytest']
+
+
+def test_every_linked_file_exists():
+    for target in re.findall(r"\]\((?!http)([^)]+)\)", TEXT):
+        assert (ROOT / target).is_file(), target

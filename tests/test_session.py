@@ -1,0 +1,292 @@
+from __future__ import annotations
+
+import math
+import os
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+from isiw.devices.clock import VirtualClock
+from isiw.devices.limits import Limits
+from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError
+from isiw.log.reader import read_session
+from isiw.log.schema import Estimate, Intent
+from isiw.session import Session
+from isiw.trials import Channel, Measurement, MistrialReason, Status, Sweep, Trial
+
+
+@pytest.fixture
+def log(tmp_path):
+    return tmp_path / "s.mcap"
+
+
+def run_failing(session, error):
+    with pytest.raises(error) as caught:
+        session.run()
+    return read_session(session.log_path), str(caught.value)
+
+
+def test_a_session_runs_to_its_budget_and_logs_everything(scripted_strategy, scripted_device, log):
+    result = Session(scripted_device(), scripted_strategy(6), log=log).run()
+    record = read_session(log)
+    assert len(result.trials) == len(record.table) == len(record.intents) == len(record.estimates) == 6
+    assert record.table == result.trials
+    assert result.decision.reason == "The budget of 6 stimuli is used up."
+    assert record.decision == result.decision
+    assert result.log == log
+    assert record.finished
+    assert record.losses == ()
+
+
+def test_each_trial_is_logged_as_intent_then_trial_then_estimate(scripted_strategy, scripted_device, log):
+    Session(scripted_device(), scripted_strategy(2), log=log).run()
+    assert [type(entry) for entry in read_session(log).history] == [Intent, Trial, Estimate] * 2
+
+
+def test_the_intent_is_on_disk_before_the_device_is_called(scripted_strategy, scripted_device, log):
+    device = scripted_device()
+
+    def answer(stimulus):
+        last = read_session(log).history[-1]
+        assert last == Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=last.t_s)
+        return Measurement(0.1, stimulus.isi_ms)
+
+    device.answer = answer
+    Session(device, scripted_strategy(3), log=log).run()
+    assert len(device.delivered) == 3
+
+
+def test_what_is_reported_is_on_disk(scripted_strategy, scripted_device, log):
+    seen = []
+
+    def on_trial(update):
+        record = read_session(log)
+        assert record.table[-1] == update.trial
+        assert record.estimates[-1].next_isi_ms == update.next_isi_ms
+        seen.append(update.stimuli_left)
+
+    Session(scripted_device(), scripted_strategy(4), log=log, on_trial=on_trial).run()
+    assert seen == [3, 2, 1, 0]
+
+
+def test_the_next_stimulus_is_the_announced_one(scripted_strategy, scripted_device, log):
+    device = scripted_device()
+    Session(device, scripted_strategy(6), log=log).run()
+    announced = [estimate.next_isi_ms for estimate in read_session(log).estimates]
+    assert announced == [stimulus.isi_ms for stimulus in device.delivered[1:]] + [None]
+
+
+def test_the_header_tells_how_to_make_the_session_again(scripted_strategy, scripted_device, log):
+    session = Session(scripted_device(), scripted_strategy(1, seed=9), log=log, subject="P1", config={"a": {"b": 1}})
+    session.run()
+    header = read_session(log).header
+    assert (header.subject, header.seed, header.config) == ("P1", 9, {"a": {"b": 1}})
+    assert header.space == session.strategy.space
+    assert header.device.name == "scripted"
+    assert {"python", "torch"} <= set(header.versions)
+
+
+def test_the_raw_sweeps_are_logged(scripted_strategy, scripted_device, log):
+    def answer(stimulus):
+        emg = 0.001 * np.random.default_rng(stimulus.trial).standard_normal(451)
+        return Sweep({"emg": Channel(emg, 3000.0, "mV", -50.0)}, t_valve_ms=-stimulus.isi_ms, t_tms_ms=0.0)
+
+    device = scripted_device(answer)
+    Session(device, scripted_strategy(2), log=log).run()
+    record = read_session(log)
+    for stimulus in device.delivered:
+        expected = answer(stimulus).channels["emg"]
+        np.testing.assert_array_equal(record.sweep(stimulus.trial)["emg"].values, expected.values)
+        assert record.sweep(stimulus.trial)["emg"].t0_ms == -50.0
+
+
+def test_a_simulated_session_does_not_sleep_through_its_intervals(scripted_strategy, scripted_device, log):
+    Session(scripted_device(), scripted_strategy(4), log=log).run()
+    assert [intent.t_s for intent in read_session(log).intents] == [0.0, 5.0, 10.0, 15.0]
+
+
+def test_the_interval_between_trials_is_waited_for(scripted_strategy, scripted_device, log, space):
+    clock = VirtualClock(100.0)
+    limits = Limits.of_space(space, min_iti_s=7.5)
+    Session(scripted_device(simulated=False), scripted_strategy(3), log=log, clock=clock, limits=limits).run()
+    assert [intent.t_s for intent in read_session(log).intents] == [100.0, 107.5, 115.0]
+
+
+def test_the_limit_of_pulses_ends_the_session_and_is_logged(scripted_strategy, scripted_device, log, space):
+    limits = Limits.of_space(space, max_pulses=3)
+    result = Session(scripted_device(), scripted_strategy(9), log=log, limits=limits).run()
+    assert len(result.trials) == 3
+    assert result.decision.reason == "The limit of 3 pulses is reached."
+    assert [event.kind for event in read_session(log).events] == ["limit"]
+
+
+def test_an_isi_beyond_the_limits_is_never_delivered(scripted_strategy, scripted_device, log):
+    device = scripted_device()
+    record, message = run_failing(
+        Session(device, scripted_strategy(9), log=log, limits=Limits(0.0, 1.0)), LimitExceededError
+    )
+    assert device.delivered == []
+    assert record.intents == ()
+    assert "beyond the limits" in message
+    assert [event.kind for event in record.events] == ["limit"]
+    assert record.finished
+
+
+def test_the_device_is_always_stopped(scripted_strategy, scripted_device, log):
+    device = scripted_device()
+    Session(device, scripted_strategy(2), log=log).run()
+    assert device.calls == ["stage", "stop", "unstage"]
+
+
+def test_a_device_that_cannot_be_staged_is_stopped_all_the_same(scripted_strategy, scripted_device, log):
+    device = scripted_device()
+
+    def stage():
+        raise DeviceError("no air pressure")
+
+    device.stage = stage
+    record, _ = run_failing(Session(device, scripted_strategy(), log=log), DeviceError)
+    assert device.calls == ["stop", "unstage"]
+    assert record.events[-1].text == "DeviceError: no air pressure"
+
+
+@pytest.mark.parametrize("error", [DeviceError("coil too hot"), RuntimeError("cable"), KeyboardInterrupt()])
+def test_a_device_that_fails_leaves_an_intact_log_and_is_stopped(scripted_strategy, scripted_device, log, error):
+    def answer(stimulus):
+        if stimulus.trial == 2:
+            raise error
+        return Measurement(0.1, stimulus.isi_ms)
+
+    device = scripted_device(answer)
+    session = Session(device, scripted_strategy(), log=log)
+    record, _ = run_failing(session, type(error))
+    assert record.finished
+    assert record.losses == ()
+    assert [trial.status for trial in record.table] == [Status.ACCEPTED, Status.ACCEPTED, Status.MISTRIAL]
+    assert record.table[2].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert record.table[2].commanded_isi_ms == device.delivered[2].isi_ms
+    assert record.events[-1].kind == "fault"
+    assert device.calls == ["stage", "stop", "unstage"]
+    assert len(session.strategy.posterior.told) == 2
+
+
+@pytest.mark.parametrize("mep_mv", [math.nan, math.inf, -math.inf, -0.001])
+def test_an_impossible_amplitude_is_an_error_that_names_it(scripted_strategy, scripted_device, log, mep_mv):
+    device = scripted_device(lambda stimulus: Measurement(mep_mv, stimulus.isi_ms))
+    session = Session(device, scripted_strategy(), log=log)
+    record, message = run_failing(session, InvalidValueError)
+    assert "mep_mv" in message
+    assert repr(mep_mv) in message
+    assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert session.strategy.posterior.told == ()
+
+
+@pytest.mark.parametrize("isi_ms", [math.nan, math.inf])
+def test_an_impossible_isi_is_an_error_that_names_it(scripted_strategy, scripted_device, log, isi_ms):
+    record, message = run_failing(
+        Session(scripted_device(lambda _: Measurement(0.1, isi_ms)), scripted_strategy(), log=log), InvalidValueError
+    )
+    assert "isi_ms" in message
+    assert record.finished
+
+
+@pytest.mark.parametrize("answer", [None, 0.1, (50.0, 0.1)])
+def test_an_answer_that_is_none_is_an_error(scripted_strategy, scripted_device, log, answer):
+    _, message = run_failing(Session(scripted_device(lambda _: answer), scripted_strategy(), log=log), DeviceError)
+    assert "Sweep or a Measurement" in message
+
+
+def test_an_answer_to_another_kind_of_trial_is_an_error(scripted_strategy, scripted_device, log):
+    _, message = run_failing(
+        Session(scripted_device(lambda _: Measurement(0.1, None)), scripted_strategy(), log=log), DeviceError
+    )
+    assert "another kind of trial" in message
+
+
+def test_an_isi_that_is_off_is_a_mistrial_and_asked_again(scripted_strategy, scripted_device, log):
+    def answer(stimulus):
+        off_ms = 10.1 if stimulus.trial == 1 else 9.9
+        return Measurement(0.1, stimulus.isi_ms + off_ms)
+
+    device = scripted_device(answer)
+    session = Session(device, scripted_strategy(3), log=log)
+    session.run()
+    record = read_session(log)
+    assert record.table[1].reason is MistrialReason.ISI_OFF
+    assert device.delivered[1].isi_ms == device.delivered[2].isi_ms
+    assert len(session.strategy.posterior.told) == 2
+
+
+def test_an_active_muscle_is_a_mistrial(scripted_strategy, scripted_device, log):
+    device = scripted_device(lambda stimulus: Measurement(0.1, stimulus.isi_ms, background_rms_uv=10.5))
+    result = Session(device, scripted_strategy(3), log=log).run()
+    assert {trial.reason for trial in result.trials} == {MistrialReason.BACKGROUND_ACTIVITY}
+    assert result.decision.reason == "The budget of 3 stimuli is used up."
+
+
+def test_an_error_of_the_observer_ends_the_session_with_an_intact_log(scripted_strategy, scripted_device, log):
+    def on_trial(update):
+        raise ZeroDivisionError(update)
+
+    device = scripted_device()
+    record, _ = run_failing(Session(device, scripted_strategy(), log=log, on_trial=on_trial), ZeroDivisionError)
+    assert len(record.table.told) == 1
+    assert record.finished
+    assert device.calls == ["stage", "stop", "unstage"]
+
+
+def test_a_device_on_another_reference_is_refused(scripted_strategy, scripted_device, log):
+    device = scripted_device()
+    object.__setattr__(device.info, "reference", "impact")
+    with pytest.raises(DeviceError, match="different events"):
+        Session(device, scripted_strategy(), log=log)
+
+
+def test_an_existing_log_stops_the_session_before_anything_is_delivered(scripted_strategy, scripted_device, log):
+    log.write_bytes(b"precious")
+    device = scripted_device()
+    with pytest.raises(LogError, match="never overwritten"):
+        Session(device, scripted_strategy(), log=log).run()
+    assert device.delivered == []
+    assert log.read_bytes() == b"precious"
+
+
+def test_without_a_writable_log_nothing_is_delivered(scripted_strategy, scripted_device, log, monkeypatch):
+    device = scripted_device()
+
+    def answer(stimulus):
+        def full(_):
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr(os, "fsync", full)
+        return Measurement(0.1, stimulus.isi_ms)
+
+    device.answer = answer
+    with pytest.raises(LogError, match="No space left"):
+        Session(device, scripted_strategy(), log=log).run()
+    monkeypatch.undo()
+    assert len(device.delivered) == 1
+    assert device.calls == ["stage", "stop", "unstage"]
+    assert len(read_session(log).intents) == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+@pytest.mark.parametrize("delay_s", [0.005, 0.05, 0.12, 0.2])
+def test_ctrl_c_at_any_time_leaves_an_intact_log(scripted_strategy, scripted_device, log, delay_s):
+    device = scripted_device()
+    session = Session(device, scripted_strategy(100_000), log=log, limits=Limits(0, 200, 0.0, 100_000))
+    timer = threading.Timer(delay_s, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        session.run()
+    timer.join()
+    record = read_session(log)
+    assert record.finished
+    assert record.losses == ()
+    assert record.unknown == ()
+    # An interrupt between the intent and the device counts as a stimulus, although none was delivered.
+    assert len(record.table) - len(device.delivered) in {0, 1}
+    assert record.events[-1].text == "Interrupted by the operator."
+    assert device.calls[-2:] == ["stop", "unstage"]
