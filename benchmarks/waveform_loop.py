@@ -1,10 +1,12 @@
 """Whether a closed loop on waveforms ends in windows as good as one on amplitudes.
 
-    OMP_NUM_THREADS=1 python benchmarks/waveform_loop.py > benchmarks/results/waveform_loop.txt
+    python benchmarks/waveform_loop.py --reference impact > benchmarks/results/waveform_loop_impact.txt
+    python benchmarks/waveform_loop.py --reference valve > benchmarks/results/waveform_loop_valve.txt
 
 The same people of the `recruitment` cohort are examined twice by the default strategy, with the same seeds: once by a
 device that reports the amplitude itself, and once by the simulated tapping robot, whose waveforms are judged. Paired,
-for both references and both trigger modes. The robot's hit delay and its variation are the person's.
+for both trigger modes. Each session ends when the strategy says so. The robot's hit delay and its variation are the
+person's.
 """
 
 from __future__ import annotations
@@ -28,12 +30,10 @@ from isiw.devices.plant import Geometry
 from isiw.devices.tapper import Trigger
 from isiw.subjects import SimulatedSubject, cohort
 
-SPACES = {
-    ("impact", "open-loop"): isiw.IMPACT_SPACE,
-    ("impact", "impact"): isiw.DesignSpace(5, 320, reference="impact"),
-    ("valve", "open-loop"): isiw.VALVE_SPACE,
+SPACES: dict[str, dict[Trigger, isiw.DesignSpace]] = {
+    "impact": {"open-loop": isiw.IMPACT_SPACE, "impact": isiw.DesignSpace(5, 320, reference="impact")},
     # Nobody's hit delay plus the time to detect the hit exceeds 215 ms.
-    ("valve", "impact"): isiw.DesignSpace(215, 500, reference="valve"),
+    "valve": {"open-loop": isiw.VALVE_SPACE, "impact": isiw.DesignSpace(215, 500, reference="valve")},
 }
 LARGEST_DIFFERENCE = 0.03
 
@@ -41,9 +41,9 @@ LARGEST_DIFFERENCE = 0.03
 def examine(
     space: isiw.DesignSpace, seed: int, trials: int, deliver: Callable[[isiw.Stimulus], isiw.Measurement | isiw.Sweep]
 ) -> tuple[isiw.WindowEstimate, Counter[str]]:
-    """One person's session of at most so many stimuli: the estimate, and the mistrials by their reasons."""
+    """One person's session of at most so many stimuli: the estimate, and how many were accepted or why not."""
     strategy = isiw.make_strategy("default", space=space, seed=seed, max_trials=trials)
-    mistrials: Counter[str] = Counter()
+    outcomes: Counter[str] = Counter()
     for trial in range(trials):
         if strategy.decision().stop:
             break
@@ -51,12 +51,13 @@ def examine(
         answer = deliver(stimulus)
         judged = isiw.signals.judge(answer, stimulus, space) if isinstance(answer, isiw.Sweep) else None
         if judged is not None and judged.reason is not None:
-            mistrials[judged.reason.value] += 1
+            outcomes[judged.reason.value] += 1
             strategy.count_mistrial()
         else:
+            outcomes["accepted"] += 1
             told = judged or answer
             strategy.tell(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
-    return strategy.estimate(), mistrials
+    return strategy.estimate(), outcomes
 
 
 def by_amplitude(
@@ -89,7 +90,8 @@ def main() -> None:
     """Run, and print a row for each reference and trigger."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--people", type=int, default=50)
-    parser.add_argument("--trials", type=int, default=40, help="stimuli a person, mistrials included")
+    parser.add_argument("--reference", choices=("impact", "valve"), required=True)
+    parser.add_argument("--trials", type=int, default=80, help="stimuli a person at most, mistrials included")
     parser.add_argument("--seed", type=int, default=10_000, help="0–999 for work, reported figures from 10,000")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
@@ -97,21 +99,23 @@ def main() -> None:
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in ("isiw", "numpy", "torch"))
     print(f"python {platform.python_version()}, {versions}")
     print(f"recruitment cohort, {arguments.people} people, seed {arguments.seed}, {arguments.trials} stimuli at most")
-    print("reference  trigger     F1 amplitudes  F1 waveforms  difference (95 % interval)   mistrials")
-    for (_, trigger), space in SPACES.items():
-        scores, mistrials = [], Counter()
+    print("reference  trigger     F1 amplitudes  F1 waveforms  difference (95 % interval)   stimuli     outcomes")
+    for trigger, space in SPACES[arguments.reference].items():
+        scores, plain_outcomes, outcomes = [], Counter(), Counter()
         for number, subject in enumerate(subjects):
             seed, truth = arguments.seed + number, subject.window(space)
-            plain, _ = examine(space, seed, arguments.trials, by_amplitude(subject, space, seed))
+            plain, plain_reasons = examine(space, seed, arguments.trials, by_amplitude(subject, space, seed))
             waves, reasons = examine(space, seed, arguments.trials, by_waveform(subject, space, seed, trigger))
             scores.append([isiw.metrics.f1(estimate, truth, space) for estimate in (plain, waves)])
-            mistrials += reasons
+            plain_outcomes += plain_reasons
+            outcomes += reasons
         amplitudes, waveforms = np.array(scores).T
         difference = waveforms - amplitudes
         half = 1.96 * difference.std(ddof=1) / math.sqrt(len(difference))
+        counts = f"{plain_outcomes.total()} and {outcomes.total()}   {dict(outcomes)}"
         kept = "kept" if abs(difference.mean()) <= LARGEST_DIFFERENCE else "MISSED"
         print(f"{space.reference:10} {trigger:11} {amplitudes.mean():13.3f} {waveforms.mean():13.3f} "
-              f"{difference.mean():11.3f} ± {half:.3f} {kept:>10}   {dict(mistrials)}", flush=True)  # fmt: skip
+              f"{difference.mean():11.3f} ± {half:.3f} {kept:>10}   {counts}", flush=True)  # fmt: skip
 
 
 if __name__ == "__main__":
