@@ -84,6 +84,8 @@ def test_faults_come_as_often_as_their_probability():
         {"contact_ms": 0.0},
         {"hit_sd_ms": -1.0},
         {"hit_sd_ms": 0.1, "descent_sd_ms": 5.0},
+        {"stuck_probability": 1.5},
+        {"late_probability": 0.1, "late_ms": (20.0, 10.0)},
     ],
 )
 def test_a_geometry_that_cannot_be_is_an_error(wrong):

@@ -89,6 +89,14 @@ def test_saturation(sweep_of):
     assert mistrial_of(sweep_of(), limits=SignalLimits(full_scale_mv=0.04)) is MistrialReason.SATURATION
 
 
+def test_an_artefact_that_saturates_outside_the_mep_window_is_no_saturation(sweep_of):
+    emg = sweep_of().channels["emg"].values.copy()
+    emg[3899:3909] = 5.0  # the pulse
+    emg[3500:3510] = -5.0  # the tap
+    assert is_saturated(emg, 5000.0)
+    assert judge(with_channel(sweep_of(), "emg", emg), PAIR, IMPACT, SignalLimits(full_scale_mv=5.0)).reason is None
+
+
 def test_a_coarse_converter_at_rest_is_not_saturated():
     steps = np.round(np.random.default_rng(0).standard_normal(5000) * 0.7)
     assert not is_saturated(0.001 * steps, 5000.0)

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
 
 from isiw.signals import MEP_WINDOWS_MS, background_rms, is_saturated, mep_amplitudes, mep_onsets, mep_present
 
-DATA = Path(__file__).parents[2].parent / "shared" / "data" / "uef"
 PULSE_MS, RATE_HZ = 50.0, 3000.0
-
-pytestmark = pytest.mark.skipif(
-    not (DATA / "uef_trials.csv").exists(), reason="the recorded sweeps are not at ../shared/data/uef"
-)
 
 
 @pytest.fixture(params=[("ID10_1_ECR", "ID10_1", "forearm"), ("ID01_FDI", "ID01", "hand")], ids=["ECR", "FDI"])
-def recorded(request):
+def recorded(request, recordings_folder):
     file, dataset, muscles = request.param
-    sweeps = pd.read_csv(DATA / f"uef_{file}_epochs_uV_3kHz.csv.gz", index_col="trial")
-    trials = pd.read_csv(DATA / "uef_trials.csv")
+    sweeps = pd.read_csv(recordings_folder / f"uef_{file}_epochs_uV_3kHz.csv.gz", index_col="trial")
+    trials = pd.read_csv(recordings_folder / "uef_trials.csv")
     reference = trials[trials["dataset"] == dataset].set_index("trial").loc[sweeps.index]
     return sweeps.to_numpy() / 1000, reference, MEP_WINDOWS_MS[muscles]
 

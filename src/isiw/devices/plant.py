@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import brentq
@@ -117,6 +118,9 @@ class Geometry:
             )
         if min(self.descent_sd_ms, self.hit_sd_ms, self.contact_sd_ms, self.memg_sd_ms, self.artefact_mv) < 0:
             raise InvalidValueError("SDs and amplitudes must not be negative", got=self)
+        chances = (self.stuck_probability, self.late_probability)
+        if not (0 <= min(chances) <= max(chances) <= 1 and 0 <= self.late_ms[0] <= self.late_ms[1]):
+            raise InvalidValueError("a fault cannot be as probable or as late as that", got=(*chances, self.late_ms))
         if self.travel_sd_ms is None:
             raise InvalidValueError(
                 "the friction alone makes the hit vary more than that",
@@ -125,17 +129,17 @@ class Geometry:
                 remedy="Raise hit_sd_ms or lower descent_sd_ms.",
             )
 
-    @property
+    @cached_property
     def kinetic_share(self) -> float:
         """Kinetic friction, as a share of the supply pressure."""
         return float(_pressure_share(self.descent_ms)) - BREAK_AWAY_M_S2 / DRIVE_M_S2
 
-    @property
+    @cached_property
     def hit_speed_m_s(self) -> float:
         """Speed of the hammer at the mean impact [m/s]."""
         return float(_speed(self.descent_ms, self.hit_ms, self.kinetic_share))
 
-    @property
+    @cached_property
     def travel_mm(self) -> float:
         """Mean travel of the hammer from its initial position to the tendon [mm]."""
         return float(_travel(self.descent_ms, self.hit_ms, self.kinetic_share))
@@ -151,7 +155,7 @@ class Geometry:
         left = self.hit_sd_ms**2 - (self.friction_share * self.descent_sd_ms) ** 2
         return math.sqrt(left) if left >= 0 else None
 
-    @property
+    @cached_property
     def stiffness_rad_ms(self) -> float:
         """Natural frequency of the hammer on the tendon [rad/ms], from the contact's length."""
         drive_m_s2 = float(drive(self.hit_ms, self.kinetic_share))

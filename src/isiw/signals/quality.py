@@ -26,7 +26,7 @@ from isiw.signals.mep import (
     mep_amplitudes,
 )
 from isiw.trials import Channel, MistrialReason, Status, Stimulus, Sweep
-from isiw.types import ArrayLike, FloatArray
+from isiw.types import ArrayLike, BoolArray, FloatArray
 
 __all__ = ["ACCELERATION_UNITS", "EMG_UNITS_MV", "Judged", "SignalLimits", "is_saturated", "judge"]
 
@@ -122,7 +122,9 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
     if not _holds_window(emg, timed, limits):
         return _mistrial(timed, MistrialReason.MISSING_CHANNEL)
     timed = replace(timed, background_rms_uv=_background_uv(emg_mv, emg, timed))
-    if is_saturated(emg_mv, emg.rate_hz, limits.full_scale_mv):
+    pulse = _on_channel(timed.t_tms_ms, emg)
+    span_ms = (pulse + limits.mep_window_ms[0], pulse + limits.mep_window_ms[1])
+    if is_saturated(emg_mv, emg.rate_hz, limits.full_scale_mv, span_ms=span_ms):
         return _mistrial(timed, MistrialReason.SATURATION)
     if timed.background_rms_uv is None:
         return _mistrial(timed, MistrialReason.MISSING_CHANNEL)
@@ -132,7 +134,13 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
     return _mistrial(timed, MistrialReason.OUTCOME_UNKNOWN) if math.isnan(mep_mv) else replace(timed, mep_mv=mep_mv)
 
 
-def is_saturated(emg_mv: ArrayLike, rate_hz: float, full_scale_mv: float | None = None) -> bool:
+def is_saturated(
+    emg_mv: ArrayLike,
+    rate_hz: float,
+    full_scale_mv: float | None = None,
+    *,
+    span_ms: tuple[float, float] = (0.0, math.inf),
+) -> bool:
     """Whether the EMG of one sweep ran into a limit of its amplifier.
 
     Args:
@@ -140,18 +148,21 @@ def is_saturated(emg_mv: ArrayLike, rate_hz: float, full_scale_mv: float | None 
         rate_hz: sampling rate [Hz].
         full_scale_mv: the largest value that the amplifier can show [mV]. Without it, a top that stays at exactly one
             value for 1 ms or longer, far out of the sweep's usual range, is taken for a limit.
+        span_ms: the part of the sweep that counts [ms from the first sample]; artefacts may run into limits elsewhere.
     """
     emg = np.asarray(emg_mv, dtype=np.float64)
+    first, last = (min(edge * rate_hz / 1000, emg.size) for edge in span_ms)
+    counts = emg[math.floor(first) : math.ceil(last) + 1]
     if full_scale_mv is not None:
-        return bool(np.abs(emg).max() >= full_scale_mv)
-    usual = np.median(np.abs(emg - np.median(emg)))
+        return bool(np.abs(counts).max() >= full_scale_mv)
+    level = np.median(emg)
+    usual = np.median(np.abs(emg - level))
     samples = max(3, round(FLAT_MS * rate_hz / 1000))
-    return any(
-        abs(top - np.median(emg)) > 10 * usual and _longest_run(emg == top) >= samples for top in (emg.max(), emg.min())
-    )
+    tops = (float(counts.max()), float(counts.min()))
+    return any(abs(top - level) > 10 * usual and _longest_run(counts == top) >= samples for top in tops)
 
 
-def _longest_run(mask: FloatArray) -> int:
+def _longest_run(mask: BoolArray) -> int:
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
