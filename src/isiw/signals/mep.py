@@ -130,7 +130,14 @@ def mep_onsets(
 ) -> FloatArray:
     """Latency of the MEP in each of n sweeps [ms after the pulse], NaN where none stands out, shape (n,).
 
-    Args: as in `mep_onset`, of shape (n, w) and (n,).
+    Args:
+        emg_mv: EMG [mV], shape (n, w).
+        rate_hz: sampling rate [Hz].
+        t_tms_ms: the magnetic pulse [ms from the first sample], one or shape (n,), after at least 40 ms of rest.
+        window_ms: where the MEP is sought [ms after the pulse].
+
+    Raises:
+        InvalidValueError: a waveform that is no recording, too little rest, or a window that it does not hold.
     """
     waves = as_waveforms(emg_mv, rate_hz, "EMG")
     pulse = per_waveform(t_tms_ms, waves)
