@@ -29,6 +29,8 @@ _HOME = {
     "Measurement": "trials",
     "Stimulus": "trials",
     "Sweep": "trials",
+    "Tapper": "devices.tapper",
+    "TapperSettings": "devices.tapper",
     "Trial": "trials",
     "TrialTable": "trials",
     "exclude": "resumption",
@@ -37,7 +39,19 @@ _HOME = {
     "read_session": "log.reader",
     "resume": "resumption",
 }
-_MODULES = {"config", "errors", "metrics", "plots", "report", "signals", "subjects", "testing"}
+_MODULES = {
+    "config",
+    "counts",
+    "errors",
+    "metrics",
+    "plots",
+    "plots_timing",
+    "report",
+    "signals",
+    "subjects",
+    "testing",
+    "timing",
+}
 
 __all__ = ["__version__", *sorted(_HOME), *sorted(_MODULES)]  # noqa: PLE0604 - the names are strings, listed above
 

@@ -104,6 +104,26 @@ def exclude(
         _print(f"Trial {trial} is excluded: {reason}")
 
 
+@app.command()
+def timing(
+    source: Annotated[str, typer.Argument(help="A preset of the tapping robot, or a session's log.", **_NO_DEFAULT)],
+    taps: Annotated[int, typer.Option(help="Taps of a preset for each ISI.")] = 100,
+    seed: Annotated[int, typer.Option(help="Seed of a preset's taps.")] = 0,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **_NO_DEFAULT)] = None,
+) -> None:
+    """Say how repeatable the taps are: events, ISI errors, mistrials."""
+    with _errors_reported():
+        recorded = Path(source).is_file()
+        study = (
+            isiw.timing.study_session(isiw.read_session(source))
+            if recorded
+            else isiw.timing.study_preset(source, taps=taps, seed=seed)
+        )
+        _print(isiw.timing.timing_report(study))
+        if output is not None:
+            _print(f"picture: {isiw.plots_timing.save_timing_plot(study, output)}")
+
+
 def _run_to_the_end(session: Session) -> None:
     _print(f"log: {session.log_path}")
     _print_row(isiw.report.PROGRESS_HEADINGS)

@@ -1,6 +1,33 @@
 """From waveforms to numbers: impact, MEP, background, and the judgement of a trial."""
 
-from isiw.signals.mep import background_rms_uv, mep_amplitude
-from isiw.signals.quality import Judged, SignalLimits, judge
+from isiw.signals.events import TapEvents, detect_events, sweep_events
+from isiw.signals.impact import impact_time, impact_times
+from isiw.signals.mep import (
+    MEP_WINDOWS_MS,
+    background_rms,
+    mep_amplitude,
+    mep_amplitudes,
+    mep_onset,
+    mep_onsets,
+    mep_present,
+)
+from isiw.signals.quality import Judged, SignalLimits, is_saturated, judge
 
-__all__ = ["Judged", "SignalLimits", "background_rms_uv", "judge", "mep_amplitude"]
+__all__ = [
+    "MEP_WINDOWS_MS",
+    "Judged",
+    "SignalLimits",
+    "TapEvents",
+    "background_rms",
+    "detect_events",
+    "impact_time",
+    "impact_times",
+    "is_saturated",
+    "judge",
+    "mep_amplitude",
+    "mep_amplitudes",
+    "mep_onset",
+    "mep_onsets",
+    "mep_present",
+    "sweep_events",
+]

@@ -1,16 +1,42 @@
-"""The judgement of one sweep: an accepted trial with its numbers, or a mistrial with its reason."""
+"""The judgement of a trial: from its sweep to an amplitude at a realised ISI, or to the reason why there is none.
+
+What goes wrong in one trial is a mistrial, with a reason from the closed list of `MistrialReason`. What is wrong with
+every trial, an unknown unit or a rate that measures nothing, is an error: no repetition would mend it.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.signals.mep import background_rms_uv, mep_amplitude
-from isiw.trials import MistrialReason, Status, Stimulus, Sweep
+from isiw.errors import InvalidValueError
+from isiw.signals.events import tap_artefact_times
+from isiw.signals.impact import impact_time
+from isiw.signals.mep import (
+    MEP_WINDOW_MS,
+    MIN_BACKGROUND_MS,
+    PULSE_GUARD_MS,
+    TAP_SPAN_MS,
+    background_rms,
+    mep_amplitudes,
+)
+from isiw.trials import Channel, MistrialReason, Status, Stimulus, Sweep
+from isiw.types import ArrayLike, BoolArray, FloatArray
 
-__all__ = ["Judged", "SignalLimits", "judge"]
+__all__ = ["ACCELERATION_UNITS", "EMG_UNITS_MV", "Judged", "SignalLimits", "is_saturated", "judge"]
+
+EMG_UNITS_MV: Mapping[str, float] = MappingProxyType({"V": 1e3, "mV": 1.0, "uV": 1e-3, "µV": 1e-3, "μV": 1e-3})
+"""One of each unit in mV; both of Unicode's micro signs are known."""
+
+ACCELERATION_UNITS = frozenset({"m/s^2", "m/s²", "g", "V", "mV"})
+"""Units of the acceleration; the impact is found in any of them."""
+
+FLAT_MS = 1.0
 
 
 @dataclass(frozen=True)
@@ -18,17 +44,51 @@ class SignalLimits:
     """What a sweep must keep to be accepted.
 
     Args:
-        mep_window_ms: where the MEP is sought [ms after the pulse].
-        background_uv: the most EMG at rest before the pulse [µV RMS].
+        mep_window_ms: where the MEP is sought [ms after the pulse]; `MEP_WINDOWS_MS` has one for each muscle group.
+        background_uv: the most EMG at rest before the pulse [µV RMS]; above it the muscle was not relaxed.
+        full_scale_mv: the largest EMG that the amplifier can show [mV]; None to look for flat tops only.
+        isi_tolerance_ms: how far the realised ISI may be from the commanded one [ms], where that is less than the
+            space's tolerance.
+        tap_artefact_ms: how long the artefact of the tap lasts in the EMG [ms]; what it covers of the MEP window does
+            not count.
+
+    Raises:
+        InvalidValueError: a limit that is not positive, or an empty window.
     """
 
-    mep_window_ms: tuple[float, float] = (15.0, 35.0)
+    mep_window_ms: tuple[float, float] = MEP_WINDOW_MS
     background_uv: float = 10.0
+    full_scale_mv: float | None = None
+    isi_tolerance_ms: float | None = None
+    tap_artefact_ms: float = 8.0
+
+    def __post_init__(self) -> None:
+        for name in ("background_uv", "full_scale_mv", "isi_tolerance_ms", "tap_artefact_ms"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise InvalidValueError(f"SignalLimits.{name} must be positive", got=value)
+        low, high = self.mep_window_ms
+        if not 0 <= low < high < math.inf:
+            raise InvalidValueError(
+                "SignalLimits.mep_window_ms is empty", got=self.mep_window_ms, expected="0 <= a < b"
+            )
 
 
 @dataclass(frozen=True)
 class Judged:
-    """What a sweep came to: accepted, or a mistrial with its reason. All times are on the sweep's clock."""
+    """What a sweep came to: accepted, or a mistrial with its reason. All times are on the sweep's clock.
+
+    Args:
+        status: accepted or mistrial.
+        reason: why it is a mistrial; None where accepted.
+        isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone or where unknown.
+        isi_sd_ms: SD of the realised ISI [ms]; 0 where both of its events were measured.
+        mep_mv: peak-to-peak amplitude of the MEP [mV]; None in a mistrial.
+        background_rms_uv: EMG at rest before the pulse [µV RMS]; None where it could not be measured.
+        t_valve_ms: the valve command [ms].
+        t_hit_ms: the impact [ms].
+        t_tms_ms: the magnetic pulse [ms].
+    """
 
     status: Status = Status.ACCEPTED
     reason: MistrialReason | None = None
@@ -49,28 +109,161 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
         stimulus: what was commanded.
         space: says which event the ISI counts from, and how far it may be off.
         limits: what the sweep must keep.
+
+    Raises:
+        InvalidValueError: an unknown unit, or a sampling rate too low to measure anything.
     """
     limits = limits or SignalLimits()
-    emg, t_tms_ms = sweep.channels.get("emg"), sweep.t_tms_ms
-    first_ms = sweep.t_hit_ms if space.reference == "impact" else sweep.t_valve_ms
-    timed = Judged(t_valve_ms=sweep.t_valve_ms, t_hit_ms=sweep.t_hit_ms, t_tms_ms=t_tms_ms)
-    if emg is None or not np.isfinite(emg.values).all() or np.ptp(emg.values) == 0:
+    timed = _judge_timing(sweep, stimulus, space, limits)
+    if timed.reason is not None:
+        return timed
+    emg = sweep.channels["emg"]
+    emg_mv = emg.values * _unit_mv(emg)
+    if not _holds_window(emg, timed, limits):
         return _mistrial(timed, MistrialReason.MISSING_CHANNEL)
-    if t_tms_ms is None:
-        return _mistrial(timed, MistrialReason.NO_PULSE)
-    if stimulus.isi_ms is not None:
-        if first_ms is None:
-            return _mistrial(timed, MistrialReason.NO_IMPACT)
-        timed = replace(timed, isi_ms=t_tms_ms - first_ms, isi_sd_ms=sweep.isi_sd_ms)
-        if abs(t_tms_ms - first_ms - stimulus.isi_ms) > space.tolerance_ms:
-            return _mistrial(timed, MistrialReason.ISI_OFF)
-    background = float(background_rms_uv(emg.values, emg.rate_hz, t_tms_ms - emg.t0_ms))
-    timed = replace(timed, background_rms_uv=background)
-    if background > limits.background_uv:
+    timed = replace(timed, background_rms_uv=_background_uv(emg_mv, emg, timed))
+    pulse = _on_channel(timed.t_tms_ms, emg)
+    span_ms = (pulse + limits.mep_window_ms[0], pulse + limits.mep_window_ms[1])
+    if is_saturated(emg_mv, emg.rate_hz, limits.full_scale_mv, span_ms=span_ms):
+        return _mistrial(timed, MistrialReason.SATURATION)
+    if timed.background_rms_uv is None:
+        return _mistrial(timed, MistrialReason.MISSING_CHANNEL)
+    if timed.background_rms_uv > limits.background_uv:
         return _mistrial(timed, MistrialReason.BACKGROUND_ACTIVITY)
-    mep_mv = mep_amplitude(emg.values, emg.rate_hz, t_tms_ms - emg.t0_ms, limits.mep_window_ms)
-    return replace(timed, mep_mv=float(mep_mv))
+    mep_mv = _mep_mv(emg_mv, emg, timed, limits)
+    return _mistrial(timed, MistrialReason.OUTCOME_UNKNOWN) if math.isnan(mep_mv) else replace(timed, mep_mv=mep_mv)
+
+
+def is_saturated(
+    emg_mv: ArrayLike,
+    rate_hz: float,
+    full_scale_mv: float | None = None,
+    *,
+    span_ms: tuple[float, float] = (0.0, math.inf),
+) -> bool:
+    """Whether the EMG of one sweep ran into a limit of its amplifier.
+
+    Args:
+        emg_mv: EMG [mV], shape (w,).
+        rate_hz: sampling rate [Hz].
+        full_scale_mv: the largest value that the amplifier can show [mV]. Without it, a top that stays at exactly one
+            value for 1 ms or longer, far out of the sweep's usual range, is taken for a limit.
+        span_ms: the part of the sweep that counts [ms from the first sample]; artefacts may run into limits elsewhere.
+    """
+    emg = np.asarray(emg_mv, dtype=np.float64)
+    first, last = (min(edge * rate_hz / 1000, emg.size) for edge in span_ms)
+    counts = emg[math.floor(first) : math.ceil(last) + 1]
+    if full_scale_mv is not None:
+        return bool(np.abs(counts).max() >= full_scale_mv)
+    level = np.median(emg)
+    usual = np.median(np.abs(emg - level))
+    samples = max(3, round(FLAT_MS * rate_hz / 1000))
+    tops = (float(counts.max()), float(counts.min()))
+    return any(abs(top - level) > 10 * usual and _longest_run(counts == top) >= samples for top in tops)
+
+
+def _longest_run(mask: BoolArray) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def _mistrial(judged: Judged, reason: MistrialReason) -> Judged:
     return replace(judged, status=Status.MISTRIAL, reason=reason)
+
+
+def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Judged:
+    """The realised ISI, or what is wrong with the timing; the amplitude is still to come."""
+    judged = Judged(t_valve_ms=sweep.t_valve_ms, t_tms_ms=sweep.t_tms_ms)
+    if not _usable(sweep, "emg") or not _of_one_length(sweep):
+        return _mistrial(judged, MistrialReason.MISSING_CHANNEL)
+    _unit_mv(sweep.channels["emg"])
+    if sweep.t_tms_ms is None:
+        return _mistrial(judged, MistrialReason.NO_PULSE)
+    if stimulus.isi_ms is None:
+        return judged
+    hit, wrong = _impact(sweep)
+    judged = replace(judged, t_hit_ms=hit, isi_sd_ms=sweep.isi_sd_ms)
+    start = hit if space.reference == "impact" else sweep.t_valve_ms
+    if wrong is not None or start is None:
+        return _mistrial(judged, wrong or MistrialReason.MISSING_CHANNEL)
+    isi_ms = sweep.t_tms_ms - start
+    judged = replace(judged, isi_ms=isi_ms)
+    if space.reference == "impact" and isi_ms < 0:
+        return _mistrial(judged, MistrialReason.TMS_BEFORE_IMPACT)
+    tolerance = min(space.tolerance_ms, limits.isi_tolerance_ms or math.inf)
+    off = abs(isi_ms - stimulus.isi_ms) > tolerance
+    return _mistrial(judged, MistrialReason.ISI_OFF) if off else judged
+
+
+def _impact(sweep: Sweep) -> tuple[float | None, MistrialReason | None]:
+    """The impact as told by the device or found in the acceleration, and what is wrong where it should be there."""
+    if sweep.t_hit_ms is not None:
+        return sweep.t_hit_ms, None
+    if "acceleration" not in sweep.channels:
+        return None, None
+    channel = sweep.channels["acceleration"]
+    if channel.unit not in ACCELERATION_UNITS:
+        raise InvalidValueError(
+            "the acceleration's unit is unknown", got=channel.unit, expected=", ".join(sorted(ACCELERATION_UNITS))
+        )
+    if sweep.t_valve_ms is None or not _usable(sweep, "acceleration"):
+        return None, MistrialReason.MISSING_CHANNEL
+    hit = impact_time(channel.values, channel.rate_hz, sweep.t_valve_ms - channel.t0_ms)
+    return (None, MistrialReason.NO_IMPACT) if hit is None else (hit + channel.t0_ms, None)
+
+
+def _usable(sweep: Sweep, name: str) -> bool:
+    """Whether a channel was recorded at all: samples, all finite, and not a flat line."""
+    if name not in sweep.channels:
+        return False
+    values = sweep.channels[name].values
+    return bool(values.size and np.isfinite(values).all() and values.min() < values.max())
+
+
+def _of_one_length(sweep: Sweep) -> bool:
+    """Whether EMG and acceleration, where there is one, cover the same time to within a sample."""
+    channels = [sweep.channels[name] for name in ("emg", "acceleration") if name in sweep.channels]
+    lengths = [channel.values.size / channel.rate_hz for channel in channels]
+    return max(lengths) - min(lengths) <= max(1 / channel.rate_hz for channel in channels)
+
+
+def _unit_mv(emg: Channel) -> float:
+    if emg.unit not in EMG_UNITS_MV:
+        raise InvalidValueError("the EMG's unit is unknown", got=emg.unit, expected=", ".join(EMG_UNITS_MV))
+    return EMG_UNITS_MV[emg.unit]
+
+
+def _holds_window(emg: Channel, timed: Judged, limits: SignalLimits) -> bool:
+    pulse = _on_channel(timed.t_tms_ms, emg)
+    end = 1000 * (emg.values.size - 1) / emg.rate_hz
+    return pulse + limits.mep_window_ms[0] >= 0 and pulse + limits.mep_window_ms[1] <= end
+
+
+def _on_channel(time_ms: float | None, channel: Channel) -> float:
+    """A time of the sweep's clock, counted from the channel's first sample [ms]; NaN where unknown."""
+    return math.nan if time_ms is None else time_ms - channel.t0_ms
+
+
+def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Judged) -> float | None:
+    """RMS of the EMG at rest, where possible of EMG that the tap cannot have touched; None where there is too little.
+
+    After the valve command the artefact of the tap may be anywhere if the impact is unknown. A short sweep may hold
+    nothing else, and then all of its EMG before the pulse is judged.
+    """
+    pulse, hit = _on_channel(timed.t_tms_ms, emg), _on_channel(timed.t_hit_ms, emg)
+    untouched = np.fmin(pulse, _on_channel(timed.t_valve_ms, emg)) if math.isnan(hit) else pulse
+    for end, tap in ((float(untouched), hit), (pulse, math.nan)):
+        touched = 0.0 if math.isnan(tap) else max(0.0, min(end, tap + TAP_SPAN_MS) - max(tap, 0.0))
+        if end - touched >= MIN_BACKGROUND_MS + 2 * PULSE_GUARD_MS:
+            return float(1000 * background_rms(emg_mv, emg.rate_hz, end, tap)[0])
+    return None
+
+
+def _mep_mv(emg_mv: FloatArray, emg: Channel, timed: Judged, limits: SignalLimits) -> float:
+    pulse = _on_channel(timed.t_tms_ms, emg)
+    shown = np.array([math.nan])
+    if timed.t_hit_ms is not None and timed.t_valve_ms is not None:
+        hit, valve = _on_channel(timed.t_hit_ms, emg), _on_channel(timed.t_valve_ms, emg)
+        shown = tap_artefact_times(emg_mv, emg.rate_hz, hit, valve_ms=valve, t_tms_ms=pulse)
+    blank = (shown, shown + limits.tap_artefact_ms)
+    return float(mep_amplitudes(emg_mv, emg.rate_hz, pulse, limits.mep_window_ms, blank_ms=blank)[0])

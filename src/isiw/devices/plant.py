@@ -1,0 +1,297 @@
+"""The pneumatic tapping robot as a mechanism: from the valve command to the hammer at rest on the wrist.
+
+    valve ── line delay ──▶ chamber fills ──▶ static friction breaks ──▶ descent ──▶ contact ⇄ flight ──▶ rest
+
+The chamber's pressure approaches the supply's exponentially. The hammer breaks away at a pressure that static friction
+sets, and is then driven by the pressure above the kinetic friction. On contact the tendon is a damped spring. Each
+person's mean event times are the dissertation's (Table 3.2); from them follow the break-away pressure, the travel and
+the stiffness, and these vary from tap to tap. Times are in ms from the valve command unless a name says otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import brentq
+
+from isiw.errors import InvalidValueError
+from isiw.types import ArrayLike, FloatArray
+
+__all__ = [
+    "LINE_DELAY_MS",
+    "SEPARATION_RAD",
+    "SUPPLY_KPA",
+    "Geometry",
+    "SensorNoise",
+    "Taps",
+    "draw_taps",
+    "drive",
+    "pressure_kpa",
+    "rebound",
+    "restitution",
+]
+
+SUPPLY_KPA = 413.7
+"""60 psi (dissertation, 3.2.2, where it is printed as 416.7 kPa)."""
+
+LINE_DELAY_MS = 23.0  # t_fill of every preset; sound needs 22 ms for the 7.5 m line
+FILL_MS = 100.0  # time constant of the chamber
+DRIVE_M_S2 = 120.0  # acceleration of the hammer at the full supply pressure without friction
+BREAK_AWAY_M_S2 = 6.0  # what static friction exceeds kinetic friction by
+DAMPING = 0.3  # of the contact, as a share of the critical one
+_ROOT = math.sqrt(1 - DAMPING**2)
+SEPARATION_RAD = (math.pi - math.atan2(2 * DAMPING * _ROOT, 1 - 2 * DAMPING**2)) / _ROOT
+"""The natural phase at which a damped spring has pushed its load back to zero force."""
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Noise SD of each sensor, white unless said otherwise.
+
+    Args:
+        valve_v: voltage of the valve command [V].
+        pressure_kpa: chamber pressure [kPa].
+        acceleration_m_s2: acceleration of the hammer [m/s²].
+        force_n: load cell [N].
+        emg_uv: EMG at rest, in the amplifier's band of 10–1000 Hz [µV RMS].
+    """
+
+    valve_v: float = 0.02
+    pressure_kpa: float = 0.5
+    acceleration_m_s2: float = 0.3
+    force_n: float = 0.1
+    emg_uv: float = 1.0
+
+    def scaled(self, factor: float) -> SensorNoise:
+        """The same sensors with all their noise multiplied."""
+        return SensorNoise(**{name: factor * value for name, value in vars(self).items()})
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """One person's wrist under the robot, by its mean event times and how they vary from tap to tap.
+
+    Args:
+        descent_ms: mean begin of the descent [ms after the valve command].
+        descent_sd_ms: its SD, from the static friction [ms].
+        hit_ms: mean impact [ms after the valve command].
+        hit_sd_ms: its SD, from friction and travel together [ms].
+        contact_ms: mean time for which the tendon decelerates the hammer [ms].
+        contact_sd_ms: its SD [ms].
+        memg_ms: mean time from the impact to its artefact in the EMG [ms].
+        memg_sd_ms: its SD [ms].
+        artefact_mv: amplitude of that artefact [mV]; 0 where there is no EMG.
+        load_cell: whether the hammer taps a load cell.
+        stuck_probability: share of taps in which the hammer does not move.
+        late_probability: share of taps whose valve opens late, a fault of the timing.
+        late_ms: by how much those are late, uniform between the two [ms].
+        noise: of the sensors.
+
+    Raises:
+        InvalidValueError: events out of order, negative SDs, or a hit SD that the friction alone exceeds.
+    """
+
+    descent_ms: float
+    descent_sd_ms: float
+    hit_ms: float
+    hit_sd_ms: float
+    contact_ms: float
+    contact_sd_ms: float
+    memg_ms: float = 20.0
+    memg_sd_ms: float = 0.5
+    artefact_mv: float = 0.1
+    load_cell: bool = False
+    stuck_probability: float = 0.0
+    late_probability: float = 0.0
+    late_ms: tuple[float, float] = (0.0, 0.0)
+    noise: SensorNoise = SensorNoise()
+
+    def __post_init__(self) -> None:
+        if not LINE_DELAY_MS < self.descent_ms < self.hit_ms or not 0 < self.contact_ms < math.inf:
+            raise InvalidValueError(
+                "a tap's events are out of order",
+                got=(LINE_DELAY_MS, self.descent_ms, self.hit_ms, self.contact_ms),
+                expected="line delay < descent < hit, and a contact of positive length",
+            )
+        if min(self.descent_sd_ms, self.hit_sd_ms, self.contact_sd_ms, self.memg_sd_ms, self.artefact_mv) < 0:
+            raise InvalidValueError("SDs and amplitudes must not be negative", got=self)
+        chances = (self.stuck_probability, self.late_probability)
+        if not (0 <= min(chances) <= max(chances) <= 1 and 0 <= self.late_ms[0] <= self.late_ms[1]):
+            raise InvalidValueError("a fault cannot be as probable or as late as that", got=(*chances, self.late_ms))
+        if self.travel_sd_ms is None:
+            raise InvalidValueError(
+                "the friction alone makes the hit vary more than that",
+                got=self.hit_sd_ms,
+                expected=f"at least {self.friction_share * self.descent_sd_ms:.2f} ms",
+                remedy="Raise hit_sd_ms or lower descent_sd_ms.",
+            )
+
+    @cached_property
+    def kinetic_share(self) -> float:
+        """Kinetic friction, as a share of the supply pressure."""
+        return float(_pressure_share(self.descent_ms)) - BREAK_AWAY_M_S2 / DRIVE_M_S2
+
+    @cached_property
+    def hit_speed_m_s(self) -> float:
+        """Speed of the hammer at the mean impact [m/s]."""
+        return float(_speed(self.descent_ms, self.hit_ms, self.kinetic_share))
+
+    @cached_property
+    def travel_mm(self) -> float:
+        """Mean travel of the hammer from its initial position to the tendon [mm]."""
+        return float(_travel(self.descent_ms, self.hit_ms, self.kinetic_share))
+
+    @property
+    def friction_share(self) -> float:
+        """By how much the hit is later when the descent is 1 ms later: a late start has more pressure behind it."""
+        return BREAK_AWAY_M_S2 * (self.hit_ms - self.descent_ms) / (1000 * self.hit_speed_m_s)
+
+    @property
+    def travel_sd_ms(self) -> float | None:
+        """What the travel adds to the SD of the hit [ms]; None where nothing is left for it."""
+        left = self.hit_sd_ms**2 - (self.friction_share * self.descent_sd_ms) ** 2
+        return math.sqrt(left) if left >= 0 else None
+
+    @cached_property
+    def stiffness_rad_ms(self) -> float:
+        """Natural frequency of the hammer on the tendon [rad/ms], from the contact's length."""
+        drive_m_s2 = float(drive(self.hit_ms, self.kinetic_share))
+
+        def too_short(rad_ms: float) -> float:
+            return float(_decelerated_ms(self.hit_speed_m_s, drive_m_s2, rad_ms)) - self.contact_ms
+
+        softest = 3 * drive_m_s2 / (1000 * self.hit_speed_m_s)  # below it the drive all but wins against the spring
+        if too_short(softest) < 0:
+            raise InvalidValueError("the hammer is too slow to be pushed back for so long", got=self.contact_ms)
+        return float(brentq(too_short, softest, 2 * math.pi / self.contact_ms))
+
+
+@dataclass(frozen=True, eq=False)
+class Taps:
+    """What n taps truly did: the generator's truth, which no detector sees. Times [ms after the valve command].
+
+    Args:
+        descent_ms: begin of the descent; NaN where there is none, shape (n,).
+        hit_ms: contact with the tendon; NaN where there is none, shape (n,).
+        rad_ms: natural frequency of each contact [rad/ms], shape (n,).
+        speed_m_s: speed at contact [m/s], shape (n,).
+        memg_ms: artefact in the EMG; NaN where there is no contact, shape (n,).
+        late_ms: by how much the valve opened late, included in the others, shape (n,).
+        geometry: of all of them.
+    """
+
+    descent_ms: FloatArray
+    hit_ms: FloatArray
+    rad_ms: FloatArray
+    speed_m_s: FloatArray
+    memg_ms: FloatArray
+    late_ms: FloatArray
+    geometry: Geometry
+
+    def none(self) -> Taps:
+        """As many taps that do not happen: neither air nor hammer."""
+        nowhere = np.full_like(self.hit_ms, math.nan)
+        never = np.full_like(self.hit_ms, math.inf)
+        return replace(self, descent_ms=nowhere, hit_ms=nowhere, memg_ms=nowhere, late_ms=never)
+
+    def weaker(self, factor: float) -> Taps:
+        """The same taps, arriving at the same time with another speed."""
+        return replace(self, speed_m_s=factor * self.speed_m_s)
+
+
+def draw_taps(geometry: Geometry, n: int, rng: np.random.Generator) -> Taps:
+    """Taps with the variation of a geometry, n of them."""
+    z = rng.standard_normal((4, n))
+    fault = rng.uniform(size=(3, n))
+    stuck = np.where(fault[2] < geometry.stuck_probability, math.nan, 0.0)
+    late = np.where(fault[0] < geometry.late_probability, geometry.late_ms[0] + fault[1] * np.ptp(geometry.late_ms), 0)
+    kinetic = geometry.kinetic_share
+    # However low the static friction, nothing moves before the pressure exceeds the kinetic one.
+    earliest_ms = LINE_DELAY_MS - FILL_MS * math.log1p(-kinetic) + 1.0
+    descent = np.maximum(geometry.descent_ms + geometry.descent_sd_ms * z[0], earliest_ms)
+    travel_sd_ms = geometry.travel_sd_ms or 0.0
+    travel = geometry.travel_mm + geometry.hit_speed_m_s * travel_sd_ms * z[1]
+    hit = _arrival(descent, travel, kinetic, geometry.hit_ms)
+    contact_ms = np.maximum(geometry.contact_ms + geometry.contact_sd_ms * z[2], 0.5)
+    return Taps(
+        descent_ms=descent + late + stuck,
+        hit_ms=hit + late + stuck,
+        rad_ms=geometry.stiffness_rad_ms * geometry.contact_ms / contact_ms,
+        speed_m_s=_speed(descent, hit, kinetic),
+        memg_ms=hit + late + stuck + geometry.memg_ms + geometry.memg_sd_ms * z[3],
+        late_ms=late,
+        geometry=geometry,
+    )
+
+
+def _pressure_share(time_ms: ArrayLike) -> FloatArray:
+    """Pressure of the chamber, as a share of the supply's."""
+    since_fill = np.maximum(np.asarray(time_ms, dtype=np.float64) - LINE_DELAY_MS, 0.0)
+    return -np.expm1(-since_fill / FILL_MS)
+
+
+def pressure_kpa(time_ms: ArrayLike) -> FloatArray:
+    """Pressure of the chamber above the room's [kPa]."""
+    return SUPPLY_KPA * _pressure_share(time_ms)
+
+
+def drive(time_ms: ArrayLike, kinetic_share: float) -> FloatArray:
+    """Acceleration of the moving hammer by the chamber's pressure [m/s²]."""
+    return DRIVE_M_S2 * (_pressure_share(time_ms) - kinetic_share)
+
+
+def _speed(descent_ms: ArrayLike, time_ms: ArrayLike, kinetic_share: float) -> FloatArray:
+    """Speed of the hammer [m/s]: the drive integrated from the begin of the descent."""
+    start, now = (np.asarray(time, dtype=np.float64) - LINE_DELAY_MS for time in (descent_ms, time_ms))
+    decay = FILL_MS * (np.exp(-now / FILL_MS) - np.exp(-start / FILL_MS))
+    speed: FloatArray = DRIVE_M_S2 * ((1 - kinetic_share) * (now - start) + decay) / 1000
+    return speed
+
+
+def _travel(descent_ms: ArrayLike, time_ms: ArrayLike, kinetic_share: float) -> FloatArray:
+    """Distance of the hammer from its initial position [mm]: the speed integrated from the begin of the descent."""
+    start, now = (np.asarray(time, dtype=np.float64) - LINE_DELAY_MS for time in (descent_ms, time_ms))
+    gone = now - start
+    initial = np.exp(-start / FILL_MS)
+    decay = FILL_MS * (FILL_MS * (initial - np.exp(-now / FILL_MS)) - initial * gone)
+    travel: FloatArray = DRIVE_M_S2 * ((1 - kinetic_share) * gone**2 / 2 + decay) / 1000
+    return travel
+
+
+def _arrival(descent_ms: FloatArray, travel_mm: FloatArray, kinetic_share: float, first_ms: float) -> FloatArray:
+    """When the hammer has travelled so far: Newton's method on a convex function, from beyond the solution."""
+    time = np.full(descent_ms.shape, first_ms + 50.0)
+    for _ in range(12):
+        excess = _travel(descent_ms, time, kinetic_share) - travel_mm
+        time = time - excess / _speed(descent_ms, time, kinetic_share)
+    return time
+
+
+def rebound(phase_rad: ArrayLike) -> FloatArray:
+    """Acceleration by a damped spring that a load hits with unit speed, over speed times natural frequency.
+
+    Args:
+        phase_rad: natural frequency times time since contact [rad]; force acts from 0 to `SEPARATION_RAD`.
+    """
+    phase = np.asarray(phase_rad, dtype=np.float64)
+    turn = _ROOT * phase
+    swing = 2 * DAMPING * np.cos(turn) + (1 - 2 * DAMPING**2) / _ROOT * np.sin(turn)
+    force: FloatArray = -np.exp(-DAMPING * phase) * swing
+    return np.where((phase >= 0) & (phase <= SEPARATION_RAD), force, 0.0)
+
+
+def restitution() -> float:
+    """Speed of the hammer as it leaves the tendon, as a share of that with which it came."""
+    turn = _ROOT * SEPARATION_RAD
+    return -math.exp(-DAMPING * SEPARATION_RAD) * (math.cos(turn) - DAMPING / _ROOT * math.sin(turn))
+
+
+def _decelerated_ms(speed_m_s: float, drive_m_s2: float, rad_ms: float) -> float:
+    """How long the tendon's force exceeds the drive [ms]."""
+    peak_m_s2 = 1000 * speed_m_s * rad_ms
+    phase = np.linspace(0, SEPARATION_RAD, 2001)
+    exceeds = np.flatnonzero(-rebound(phase) * peak_m_s2 > drive_m_s2)
+    return float(phase[exceeds[-1]] / rad_ms) if exceeds.size else 0.0

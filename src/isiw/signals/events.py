@@ -1,0 +1,179 @@
+"""The events of a tap in its waveforms, by the dissertation's rules (3.3.1, Table 3.1).
+
+Every rule is a hysteresis about the level at rest: a high threshold confirms that something happened, the last crossing
+of a low one says when. Both are multiples of the noise that each sweep has before the valve command.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from isiw.errors import InvalidValueError
+from isiw.signals.impact import HYSTERESIS_SD, VALVE_MS, impact_times
+from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, per_waveform, rest_level
+from isiw.trials import Channel, Sweep
+from isiw.types import ArrayLike, FloatArray
+
+__all__ = ["TapEvents", "detect_events", "sweep_events", "tap_artefact_times"]
+
+ONSET_SD = 3.0
+ARTEFACT_SEARCH_MS = (12.0, 30.0)  # four people: 18 to 23 ms after the impact, SD below 2 (Table 3.2)
+PULSE_SPAN_MS = (-1.0, 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class TapEvents:
+    """The events of n taps [ms from the first sample], each of shape (n,), NaN where not found.
+
+    Args:
+        fill_ms: the chamber's pressure begins to rise.
+        descent_ms: the hammer begins its descent: its acceleration goes above a threshold for good.
+        hit_ms: the hammer hits: the acceleration falls through its level at rest.
+        away_ms: the tendon has pushed the hammer back: the next rise through that level.
+        memg_ms: the EMG shows the tap.
+    """
+
+    fill_ms: FloatArray
+    descent_ms: FloatArray
+    hit_ms: FloatArray
+    away_ms: FloatArray
+    memg_ms: FloatArray
+
+    def columns(self) -> dict[str, FloatArray]:
+        """The events by name, in order of occurrence."""
+        return {field.name.removesuffix("_ms"): getattr(self, field.name) for field in fields(self)}
+
+
+def detect_events(
+    acceleration: ArrayLike,
+    rate_hz: float,
+    *,
+    pressure: ArrayLike | None = None,
+    emg: ArrayLike | None = None,
+    valve_ms: float = VALVE_MS,
+    t_tms_ms: ArrayLike | None = None,
+) -> TapEvents:
+    """Find the events of n taps.
+
+    Args:
+        acceleration: of the hammer, positive towards the tendon, shape (n, w).
+        rate_hz: sampling rate of all waveforms [Hz].
+        pressure: of the chamber, shape (n, w); None where not recorded.
+        emg: shape (n, w); None where not recorded.
+        valve_ms: the valve command [ms from the first sample].
+        t_tms_ms: the magnetic pulse of each sweep [ms from the first sample], whose own artefact is passed over.
+
+    Raises:
+        InvalidValueError: a waveform that is no recording, or waveforms of different shapes.
+    """
+    waves = as_waveforms(acceleration, rate_hz, "acceleration")
+    hit = impact_times(waves, rate_hz, valve_ms)
+    nowhere = np.full(len(waves), math.nan)
+    descent, away = _descent_and_away(waves, rate_hz, hit, valve_ms)
+    return TapEvents(
+        fill_ms=nowhere if pressure is None else _fill(_like(pressure, waves, rate_hz, "pressure"), rate_hz, valve_ms),
+        descent_ms=descent,
+        hit_ms=hit,
+        away_ms=away,
+        memg_ms=nowhere
+        if emg is None
+        else tap_artefact_times(_like(emg, waves, rate_hz, "EMG"), rate_hz, hit, valve_ms=valve_ms, t_tms_ms=t_tms_ms),
+    )
+
+
+def sweep_events(sweep: Sweep) -> TapEvents:
+    """Find the events of one recorded tap, in ms of the sweep's own clock.
+
+    Args:
+        sweep: with an acceleration and the valve's time; pressure and EMG where they have the same samples.
+
+    Raises:
+        InvalidValueError: no acceleration, no valve time, or a waveform that is no recording.
+    """
+    channel = sweep.channels.get("acceleration")
+    if channel is None or sweep.t_valve_ms is None:
+        raise InvalidValueError(
+            "the timing of a tap needs its acceleration and the time of the valve command",
+            got=sorted(sweep.channels),
+            expected="a channel named acceleration, and t_valve_ms",
+        )
+    pressure, emg = (_same_samples(sweep.channels.get(name), channel) for name in ("pressure", "emg"))
+    found = detect_events(
+        channel.values,
+        channel.rate_hz,
+        pressure=pressure,
+        emg=emg,
+        valve_ms=sweep.t_valve_ms - channel.t0_ms,
+        t_tms_ms=None if sweep.t_tms_ms is None else sweep.t_tms_ms - channel.t0_ms,
+    )
+    return TapEvents(*(times + channel.t0_ms for times in found.columns().values()))
+
+
+def _same_samples(channel: Channel | None, other: Channel) -> FloatArray | None:
+    """The samples of a channel, where it was recorded at the same times as another."""
+    if channel is None or (channel.rate_hz, channel.t0_ms) != (other.rate_hz, other.t0_ms):
+        return None
+    return channel.values if channel.values.shape == other.values.shape else None
+
+
+def _like(values: ArrayLike, waves: FloatArray, rate_hz: float, name: str) -> FloatArray:
+    other = as_waveforms(values, rate_hz, name)
+    if other.shape != waves.shape:
+        raise InvalidValueError(
+            f"the {name} and the acceleration must have one shape", got=other.shape, expected=str(waves.shape)
+        )
+    return other
+
+
+def _fill(pressure: FloatArray, rate_hz: float, valve_ms: float) -> FloatArray:
+    valve = round(valve_ms * rate_hz / 1000)
+    level, noise = rest_level(pressure, valve, rate_hz)
+    risen = pressure > level + HYSTERESIS_SD * noise
+    risen[:, :valve] = False
+    return crossing_before(pressure, level + ONSET_SD * noise, first_true(risen)) * 1000 / rate_hz
+
+
+def _descent_and_away(
+    acceleration: FloatArray, rate_hz: float, hit_ms: FloatArray, valve_ms: float
+) -> tuple[FloatArray, FloatArray]:
+    level, noise = rest_level(acceleration, round(valve_ms * rate_hz / 1000), rate_hz)
+    columns = np.arange(acceleration.shape[-1])
+    hit = np.where(np.isnan(hit_ms), -1, np.floor(hit_ms * rate_hz / 1000)).astype(np.int64)
+    descent = crossing_before(acceleration, level + ONSET_SD * noise, hit)
+    pushed = (acceleration < level - ONSET_SD * noise) & (columns > hit[:, None])
+    bottom = first_true(pushed)
+    risen = (acceleration > level + ONSET_SD * noise) & (columns > bottom[:, None]) & (bottom >= 0)[:, None]
+    away = crossing_before(acceleration, level, np.where(hit >= 0, first_true(risen), -1))
+    return descent * 1000 / rate_hz, away * 1000 / rate_hz
+
+
+def tap_artefact_times(
+    emg: ArrayLike,
+    rate_hz: float,
+    hit_ms: ArrayLike,
+    *,
+    valve_ms: float = VALVE_MS,
+    t_tms_ms: ArrayLike | None = None,
+) -> FloatArray:
+    """When the tap shows in the EMG [ms from the first sample], NaN where it does not, shape (n,).
+
+    Args:
+        emg: shape (n, w).
+        rate_hz: sampling rate [Hz].
+        hit_ms: the impacts [ms from the first sample], shape (n,), NaN where there is none.
+        valve_ms: the valve command [ms from the first sample]; the EMG is at rest before it.
+        t_tms_ms: the magnetic pulse [ms from the first sample], shape (n,), whose own artefact is passed over.
+    """
+    waves = as_waveforms(emg, rate_hz, "EMG")
+    level, noise = rest_level(waves, round(valve_ms * rate_hz / 1000), rate_hz)
+    deviation = np.abs(waves - level)
+    times = np.arange(waves.shape[-1]) * 1000 / rate_hz
+    since_pulse = times - per_waveform(t_tms_ms, waves)[:, None]
+    deviation[(since_pulse >= PULSE_SPAN_MS[0]) & (since_pulse <= PULSE_SPAN_MS[1])] = 0.0
+    since_hit = times - per_waveform(hit_ms, waves)[:, None]
+    sought = (since_hit >= ARTEFACT_SEARCH_MS[0]) & (since_hit <= ARTEFACT_SEARCH_MS[1])
+    shown = first_true(sought & (deviation > HYSTERESIS_SD * noise))
+    return crossing_before(deviation, ONSET_SD * noise, shown) * 1000 / rate_hz

@@ -1,0 +1,136 @@
+"""What every detector needs: checked waveforms, level and noise at rest, crossings to a fraction of a sample.
+
+All of it works on many sweeps at once, one waveform a row, shape (n, w).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from isiw.errors import InvalidValueError
+from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
+
+__all__ = [
+    "MIN_RATE_HZ",
+    "as_waveforms",
+    "crossing_before",
+    "cut",
+    "first_true",
+    "per_waveform",
+    "rest_level",
+]
+
+MIN_RATE_HZ = 1000.0
+"""Below this a surface MEP and an impact are not resolved; recordings use 3–10 kHz."""
+
+MIN_REST_MS = 20.0
+REST_MS = 200.0  # the last part of the rest, where a baseline that drifts is nearest to what it will be
+MAD_TO_SD = 1.4826  # of a normal distribution
+
+
+def as_waveforms(values: ArrayLike, rate_hz: float, name: str = "waveform") -> FloatArray:
+    """Waveforms as a float array, checked to be recordings at all.
+
+    Args:
+        values: samples, shape (..., w).
+        rate_hz: sampling rate [Hz].
+        name: what to call them in an error.
+
+    Returns:
+        The samples, shape (n, w); a single waveform becomes one row.
+
+    Raises:
+        InvalidValueError: no samples, samples that are not finite, a waveform without any variation, or a rate that
+            cannot be right.
+    """
+    waves = np.asarray(values, dtype=np.float64)
+    if not math.isfinite(rate_hz) or rate_hz < MIN_RATE_HZ:
+        raise InvalidValueError(
+            f"the {name}'s sampling rate is too low to measure anything",
+            got=rate_hz,
+            expected=f"at least {MIN_RATE_HZ:g} Hz",
+            remedy="Rates are in Hz, not kHz.",
+        )
+    if waves.ndim == 0 or waves.size == 0:
+        raise InvalidValueError(f"the {name} is empty", got=waves.shape, expected="shape (..., w)")
+    low, high = waves.min(axis=-1), waves.max(axis=-1)
+    if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        raise InvalidValueError(f"the {name} has samples that are not finite")
+    if (low == high).any():
+        raise InvalidValueError(
+            f"the {name} is constant", got=float(low.flat[0]), remedy="Check that the sensor is connected."
+        )
+    return waves.reshape(-1, waves.shape[-1])
+
+
+def per_waveform(value: ArrayLike | None, waves: FloatArray) -> FloatArray:
+    """One number for each waveform, shape (n,); None becomes NaN."""
+    number = np.asarray(math.nan if value is None else value, dtype=np.float64)
+    return np.broadcast_to(number.reshape(-1) if number.ndim else number, waves.shape[:1]).astype(np.float64)
+
+
+def rest_level(waves: FloatArray, stop: int, rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Level and noise SD of each waveform while nothing happens: the reading at rest, robust against outliers.
+
+    Args:
+        waves: shape (n, w).
+        stop: number of samples from the start that are at rest; the last 200 ms of them are read.
+        rate_hz: sampling rate [Hz].
+
+    Returns:
+        Median and noise SD, each of shape (n, 1).
+
+    Raises:
+        InvalidValueError: less than 20 ms of rest.
+    """
+    stop = min(stop, waves.shape[-1])
+    if stop < MIN_REST_MS * rate_hz / 1000:
+        raise InvalidValueError(
+            "too little of the sweep is at rest to know its noise",
+            got=f"{1000 * stop / rate_hz:.1f} ms",
+            expected=f"at least {MIN_REST_MS:g} ms before the first stimulus",
+        )
+    rest = waves[:, max(0, stop - round(REST_MS * rate_hz / 1000)) : stop]
+    level = np.median(rest, axis=-1, keepdims=True)
+    deviation = rest - level
+    mad = np.median(np.abs(deviation), axis=-1, keepdims=True)
+    # A coarse converter reads the same number most of the time; its MAD is 0, its RMS is not.
+    rms = np.sqrt(np.mean(deviation**2, axis=-1, keepdims=True))
+    return level, np.maximum(MAD_TO_SD * mad, 0.25 * rms)
+
+
+def cut(waves: FloatArray, start: IntArray, count: int) -> FloatArray:
+    """`count` samples of each waveform from its own `start` on, shape (n, count); ends are held."""
+    columns = np.clip(start[:, None] + np.arange(count), 0, waves.shape[-1] - 1)
+    return np.take_along_axis(waves, columns, axis=-1)
+
+
+def first_true(mask: BoolArray) -> IntArray:
+    """Index of each row's first true sample, -1 where there is none, shape (n,)."""
+    found: IntArray = np.where(mask.any(axis=-1), mask.argmax(axis=-1), -1)
+    return found
+
+
+def crossing_before(waves: FloatArray, level: FloatArray, stop: IntArray) -> FloatArray:
+    """Where each waveform last rose through a level before a sample that is above it.
+
+    Args:
+        waves: shape (n, w).
+        level: shape (n, 1).
+        stop: index of a sample above the level for each row, or -1 for none, shape (n,).
+
+    Returns:
+        The crossing in samples, interpolated linearly; NaN where there is none, shape (n,).
+    """
+    columns = np.arange(waves.shape[-1])
+    below = (waves <= level) & (columns < stop[:, None])
+    last = waves.shape[-1] - 1 - first_true(below[:, ::-1])
+    known = (stop >= 0) & (last < waves.shape[-1])
+    at = np.where(known, last, 0)
+    rows = np.arange(len(waves))
+    before, after = waves[rows, at], waves[rows, np.minimum(at + 1, waves.shape[-1] - 1)]
+    rise = after - before
+    share = np.divide(level[:, 0] - before, rise, out=np.zeros_like(rise), where=rise > 0)
+    return np.where(known, at + share, math.nan)

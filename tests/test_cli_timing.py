@@ -1,0 +1,28 @@
+from __future__ import annotations
+
+from typer.testing import CliRunner
+
+from isiw.cli import app
+
+
+def run(*arguments: object):
+    return CliRunner().invoke(app, ["timing", *map(str, arguments)])
+
+
+def test_timing_of_a_preset_is_printed_and_drawn(tmp_path):
+    result = run("subject1", "--taps", 12, "--output", tmp_path / "timing.png")
+    assert result.exit_code == 0
+    assert "subject1: 108 taps" in result.output
+    assert "Pooled SD of the ISI error" in result.output
+    assert (tmp_path / "timing.png").stat().st_size > 10_000
+
+
+def test_the_same_seed_gives_the_same_study():
+    assert run("cushion", "--taps", 5, "--seed", 3).output == run("cushion", "--taps", 5, "--seed", 3).output
+    assert run("cushion", "--taps", 5, "--seed", 3).output != run("cushion", "--taps", 5, "--seed", 4).output
+
+
+def test_an_unknown_source_is_a_message_with_the_presets(tmp_path):
+    result = run(tmp_path / "nothing.mcap")
+    assert result.exit_code == 1
+    assert "timing-fault" in result.output
