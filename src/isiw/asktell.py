@@ -101,9 +101,18 @@ class Strategy:
         return self._posterior
 
     def ask(self) -> float:
-        """The next ISI [ms], on the grid; the same until the next `tell`."""
+        """The next ISI [ms], on the grid; the same until the next `tell`.
+
+        Raises:
+            StrategyError: no candidate ISI has a finite score.
+        """
         if self._next_isi_ms is None:
             scores = self.acquisition(self._posterior, self._candidates)
+            if not scores[0].isfinite().any():
+                raise StrategyError(
+                    f"{type(self.acquisition).__name__} gives no ISI a finite score",
+                    remedy="Check the settings of the model and its prior.",
+                )
             self._next_isi_ms = self.space.snap(float(self._candidates[best_candidate(scores)[0]]))
         return self._next_isi_ms
 

@@ -11,12 +11,15 @@ from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.sweeps import EvenSpacing, RandomIsi
 from isiw.asktell import Recipe, Strategy
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.errors import StrategyError
+from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.particles import ParticleModel
 from isiw.models.prior import Prior
 from isiw.stopping import AnyOf, Budget, CredibleWidth, NoWindow, StoppingRule
 
 __all__ = ["StrategySettings", "list_strategies", "make_strategy"]
+
+MIN_PARTICLES = 2
+"""Half of the particles move at a time, so that neither half may be empty."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,9 @@ class StrategySettings:
         stop_no_window: stop when "there is no window" is at least this probable.
         particles: how many particles the posterior has.
         prior: settings of `isiw.models.prior.Prior` that differ from its defaults.
+
+    Raises:
+        InvalidValueError: a number that cannot be, or a setting that the prior does not have.
     """
 
     max_trials: int = 80
@@ -36,6 +42,17 @@ class StrategySettings:
     stop_no_window: float = 0.9
     particles: int = 1000
     prior: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.particles, int) or self.particles < MIN_PARTICLES:
+            raise InvalidValueError(
+                "particles must be a whole number", got=self.particles, expected=f"{MIN_PARTICLES} or more"
+            )
+        known = [f.name for f in fields(Prior)]
+        unknown = sorted(set(self.prior) - set(known))
+        if unknown:
+            raise InvalidValueError("the prior has no such setting", got=unknown, expected=", ".join(known))
+        self.stopping()
 
     def stopping(self) -> StoppingRule:
         """Known well enough, no window, or the budget used up."""
@@ -80,15 +97,17 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
     Args:
         name: one of `list_strategies()`.
         space: the ISIs that may be asked; by default what can be searched without an accelerometer.
-        seed: seed of all randomness.
+        seed: seed of all randomness, not negative.
         **settings: fields of `StrategySettings`.
 
     Raises:
         StrategyError: an unknown name or setting.
-        InvalidValueError: a setting that cannot be.
+        InvalidValueError: a seed or a setting that cannot be.
     """
     if name not in _CATALOGUE:
         raise StrategyError("unknown strategy", got=name, expected=", ".join(_CATALOGUE))
+    if seed < 0:
+        raise InvalidValueError("a seed must not be negative", got=seed)
     known = [f.name for f in fields(StrategySettings)]
     unknown = sorted(set(settings) - set(known))
     if unknown:

@@ -68,7 +68,13 @@ class DesignSpace:
         return grid
 
     def snap(self, isi_ms: float) -> float:
-        """The nearest ISI on the grid [ms]."""
+        """The nearest ISI on the grid [ms].
+
+        Raises:
+            InvalidValueError: not a finite number.
+        """
+        if not math.isfinite(isi_ms):
+            raise InvalidValueError("an ISI must be a finite number of milliseconds", got=isi_ms)
         steps = round((min(max(isi_ms, self.low_ms), self.high_ms) - self.low_ms) / self.step_ms)
         return float(self.grid_ms[steps])
 

@@ -83,6 +83,7 @@ def trials_to_lasting(mean_f1: ArrayLike, criterion: float) -> int | None:
         mean_f1: mean F1 after 1, 2, … trials, shape (n,).
         criterion: the least F1.
     """
-    below = np.flatnonzero(np.asarray(mean_f1, dtype=float) < criterion)
-    first = 1 if len(below) == 0 else int(below[-1]) + 2
-    return first if first <= len(np.asarray(mean_f1)) else None
+    reached = np.asarray(mean_f1, dtype=float) >= criterion  # a NaN has not
+    missed = np.flatnonzero(~reached)
+    first = 1 if len(missed) == 0 else int(missed[-1]) + 2
+    return first if first <= len(reached) else None

@@ -83,7 +83,7 @@ class TwoPeakProfile:
 
     def __post_init__(self) -> None:
         _require_span(self.start_ms, self.width_ms)
-        if not (min(self.first, self.second) >= 0 and max(self.first, self.second) == 1):
+        if not (0 <= self.first <= 1 and 0 <= self.second <= 1 and 1 in {self.first, self.second}):
             raise InvalidValueError("the higher peak has height 1", got=(self.first, self.second))
 
     def __call__(self, isi_ms: ArrayLike) -> FloatArray:

@@ -128,9 +128,20 @@ class NoWindow:
 
 @dataclass(frozen=True)
 class AnyOf:
-    """Stop as soon as one of the rules says so; its reason is given."""
+    """Stop as soon as one of the rules says so; its reason is given.
+
+    Args:
+        rules: the rules, asked in order.
+
+    Raises:
+        InvalidValueError: no rules, which would never stop.
+    """
 
     rules: tuple[StoppingRule, ...]
+
+    def __post_init__(self) -> None:
+        if not self.rules:
+            raise InvalidValueError("AnyOf needs at least one rule", got=self.rules)
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""

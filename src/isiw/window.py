@@ -100,8 +100,13 @@ def window_from_excess(grid_ms: ArrayLike, excess_mv: ArrayLike, baseline_mv: fl
     Returns:
         All grid points with at least 0.135 of the largest excess; None where the largest excess is below 10 % of the
         baseline or 2 µV, whichever is more.
+
+    Raises:
+        InvalidValueError: an excess or a baseline that is not finite.
     """
     excess = np.asarray(excess_mv, dtype=float)
+    if not (np.isfinite(excess).all() and math.isfinite(baseline_mv)):
+        raise InvalidValueError("the expected MEP must be finite at every ISI", got=(float(excess.max()), baseline_mv))
     peak = float(excess.max())
     if peak < max(MIN_EXCESS_OF_BASELINE * baseline_mv, MIN_EXCESS_MV):
         return None
