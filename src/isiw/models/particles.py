@@ -7,11 +7,12 @@ resampled, and moved by Markov chain steps (resample-move: Gilks and Berzuini, J
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
+import numpy as np
 import torch
 
 from isiw.design import DesignSpace
@@ -21,6 +22,7 @@ from isiw.models.prior import Latents, Person, Prior
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.response import Response
 from isiw.models.sample import PersonSample
+from isiw.models.shapes import Shape
 from isiw.models.windows import best_window, edge_samples
 from isiw.window import WindowEstimate
 
@@ -160,7 +162,7 @@ class ParticlePosterior:
     @cached_property
     def _thinned(self) -> PersonSample:
         picks = systematic(self.log_weights, self.model.thinned)
-        return PersonSample(_pick_person(self.person, picks))
+        return PersonSample(_each(self.person, lambda x: _take(x, picks)))
 
     def outcome_mass(self, isi_ms: Tensor) -> tuple[Tensor, Tensor]:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
@@ -174,13 +176,13 @@ class ParticlePosterior:
         """The window of one person."""
         one = slice(person, person + 1)
         picks = systematic(self.log_weights[one], self.model.particles)
-        sample = PersonSample(_pick_person(_rows(self.person, one), picks))
+        sample = PersonSample(_each(self.person, lambda x: _take(x[one], picks)))
         grid = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=picks.device)
         masks = sample.window_masks(grid)[0]
         masks = masks[masks.any(-1)]
         probability = len(masks) / self.model.particles
         profile_grid = grid[:: max(1, len(grid) // PROFILE_POINTS)]
-        profiles = PersonSample(_rows(self._thinned.person, one)).expected_mep_mv(profile_grid)[0]
+        profiles = PersonSample(_each(self._thinned.person, lambda x: x[one])).expected_mep_mv(profile_grid)[0]
         levels_of = torch.tensor([0.05, 0.5, 0.95], device=picks.device)
         edges = edge_samples(masks, self.space)
         start, end = edges.median(0).values.tolist() if len(masks) else (None, None)
@@ -197,7 +199,8 @@ class ParticlePosterior:
 
 def _generator(device: str, seed: int, step: int) -> torch.Generator:
     """A stream of its own for each step, so that a posterior depends on its seed and its trials alone."""
-    return torch.Generator(device=device).manual_seed(seed * 1_000_003 + step)
+    state = np.random.SeedSequence((seed, step)).generate_state(1, np.uint64)
+    return torch.Generator(device=device).manual_seed(int(state[0] >> np.uint64(1)))
 
 
 def systematic(log_weights: Tensor, size: int) -> Tensor:
@@ -221,11 +224,7 @@ def _take(values: Tensor, picks: Tensor) -> Tensor:
     return torch.gather(values, 1, index)
 
 
-def _pick_person(person: Person, picks: Tensor) -> Person:
-    shape, response = ([_take(f, picks) for f in part] for part in (person.shape, person.response))
-    return Person(type(person.shape)(*shape), Response(*response), _take(person.present, picks))
-
-
-def _rows(person: Person, rows: slice) -> Person:
-    shape, response = ([f[rows] for f in part] for part in (person.shape, person.response))
-    return Person(type(person.shape)(*shape), Response(*response), person.present[rows])
+def _each(person: Person, function: Callable[[Tensor], Tensor]) -> Person:
+    """The same of every field of a person."""
+    shape, response = map(function, person.shape), map(function, person.response)
+    return Person(Shape(*shape), Response(*response), function(person.present))
