@@ -91,7 +91,7 @@ def test_the_expected_mep_is_the_integral_over_the_input_noise() -> None:
     z = np.linspace(-9, 9, 20_001)
     density = np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi)
     by_sum = np.sum(FCR.evoked_mv(0.4, z) * density) * (z[1] - z[0]) * np.exp(0.5 * 0.4**2)
-    assert float(FCR.expected_evoked_mv(0.4)) == pytest.approx(by_sum, rel=1e-2)
+    assert float(FCR.expected_evoked_mv(0.4)) == pytest.approx(by_sum, rel=1e-6)
 
 
 def test_expectations_keep_the_shape_of_the_facilitation() -> None:
