@@ -181,6 +181,17 @@ def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted, scripted_strate
     assert again.trials == result.trials
 
 
+def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted, scripted_strategy, scripted_device):
+    first = resume(interrupted, scripted_device(), scripted_strategy(10))
+    device = scripted_device()
+    second = resume(interrupted, device, scripted_strategy(10))
+    first.run()
+    with pytest.raises(LogError, match="has changed since it was read"):
+        second.run()
+    assert device.delivered == []
+    assert len(read_session(interrupted).table) == 10
+
+
 def test_what_is_no_log_cannot_be_resumed(tmp_path, scripted_device):
     with pytest.raises(LogError, match="no such log"):
         resume(tmp_path / "nothing.mcap", scripted_device())

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
 
 import torch
 
 from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
+from isiw.acquisition.sweeps import golden_index
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.protocol import Observation, Posterior, ResponseModel, Tensor
@@ -32,6 +35,13 @@ def candidate_isis(space: DesignSpace, max_candidates: int = MAX_CANDIDATES) -> 
     stride = max(1, math.ceil((len(grid) - 1) / (max_candidates - 1)))
     picked = sorted({*range(0, len(grid), stride), len(grid) - 1})
     return torch.as_tensor(grid[picked], dtype=torch.float32)
+
+
+def _fulfil(answer: Future[int], choose: Callable[[], int]) -> None:
+    try:
+        answer.set_result(choose())
+    except Exception as error:  # noqa: BLE001 - handed over to whoever waits for the answer
+        answer.set_exception(error)
 
 
 @dataclass(frozen=True)
@@ -90,6 +100,7 @@ class Strategy:
         self._mistrials = 0
         self._next_isi_ms: float | None = None
         self._estimate: WindowEstimate | None = None
+        self._fallback_reason: str | None = None
 
     def restarted(self) -> Strategy:
         """The same strategy before its first trial."""
@@ -100,21 +111,46 @@ class Strategy:
         """What is believed after the trials told so far."""
         return self._posterior
 
-    def ask(self) -> float:
+    def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], on the grid; the same until the next `tell`.
+
+        Args:
+            deadline_s: answer within this time [s]: past it with an evenly spaced ISI, and a `fallback_reason`.
 
         Raises:
             StrategyError: no candidate ISI has a finite score.
+            InvalidValueError: a deadline that is negative or not a number.
         """
         if self._next_isi_ms is None:
-            scores = self.acquisition(self._posterior, self._candidates)
-            if not scores[0].isfinite().any():
-                raise StrategyError(
-                    f"{type(self.acquisition).__name__} gives no ISI a finite score",
-                    remedy="Check the settings of the model and its prior.",
-                )
-            self._next_isi_ms = self.space.snap(float(self._candidates[best_candidate(scores)[0]]))
+            index = self._best() if deadline_s is None else self._best_within(deadline_s)
+            self._next_isi_ms = self.space.snap(float(self._candidates[index]))
         return self._next_isi_ms
+
+    @property
+    def fallback_reason(self) -> str | None:
+        """Why the current ISI is not the acquisition function's choice; None where it is."""
+        return self._fallback_reason
+
+    def _best(self) -> int:
+        scores = self.acquisition(self._posterior, self._candidates)
+        if not scores[0].isfinite().any():
+            raise StrategyError(
+                f"{type(self.acquisition).__name__} gives no ISI a finite score",
+                remedy="Check the settings of the model and its prior.",
+            )
+        return int(best_candidate(scores)[0])
+
+    def _best_within(self, deadline_s: float) -> int:
+        if not deadline_s >= 0:
+            raise InvalidValueError("deadline_s must be a time from 0 up", got=deadline_s)
+        answer: Future[int] = Future()
+        # A posterior never changes, so a late thread can go on with it and be forgotten.
+        threading.Thread(target=_fulfil, args=(answer, self._best), daemon=True).start()
+        try:
+            return answer.result(deadline_s)
+        except TimeoutError:
+            self._fallback_reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
+            return golden_index(self._told, len(self._candidates))
 
     def tell(
         self,
@@ -155,7 +191,7 @@ class Strategy:
         )
         self._posterior = self.model.update(self._posterior, observation)
         self._told += 1
-        self._next_isi_ms = self._estimate = None
+        self._next_isi_ms = self._estimate = self._fallback_reason = None
 
     def count_mistrial(self) -> None:
         """Count a delivered stimulus whose outcome is not told: it uses up budget and changes nothing else."""

@@ -93,6 +93,7 @@ class Session:
         signals: what a sweep must keep to be accepted.
         config: anything that should be kept in the log, as TOML values.
         timeout_s: how long the device may take for one delivery [s].
+        ask_deadline_s: how long the strategy may take for one ask [s]; past it, it falls back, and the log says so.
 
     Raises:
         DeviceError: the device counts its ISIs from another event than the space.
@@ -111,6 +112,7 @@ class Session:
         signals: SignalLimits | None = None,
         config: Mapping[str, Any] | None = None,
         timeout_s: float = 30.0,
+        ask_deadline_s: float | None = None,
     ) -> None:
         space, info = strategy.space, device.describe()
         if info.reference != space.reference:
@@ -127,7 +129,7 @@ class Session:
         self._limits = limits or Limits.of_space(space)
         self._clock = clock or (VirtualClock() if info.simulated else MonotonicClock())
         self._signals = signals or SignalLimits()
-        self._on_trial, self._timeout_s = on_trial, timeout_s
+        self._on_trial, self._timeout_s, self._ask_deadline_s = on_trial, timeout_s, ask_deadline_s
         recipe = strategy.recipe
         self._header = Header(
             isiw_version=isiw.__version__,
@@ -217,7 +219,9 @@ class Session:
         return decision
 
     def _one_trial(self) -> StopDecision:
-        stimulus = Stimulus(len(self.trials), self.strategy.ask())
+        stimulus = Stimulus(len(self.trials), self.strategy.ask(self._ask_deadline_s))
+        if self.strategy.fallback_reason is not None:
+            self._log.append(Event(kind="fallback", trial=stimulus.trial, text=self.strategy.fallback_reason))
         trial = self._delivered(stimulus)
         learn(self.strategy, trial)
         decision, next_isi_ms = self._log_estimate(trial.index)
@@ -229,7 +233,7 @@ class Session:
     def _log_estimate(self, trial: int) -> tuple[StopDecision, float | None]:
         """Put what is believed after a trial on disk; the decision and the next ISI [ms]."""
         estimate, decision = self.strategy.estimate(), self.strategy.decision()
-        next_isi_ms = None if decision.stop else self.strategy.ask()
+        next_isi_ms = None if decision.stop else self.strategy.ask(self._ask_deadline_s)
         self._log.append(Estimate.of(trial, estimate, decision, next_isi_ms))
         self._log.sync()
         return decision, next_isi_ms

@@ -56,6 +56,7 @@ class Salvage:
 
     Args:
         path: the file that was read.
+        size: its size [bytes].
         messages: the records, in the order in which they were written.
         attachments: by name.
         losses: what could not be read, a sentence each; empty where nothing is missing.
@@ -64,6 +65,7 @@ class Salvage:
     """
 
     path: Path
+    size: int = 0
     messages: list[Message] = field(default_factory=list)
     attachments: dict[str, bytes] = field(default_factory=dict)
     losses: list[str] = field(default_factory=list)
@@ -100,11 +102,13 @@ def salvage(path: str | Path) -> Salvage:
     found = Salvage(current_file(path))
     with found.path.open("rb") as file:
         if not file.read(len(_MAGIC)):
-            raise DamagedLogError("the log is empty", got=str(found.path), remedy="No trial was recorded in it.")
+            raise DamagedLogError(
+                "the log is empty", got=str(found.path), remedy="Nothing was recorded in it; delete it."
+            )
         file.seek(0)
-        size = found.path.stat().st_size
-        _read(file, size, found)
-        if found.finished:
+        found.size = found.path.stat().st_size
+        _read(file, found)
+        if found.finished and not found.losses:
             _check_summary(file, found)
     _report_gaps(found)
     if not found.messages and not found.attachments:
@@ -114,9 +118,10 @@ def salvage(path: str | Path) -> Salvage:
     return found
 
 
-def _read(file: IO[bytes], size: int, found: Salvage) -> None:
+def _read(file: IO[bytes], found: Salvage) -> None:
     """Read record after record; a chunk that fails is left out, and reading goes on behind it."""
-    reader = StreamReader(cast("IO[bytes]", _Exact(file)), emit_chunks=True, validate_crcs=True, record_size_limit=size)
+    whole = cast("IO[bytes]", _Exact(file))
+    reader = StreamReader(whole, emit_chunks=True, validate_crcs=True, record_size_limit=found.size)
     readable_to, sealed = 0, False
     try:
         for record in reader.records:
@@ -138,7 +143,7 @@ def _read(file: IO[bytes], size: int, found: Salvage) -> None:
             found.losses.append("The index at the end of the file is damaged. No record is affected.")
         else:
             _search_chunks(file, found)
-            found.losses.insert(0, f"The log is torn or damaged at byte {readable_to} of {size}.")
+            found.losses.insert(0, f"The log is torn or damaged at byte {readable_to} of {found.size}.")
     if found.finished and not sealed:
         found.losses.append("The mark behind the last record is damaged. No record is affected.")
 

@@ -11,7 +11,7 @@ import tomli_w
 from mcap.writer import Writer
 
 from isiw.errors import LogError
-from isiw.log.salvage import Message, Salvage
+from isiw.log.salvage import Message, Salvage, current_file
 from isiw.log.schema import TOPICS, Header, Record, encode, json_schema, topic_of
 from isiw.log.storage import DurableFile, log_of, part_of, refuse_if_locked, sync_folder
 
@@ -79,10 +79,12 @@ class LogWriter:
             header: its header.
 
         Raises:
-            LogError: it is still being written.
+            LogError: it is still being written, or has changed since it was read.
         """
         target = log_of(Path(path))
         refuse_if_locked(salvage.path)
+        if current_file(path) != salvage.path or salvage.path.stat().st_size != salvage.size:
+            raise LogError("the log has changed since it was read", got=str(path), remedy="Begin again by reading it.")
         copy = target.with_name(f"{target.name}.resuming")
         if copy.exists():  # an earlier attempt was killed before it took over; its source is still whole
             refuse_if_locked(copy)

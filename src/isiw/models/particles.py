@@ -7,29 +7,26 @@ resampled, and moved by Markov chain steps (resample-move: Gilks and Berzuini, J
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
+import numpy as np
 import torch
 
 from isiw.design import DesignSpace
-from isiw.models.evidence import History, in_pieces, levels, total_log_likelihood
+from isiw.models.evidence import History, total_log_likelihood
 from isiw.models.moves import Mover
 from isiw.models.prior import Latents, Person, Prior
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.response import NODES, Response, evoked_mean, outcome_density
+from isiw.models.response import Response
+from isiw.models.sample import PersonSample
+from isiw.models.shapes import Shape
 from isiw.models.windows import best_window, edge_samples
-from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, WindowEstimate
+from isiw.window import WindowEstimate
 
 __all__ = ["ParticleModel", "ParticlePosterior"]
-
-LEVELS = 12
-"""Facilitations at which responses are worked out; what lies between is interpolated."""
-
-OUTCOMES = 32
-"""Values of the log MEP on which predictive distributions live."""
 
 PROFILE_POINTS = 101
 """ISIs at which the expected MEP and its band are reported."""
@@ -96,7 +93,7 @@ class ParticleModel:
 
     def _sweeps(self, trials: int) -> int:
         """As many sweeps as asked for, but fewer where the history has become long."""
-        return max(1, min(self.moves, self.max_trial_moves // max(1, trials)))
+        return min(self.moves, max(1, self.max_trial_moves // max(1, trials)))
 
     def _resampled(self, posterior: ParticlePosterior, generator: torch.Generator) -> ParticlePosterior:
         picks = systematic(posterior.log_weights, self.particles)
@@ -163,9 +160,9 @@ class ParticlePosterior:
         return self.model.beliefs.person(self.latents, self.space)
 
     @cached_property
-    def _thinned(self) -> _Sample:
+    def _thinned(self) -> PersonSample:
         picks = systematic(self.log_weights, self.model.thinned)
-        return _Sample(_pick_person(self.person, picks))
+        return PersonSample(_each(self.person, lambda x: _take(x, picks)))
 
     def outcome_mass(self, isi_ms: Tensor) -> tuple[Tensor, Tensor]:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
@@ -179,13 +176,13 @@ class ParticlePosterior:
         """The window of one person."""
         one = slice(person, person + 1)
         picks = systematic(self.log_weights[one], self.model.particles)
-        sample = _Sample(_pick_person(_rows(self.person, one), picks))
+        sample = PersonSample(_each(self.person, lambda x: _take(x[one], picks)))
         grid = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=picks.device)
         masks = sample.window_masks(grid)[0]
         masks = masks[masks.any(-1)]
         probability = len(masks) / self.model.particles
         profile_grid = grid[:: max(1, len(grid) // PROFILE_POINTS)]
-        profiles = _Sample(_rows(self._thinned.person, one)).expected_mep_mv(profile_grid)[0]
+        profiles = PersonSample(_each(self._thinned.person, lambda x: x[one])).expected_mep_mv(profile_grid)[0]
         levels_of = torch.tensor([0.05, 0.5, 0.95], device=picks.device)
         edges = edge_samples(masks, self.space)
         start, end = edges.median(0).values.tolist() if len(masks) else (None, None)
@@ -200,79 +197,10 @@ class ParticlePosterior:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Sample:
-    """Equally weighted particles, fields of shape (b, s), and what they say about the next MEP and the window."""
-
-    person: Person
-
-    @cached_property
-    def _levels(self) -> Tensor:
-        """Facilitations of the tables, denser where responses begin, shape (1, 1, l)."""
-        device = self.person.present.device
-        return torch.linspace(0.0, 1.0, LEVELS, device=device).square()[None, None, :]
-
-    def _hats(self, level: Tensor) -> Tensor:
-        """Weights of the tables' levels that interpolate at each facilitation, shape (b, s, t, l)."""
-        position = level.clamp(0.0, 1.0).sqrt() * (LEVELS - 1)
-        return (1.0 - (position.unsqueeze(-1) - torch.arange(LEVELS, device=level.device)).abs()).clamp_min(0.0)
-
-    @cached_property
-    def _evoked(self) -> Tensor:
-        """Expected MEP above the floor at the tables' levels, in floors, shape (b, s, l)."""
-        return evoked_mean(self.person.response, self._levels)
-
-    @cached_property
-    def edge_level(self) -> Tensor:
-        """Facilitation at a window's edge by the 0.135 rule; above 1 where there is no window, shape (b, s)."""
-        response = self.person.response
-        excess = self._evoked - self._evoked[..., :1]
-        peak = excess[..., -1]
-        floor_mv = response.log_floor.exp()
-        baseline_mv = floor_mv * (torch.exp(0.5 * response.floor_log_sd.square()) + self._evoked[..., 0])
-        enough = peak * floor_mv >= (MIN_EXCESS_OF_BASELINE * baseline_mv).clamp_min(MIN_EXCESS_MV)
-        share = (excess / peak.clamp_min(1e-12).unsqueeze(-1)).contiguous()
-        right = torch.searchsorted(share, torch.full_like(share[..., :1], EDGE_LEVEL)).clamp(1, LEVELS - 1)
-        low, high = share.gather(-1, right - 1), share.gather(-1, right)
-        position = (right - 1 + (EDGE_LEVEL - low) / (high - low).clamp_min(1e-12)).squeeze(-1) / (LEVELS - 1)
-        return torch.where(enough & self.person.present, position.square(), 2.0)
-
-    def window_masks(self, isi_ms: Tensor) -> Tensor:
-        """Sampled windows as 0 or 1, shape (b, s, t)."""
-        level = levels(self.person, isi_ms.unsqueeze(0))
-        return (level >= self.edge_level.unsqueeze(-1)).to(level.dtype)
-
-    def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
-        """Expected MEP [mV], shape (b, s, t)."""
-        response = self.person.response
-        evoked = (self._hats(levels(self.person, isi_ms.unsqueeze(0))) @ self._evoked.unsqueeze(-1)).squeeze(-1)
-        rest = torch.exp(0.5 * response.floor_log_sd.square()).unsqueeze(-1)
-        return response.log_floor.exp().unsqueeze(-1) * (evoked + rest)
-
-    @cached_property
-    def _outcome_table(self) -> Tensor:
-        """Probability of each outcome at the tables' levels, shape (b, s, l, y)."""
-        response = self.person.response
-        top = response.log_floor + torch.log1p(self._evoked.amax(-1))
-        low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
-        high = torch.quantile(top, 0.95, dim=-1) + 1.5
-        share = torch.linspace(0.0, 1.0, OUTCOMES, device=low.device)
-        log_mep = (low.unsqueeze(-1) + share * (high - low).unsqueeze(-1)).unsqueeze(-2)
-        density = in_pieces(
-            lambda r, grid: outcome_density(r, self._levels, grid), response, (log_mep,), LEVELS * OUTCOMES * NODES
-        )
-        return density / density.sum(-1, keepdim=True)
-
-    def outcome_mass(self, isi_ms: Tensor) -> tuple[Tensor, Tensor]:
-        """Weights of the samples (b, s), and the predictive distribution of each, shape (b, s, t, y)."""
-        hats = self._hats(levels(self.person, isi_ms.unsqueeze(0)))
-        weights = torch.full_like(self.person.response.log_floor, 1.0 / self.person.present.shape[-1])
-        return weights, hats @ self._outcome_table
-
-
 def _generator(device: str, seed: int, step: int) -> torch.Generator:
     """A stream of its own for each step, so that a posterior depends on its seed and its trials alone."""
-    return torch.Generator(device=device).manual_seed(seed * 1_000_003 + step)
+    state = np.random.SeedSequence((seed, step)).generate_state(1, np.uint64)
+    return torch.Generator(device=device).manual_seed(int(state[0] >> np.uint64(1)))
 
 
 def systematic(log_weights: Tensor, size: int) -> Tensor:
@@ -296,11 +224,7 @@ def _take(values: Tensor, picks: Tensor) -> Tensor:
     return torch.gather(values, 1, index)
 
 
-def _pick_person(person: Person, picks: Tensor) -> Person:
-    shape, response = ([_take(f, picks) for f in part] for part in (person.shape, person.response))
-    return Person(type(person.shape)(*shape), Response(*response), _take(person.present, picks))
-
-
-def _rows(person: Person, rows: slice) -> Person:
-    shape, response = ([f[rows] for f in part] for part in (person.shape, person.response))
-    return Person(type(person.shape)(*shape), Response(*response), person.present[rows])
+def _each(person: Person, function: Callable[[Tensor], Tensor]) -> Person:
+    """The same of every field of a person."""
+    shape, response = map(function, person.shape), map(function, person.response)
+    return Person(Shape(*shape), Response(*response), function(person.present))

@@ -66,7 +66,8 @@ class Prior:
         hit_delay_ms: mean and SD of the hit delay of a person unknown [ms]; 172–188 ms measured (dissertation, 4.2).
         p_anywhere: probability that a window starts anywhere in the range instead, for stimulators unlike that one.
         width_ms: median and log SD of the width; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
-        floor_mv: median and log SD of the EMG floor; 6–20 µV measured, widened so that the unit is learnt.
+        floor_mv: median, log SD and cubic tail of the EMG floor; 6–20 µV measured. The tail reaches a factor of ten at
+            2.4 SDs, so that rigs with another gain are learnt rather than pulled to the usual floor.
         floor_log_sd: median and log SD of the floor's own log SD; 0.12–0.35.
         gain_ratio: median and log SD of the best expected MEP over the floor; MEPs peak at 0.03–0.3 mV (ibid., 4.2).
         cv: median and log SD of the constant CV.
@@ -86,7 +87,7 @@ class Prior:
     hit_delay_ms: tuple[float, float] = (180.0, 7.0)
     p_anywhere: float = 0.2
     width_ms: tuple[float, float] = (100.0, 0.5)
-    floor_mv: tuple[float, float] = (0.009, 1.0)
+    floor_mv: tuple[float, float, float] = (0.009, 0.35, 0.12)
     floor_log_sd: tuple[float, float] = (0.24, 0.4)
     gain_ratio: tuple[float, float] = (7.0, 0.7)
     cv: tuple[float, float] = (0.62, 0.3)
@@ -130,7 +131,7 @@ class Prior:
         recruits = latents.noise == NoiseKind.RECRUITMENT
         response = Response(
             kind=latents.noise,
-            log_floor=math.log(self.floor_mv[0]) + self.floor_mv[1] * z["log_floor"],
+            log_floor=self._log_floor(z["log_floor"]),
             floor_log_sd=_log_normal(z["floor_log_sd"], self.floor_log_sd),
             log_ratio=torch.log(
                 torch.where(
@@ -146,6 +147,10 @@ class Prior:
             max_probability=torch.sigmoid(self.max_probability[0] + self.max_probability[1] * z["output"]),
         )
         return Person(shape, response, latents.present)
+
+    def _log_floor(self, z: Tensor) -> Tensor:
+        median_mv, log_sd, tail = self.floor_mv
+        return math.log(median_mv) + log_sd * z + tail * z**3
 
     def _start(self, z: Tensor, space: DesignSpace) -> Tensor:
         """Start of the profile's span in the space [ms]: the mixture's quantile at the latent's probability."""

@@ -1,0 +1,35 @@
+import numpy as np
+import torch
+
+from isiw.design import DesignSpace
+from isiw.models.windows import best_window, edge_samples
+
+SPACE = DesignSpace(0, 9)
+
+
+def masks(*rows: str) -> torch.Tensor:
+    return torch.tensor([[float(c) for c in row] for row in rows])
+
+
+def test_certain_membership_is_reported_as_it_is():
+    window = best_window(masks("0111001100", "0111001100"), SPACE.grid_ms)
+    assert window.segments == ((1.0, 3.0), (6.0, 7.0))
+
+
+def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets():
+    rng = np.random.default_rng(0)
+    starts, ends = rng.integers(0, 5, 200), rng.integers(5, 10, 200)
+    samples = np.array([[float(a <= t <= b) for t in range(10)] for a, b in zip(starts, ends, strict=True)])
+    reported = best_window(torch.tensor(samples, dtype=torch.float32), SPACE.grid_ms).mask(SPACE.grid_ms)
+
+    def expected_f1(mask: np.ndarray) -> float:
+        return float(np.mean(2 * (samples * mask).sum(1) / (samples.sum(1) + mask.sum())))
+
+    membership = samples.mean(0)
+    best = max(expected_f1(membership >= level) for level in membership)
+    assert expected_f1(reported) > best - 0.005  # the cuts are a grid
+
+
+def test_an_edge_at_the_border_of_the_range_lies_beyond_it():
+    edges = edge_samples(masks("1110000000", "0000011111", "0011100000"), SPACE)
+    assert edges.tolist() == [[-np.inf, 2.0], [5.0, np.inf], [2.0, 4.0]]

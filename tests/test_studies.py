@@ -1,0 +1,88 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from isiw.design import IMPACT_SPACE
+from isiw.errors import InvalidValueError
+from isiw.studies import SimulatedSession, paired_sessions, play, run_study, simulate
+from isiw.window import Window
+
+TIMES = ["ask_ms", "tell_ms"]
+SMALL = (("particles", 100),)
+
+
+def small(strategy: str = "even", cohort: str = "gaussian", person: int = 0) -> SimulatedSession:
+    return SimulatedSession(strategy, cohort, person, seed=5, trials=4, marks=(2, 4), settings=SMALL)
+
+
+class Perfect:
+    """Knows the window from the start, and remembers what it was told."""
+
+    def __init__(self, session: SimulatedSession) -> None:
+        self.window = session.subject().window(session.space)
+        self.told: list[tuple[float, float]] = []
+
+    def ask(self) -> float:
+        return 250.0
+
+    def tell(self, isi_ms: float, mep_mv: float, *, isi_sd_ms: float = 0.0) -> None:
+        assert isi_sd_ms == 0.0
+        self.told.append((isi_ms, mep_mv))
+
+    def estimate(self) -> Window | None:
+        return self.window
+
+
+def test_each_mark_is_a_row_and_the_perfect_player_scores_one():
+    session = small()
+    rows = play(session, Perfect(session))
+    assert rows["trial"].tolist() == [2, 4]
+    assert rows["f1"].tolist() == [1.0, 1.0]
+    assert rows["start_covered"].isna().all()
+    assert rows["reported_window"].all()
+
+
+def test_every_player_meets_the_same_person_with_the_same_noise():
+    session = small()
+    players = [Perfect(session), Perfect(session)]
+    for player in players:
+        play(session, player)
+    assert players[0].told == players[1].told
+
+
+def test_a_person_without_a_window_is_one_in_the_table():
+    rows = simulate(small(cohort="nonresponder"))
+    assert not rows["true_window"].any()
+    assert (rows["f1"] == (~rows["reported_window"]).astype(float)).all()
+
+
+def test_a_study_is_the_same_in_one_process_and_in_two():
+    sessions = [small(strategy, person=person) for strategy in ("even", "random") for person in (0, 1)]
+    done: list[SimulatedSession] = []
+    here = run_study(sessions, on_done=done.append)
+    there = run_study(sessions, workers=2)
+    assert done == sessions
+    pd.testing.assert_frame_equal(here.drop(columns=TIMES), there.drop(columns=TIMES))
+    assert (here[TIMES] > 0).all(axis=None)
+
+
+def test_a_study_in_the_other_space_counts_from_the_impact():
+    session = SimulatedSession("even", "gaussian", 0, 5, 3, (3,), IMPACT_SPACE, SMALL)
+    assert np.isfinite(simulate(session)["f1"]).all()
+
+
+def test_paired_sessions_cross_strategies_cohorts_and_people():
+    sessions = paired_sessions(["even", "random"], ["gaussian", "wide"], 3, seed=7, trials=5, marks=(5,))
+    assert len({(s.strategy, s.cohort, s.person) for s in sessions}) == 12
+
+
+@pytest.mark.parametrize("wrong", [{"trials": 0}, {"person": -1}])
+def test_a_session_that_cannot_be_is_refused(wrong):
+    values = {"strategy": "even", "cohort": "gaussian", "person": 0, "seed": 0, "trials": 3, "marks": (3,)}
+    with pytest.raises(InvalidValueError):
+        SimulatedSession(**(values | wrong))
+
+
+def test_a_study_without_workers_is_refused():
+    with pytest.raises(InvalidValueError, match="worker"):
+        run_study([small()], workers=0)
