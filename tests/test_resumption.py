@@ -126,7 +126,7 @@ def test_an_ask_that_was_answered_by_the_fallback_is_replayed_as_logged(
 ):
     strategy = scripted_strategy(10)
     asked = strategy.ask
-    monkeypatch.setattr(strategy, "ask", lambda: 1.0 if len(strategy.posterior.told) == 2 else asked())
+    monkeypatch.setattr(strategy, "ask", lambda _=None: 1.0 if len(strategy.posterior.told) == 2 else asked())
     with pytest.raises(KeyboardInterrupt):
         Session(scripted_device(), strategy, log=log, on_trial=stop_after(5)).run()
     with pytest.raises(StrategyError, match="trial 2"):

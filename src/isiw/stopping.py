@@ -114,7 +114,7 @@ class NoWindow:
 
     def __post_init__(self) -> None:
         if not 0 < self.probability <= 1:
-            raise InvalidValueError("a probability lies in 0–1", got=self.probability)
+            raise InvalidValueError("the probability of no window to stop at must lie in 0–1", got=self.probability)
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""

@@ -1,0 +1,139 @@
+"""The named strategies: each works, says what it is, and is made again from its recipe."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.asktell import Recipe
+from isiw.catalogue import StrategySettings, list_strategies, make_strategy
+from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.errors import InvalidValueError, StrategyError
+from isiw.models.particles import ParticleModel
+from isiw.models.protocol import ResponseModel
+
+NAMES = sorted(list_strategies())
+FEW: dict[str, Any] = {"particles": 64}
+
+
+def asks(name: str, seed: int, meps_mv: tuple[float, ...] = (0.02, 0.1)) -> list[float]:
+    strategy = make_strategy(name, seed=seed, **FEW)
+    asked = []
+    for mep_mv in meps_mv:
+        asked.append(strategy.ask())
+        strategy.tell(asked[-1], mep_mv)
+    return [*asked, strategy.ask()]
+
+
+def test_every_named_strategy_is_described_in_a_sentence() -> None:
+    assert "default" in NAMES
+    assert all(text[0].isupper() and text.endswith(".") for text in list_strategies().values())
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
+def test_every_named_strategy_asks_learns_and_decides(name: str, space: Any) -> None:
+    strategy = make_strategy(name, space=space, seed=1, **FEW)
+    for mep_mv in (0.02, 0.08):
+        strategy.tell(strategy.ask(), mep_mv)
+    assert strategy.ask() in space.grid_ms
+    assert 0 <= strategy.estimate().probability <= 1
+    assert strategy.decision().reason
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_named_strategy_is_made_again_from_its_recipe(name: str) -> None:
+    strategy = make_strategy(name, seed=5, max_trials=7, prior={"p_window": 0.6}, **FEW)
+    recipe = strategy.recipe
+    again = make_strategy(recipe.name, strategy.space, recipe.seed, **recipe.settings)
+    assert again.recipe == recipe
+    assert (again.model, again.acquisition, again.stopping) == (strategy.model, strategy.acquisition, strategy.stopping)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_name_and_seed_give_the_same_asks(name: str) -> None:
+    assert asks(name, seed=2) == asks(name, seed=2)
+
+
+@pytest.mark.parametrize("name", ["default", "random"])
+def test_another_seed_gives_other_asks(name: str) -> None:
+    assert asks(name, seed=2) != asks(name, seed=3)
+
+
+def test_designs_that_do_not_look_at_the_responses_do_not() -> None:
+    for name in ("even", "random"):
+        assert asks(name, 2, (0.02, 0.02)) == asks(name, 2, (0.3, 0.3))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_model_and_acquisition_function_are_rebuilt_from_their_settings(name: str) -> None:
+    strategy = make_strategy(name, seed=2, prior={"p_window": 0.6, "width_ms": (90.0, 0.4)}, **FEW)
+    assert isinstance(strategy.model, ResponseModel)
+    assert isinstance(strategy.acquisition, AcquisitionFunction)
+    assert type(strategy.model).from_settings(strategy.model.settings()) == strategy.model
+    assert type(strategy.acquisition).from_settings(strategy.acquisition.settings()) == strategy.acquisition
+
+
+def test_settings_reach_the_parts_they_are_meant_for() -> None:
+    strategy = make_strategy(max_trials=7, particles=32, prior={"p_window": 0.6})
+    model = strategy.model
+    assert isinstance(model, ParticleModel)
+    assert (model.particles, model.beliefs.p_window) == (32, 0.6)
+    assert "7 stimuli are left" in strategy.decision().reason
+    assert strategy.recipe == Recipe("default", 0, vars(StrategySettings(7, 30.0, 0.9, 32, {"p_window": 0.6})))
+
+
+def test_the_prior_as_a_list_of_numbers_is_the_prior_as_a_pair() -> None:
+    pair, row = (make_strategy(prior={"width_ms": kind((90.0, 0.4))}, **FEW) for kind in (tuple, list))
+    assert pair.model == row.model
+
+
+def test_an_unknown_strategy_names_the_known_ones() -> None:
+    with pytest.raises(StrategyError, match="oracle") as caught:
+        make_strategy("oracle")
+    assert all(name in str(caught.value) for name in NAMES)
+
+
+def test_an_unknown_setting_names_the_known_ones() -> None:
+    with pytest.raises(StrategyError, match="max_trails") as caught:
+        make_strategy(max_trails=5)
+    assert all(name in str(caught.value) for name in ("max_trials", "stop_width_ms", "particles", "prior"))
+
+
+def test_an_unknown_setting_of_the_prior_names_the_known_ones() -> None:
+    with pytest.raises(InvalidValueError, match="p_windows") as caught:
+        make_strategy(prior={"p_windows": 0.5})
+    assert "p_window," in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("settings", "what"),
+    [
+        ({"seed": -1}, "seed"),
+        ({"max_trials": 0}, "max_trials"),
+        ({"stop_width_ms": 0.0}, "width_ms"),
+        ({"stop_width_ms": math.nan}, "width_ms"),
+        ({"stop_no_window": 0.0}, "no window"),
+        ({"stop_no_window": 1.5}, "no window"),
+        ({"particles": 0}, "particles"),
+        ({"particles": 1}, "particles"),
+        ({"particles": 2.5}, "particles"),
+        ({"particles": "many"}, "particles"),
+    ],
+)
+@pytest.mark.parametrize("name", ["default", "random"])
+def test_a_setting_that_cannot_be_is_refused_when_the_strategy_is_made(
+    name: str, settings: dict[str, Any], what: str
+) -> None:
+    with pytest.raises(InvalidValueError, match=what):
+        make_strategy(name, **settings)
+
+
+def test_the_fewest_particles_allowed_do_learn() -> None:
+    strategy = make_strategy(particles=2)
+    for _ in range(3):
+        strategy.tell(strategy.ask(), 0.05)
+    assert 0 <= strategy.estimate().probability <= 1

@@ -1,0 +1,100 @@
+"""The design space: its grid, its nearest ISI, and what it refuses."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.errors import InvalidValueError, OutOfSpaceError
+
+spaces = st.builds(
+    lambda low, step, count: DesignSpace(low, low + step * count, step_ms=step),
+    st.integers(-200, 200),
+    st.sampled_from([0.1, 0.25, 0.5, 1.0, 2.5, 5.0]),
+    st.integers(1, 400),
+)
+isis = st.floats(-1e4, 1e4)
+
+
+def test_the_grid_holds_both_ends() -> None:
+    assert DesignSpace(10, 20, step_ms=2.5).grid_ms.tolist() == [10.0, 12.5, 15.0, 17.5, 20.0]
+
+
+@given(spaces)
+def test_the_grid_is_evenly_spaced(space: DesignSpace) -> None:
+    assert space.grid_ms[0] == space.low_ms
+    assert space.grid_ms[-1] == pytest.approx(space.high_ms, abs=1e-6)
+    np.testing.assert_allclose(np.diff(space.grid_ms), space.step_ms, atol=1e-9)
+
+
+@given(spaces, isis)
+def test_snapping_lands_on_the_grid_and_does_so_once(space: DesignSpace, isi_ms: float) -> None:
+    snapped = space.snap(isi_ms)
+    assert snapped in space.grid_ms
+    assert space.snap(snapped) == snapped
+
+
+@given(spaces, isis)
+def test_no_grid_point_is_nearer_than_the_snapped_one(space: DesignSpace, isi_ms: float) -> None:
+    nearest = np.abs(space.grid_ms - isi_ms).min()
+    assert abs(space.snap(isi_ms) - isi_ms) == pytest.approx(nearest, abs=1e-9)
+
+
+@pytest.mark.parametrize("isi_ms", [math.nan, math.inf, -math.inf])
+def test_what_is_no_number_is_neither_snapped_nor_realised(isi_ms: float) -> None:
+    with pytest.raises(InvalidValueError, match="finite"):
+        IMPACT_SPACE.snap(isi_ms)
+    with pytest.raises(InvalidValueError, match="finite"):
+        IMPACT_SPACE.check_realised(isi_ms)
+
+
+@pytest.mark.parametrize("isi_ms", [-10.0, -0.5, 0.0, 123.4, 330.0])
+def test_a_realised_isi_within_the_tolerance_passes_unchanged(isi_ms: float) -> None:
+    assert IMPACT_SPACE.check_realised(isi_ms) == isi_ms
+
+
+@pytest.mark.parametrize("isi_ms", [-10.001, 330.001])
+def test_a_realised_isi_beyond_the_tolerance_is_refused_with_the_reference(isi_ms: float) -> None:
+    with pytest.raises(OutOfSpaceError, match="check the reference") as caught:
+        IMPACT_SPACE.check_realised(isi_ms)
+    assert "the impact" in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["low_ms", "high_ms", "step_ms", "tolerance_ms"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, "5", None, True])
+def test_a_field_that_is_no_finite_number_is_named(name: str, value: object) -> None:
+    with pytest.raises(InvalidValueError, match=name):
+        dataclasses.replace(VALVE_SPACE, **{name: value})
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"low_ms": 10, "high_ms": 10},
+        {"low_ms": 10, "high_ms": 5},
+        {"low_ms": 0, "high_ms": 10, "step_ms": 0},
+        {"low_ms": 0, "high_ms": 10, "step_ms": -1},
+        {"low_ms": 0, "high_ms": 10, "tolerance_ms": -1},
+        {"low_ms": 0, "high_ms": 10, "step_ms": 3},
+        {"low_ms": 0, "high_ms": 10, "reference": "pulse"},
+    ],
+)
+def test_a_space_that_cannot_be_is_refused(fields: dict[str, object]) -> None:
+    with pytest.raises(InvalidValueError):
+        DesignSpace(**fields)
+
+
+def test_the_grid_cannot_be_written_to() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        VALVE_SPACE.grid_ms[0] = 1.0
+
+
+def test_the_two_ready_spaces_are_those_of_the_dissertation() -> None:
+    assert (VALVE_SPACE.low_ms, VALVE_SPACE.high_ms, VALVE_SPACE.reference) == (0, 500, "valve")
+    assert (IMPACT_SPACE.low_ms, IMPACT_SPACE.high_ms, IMPACT_SPACE.reference) == (0, 320, "impact")

@@ -1,0 +1,50 @@
+"""The exception tree: what each error is, and what its message says."""
+
+from __future__ import annotations
+
+import pytest
+
+from isiw import errors
+from isiw.errors import IsiwError
+
+
+def test_a_message_says_what_was_got_what_was_expected_and_the_way_out() -> None:
+    error = IsiwError("the MEP is negative", got=-0.1, expected="0 or more", remedy="Check the unit.")
+    assert str(error) == "the MEP is negative; got -0.1; expected 0 or more. Check the unit."
+
+
+def test_a_message_leaves_out_what_is_not_known() -> None:
+    assert str(IsiwError("the device is off")) == "the device is off"
+
+
+def test_a_falsy_value_is_still_reported() -> None:
+    assert "got 0" in str(IsiwError("max_trials must be at least 1", got=0))
+
+
+def test_the_parts_of_a_message_can_be_read_one_by_one() -> None:
+    error = IsiwError("a", got=1, expected="b", remedy="c")
+    assert (error.what, error.got, error.expected, error.remedy) == ("a", 1, "b", "c")
+
+
+@pytest.mark.parametrize(
+    ("child", "parent"),
+    [
+        ("OutOfSpaceError", "InvalidValueError"),
+        ("LimitExceededError", "DeviceError"),
+        ("DeviceTimeoutError", "DeviceError"),
+        ("DamagedLogError", "LogError"),
+    ],
+)
+def test_a_narrow_error_is_caught_as_the_wider_one(child: str, parent: str) -> None:
+    assert issubclass(getattr(errors, child), getattr(errors, parent))
+
+
+def test_every_error_of_the_module_has_the_one_root() -> None:
+    classes = [value for value in vars(errors).values() if isinstance(value, type)]
+    assert len(classes) >= 10
+    assert all(issubclass(cls, IsiwError) for cls in classes)
+
+
+@pytest.mark.parametrize("name", ["InvalidValueError", "OutOfSpaceError", "ConfigError"])
+def test_bad_values_are_also_value_errors(name: str) -> None:
+    assert issubclass(getattr(errors, name), ValueError)

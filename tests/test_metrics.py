@@ -1,0 +1,122 @@
+"""F1, edge errors, coverage, and trials to a lasting criterion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from isiw.design import DesignSpace
+from isiw.metrics import covers, edge_error_ms, f1, f1_of_masks, trials_to_lasting, true_edges_ms
+from isiw.window import Window, WindowEstimate
+
+SPACE = DesignSpace(0, 40, step_ms=1)
+
+masks = st.lists(st.booleans(), min_size=12, max_size=12).map(np.array)
+
+
+def estimate_of(edges_ms: list[tuple[float, float]]) -> WindowEstimate:
+    return WindowEstimate(1.0, None, edge_samples_ms=np.array(edges_ms))
+
+
+@given(masks, masks)
+def test_f1_is_symmetric_within_0_to_1_and_1_only_for_equal_sets(a: np.ndarray, b: np.ndarray) -> None:
+    score = float(f1_of_masks(a, b))
+    assert score == float(f1_of_masks(b, a))
+    assert 0.0 <= score <= 1.0
+    assert (score == 1.0) == bool((a == b).all())
+    assert (score == 0.0) == (not (a & b).any() and bool((a | b).any()))
+
+
+@given(masks, masks)
+def test_f1_is_the_harmonic_mean_of_precision_and_recall(a: np.ndarray, b: np.ndarray) -> None:
+    hits = (a & b).sum()
+    if hits:
+        precision, recall = hits / a.sum(), hits / b.sum()
+        assert float(f1_of_masks(a, b)) == pytest.approx(2 / (1 / precision + 1 / recall))
+
+
+def test_f1_of_many_estimates_is_broadcast_against_one_truth() -> None:
+    truth = np.array([True, True, False])
+    estimates = np.array([[True, True, False], [False, False, True], [True, False, False]])
+    np.testing.assert_allclose(f1_of_masks(estimates, truth), [1.0, 0.0, 2 / 3])
+
+
+def test_no_window_rightly_reported_scores_1_and_wrongly_0() -> None:
+    assert f1(None, None, SPACE) == 1.0
+    assert f1(None, Window(5, 10), SPACE) == 0.0
+    assert f1(Window(5, 10), None, SPACE) == 0.0
+
+
+def test_f1_counts_grid_points_of_an_estimate_or_of_its_window() -> None:
+    window, truth = Window(10, 19), Window(15, 24)
+    assert f1(window, truth, SPACE) == pytest.approx(0.5)
+    assert f1(WindowEstimate(0.9, window), truth, SPACE) == pytest.approx(0.5)
+    assert f1(WindowEstimate(0.1, None), truth, SPACE) == 0.0
+
+
+def test_edge_errors_are_estimated_minus_true() -> None:
+    assert edge_error_ms(Window(10, 20), Window(12, 15)) == (-2.0, 5.0)
+    assert edge_error_ms(WindowEstimate(0.9, Window(10, 20)), Window(12, 15)) == (-2.0, 5.0)
+    assert edge_error_ms(None, Window(12, 15)) is None
+    assert edge_error_ms(Window(10, 20), None) is None
+
+
+def test_a_true_edge_at_the_border_of_the_space_lies_beyond_it() -> None:
+    assert true_edges_ms(Window(0, 20), SPACE) == (-math.inf, 20.0)
+    assert true_edges_ms(Window(1, 40), SPACE) == (1.0, math.inf)
+
+
+def test_each_edge_is_covered_by_its_own_interval() -> None:
+    estimate = estimate_of([(10.0, 20.0), (11.0, 21.0), (12.0, 22.0)])
+    assert covers(estimate, Window(11, 25), SPACE) == (True, False)
+    assert covers(estimate, Window(9, 22), SPACE) == (False, True)
+
+
+def test_half_a_grid_step_is_granted_and_no_more() -> None:
+    estimate = estimate_of([(10.0, 20.0)])
+    assert covers(estimate, Window(10.5, 19.5), SPACE) == (True, True)
+    assert covers(estimate, Window(10.6, 19.4), SPACE) == (False, False)
+
+
+def test_an_edge_beyond_the_range_is_covered_by_an_infinite_interval_only() -> None:
+    beyond = estimate_of([(-math.inf, math.inf)])
+    within = estimate_of([(1.0, 39.0)])
+    assert covers(beyond, Window(0, 40), SPACE) == (True, True)
+    assert covers(within, Window(0, 40), SPACE) == (False, False)
+
+
+def test_an_estimate_without_intervals_is_not_judged() -> None:
+    assert covers(WindowEstimate(None, Window(10, 20)), Window(10, 20), SPACE) is None
+
+
+def test_intervals_of_a_calibrated_posterior_cover_at_their_level() -> None:
+    # 2000 draws: four standard errors of a share of 0.9 are 0.027.
+    rng = np.random.default_rng(12)
+    fine = DesignSpace(0, 40, step_ms=0.01)
+    hits = []
+    for _ in range(2000):
+        middles = rng.normal((12.0, 28.0), 1.0)
+        samples = rng.normal(middles, 1.0, (400, 2))
+        start, end = rng.normal(middles, 1.0)
+        hits.append(covers(estimate_of(samples), Window(start, end), fine))
+    np.testing.assert_allclose(np.mean(hits, axis=0), 0.9, atol=0.027)
+
+
+@pytest.mark.parametrize(
+    ("mean_f1", "expected"),
+    [
+        ([0.9, 0.95, 0.97], 1),
+        ([0.1, 0.9, 0.95], 2),
+        ([0.9, 0.1, 0.9], 3),
+        ([0.9, 0.9, 0.1], None),
+        ([0.9, math.nan, 0.9], 3),
+        ([math.nan, math.nan], None),
+        ([], None),
+    ],
+)
+def test_a_criterion_lasts_from_the_trial_after_the_last_miss(mean_f1: list[float], expected: int | None) -> None:
+    assert trials_to_lasting(mean_f1, 0.9) == expected

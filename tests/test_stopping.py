@@ -1,0 +1,129 @@
+"""Stopping rules: when they stop, what they say, and how they compose."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.stopping import AnyOf, Budget, CredibleWidth, NoWindow, Progress, stimuli_left
+from isiw.window import WindowEstimate
+
+
+def progress(delivered: int = 3, probability: float | None = 0.95, edges_ms: object = None) -> Progress:
+    samples = None if edges_ms is None else np.asarray(edges_ms, dtype=float)
+    return Progress(delivered, delivered, WindowEstimate(probability, None, edge_samples_ms=samples))
+
+
+def edges_with_width(width_ms: float) -> list[tuple[float, float]]:
+    return [(100 + share * width_ms, 200 + share * width_ms) for share in np.linspace(0, 1, 101)]
+
+
+@pytest.mark.parametrize(("delivered", "stop"), [(0, False), (4, False), (5, True), (6, True)])
+def test_the_budget_counts_delivered_stimuli(delivered: int, *, stop: bool) -> None:
+    assert Budget(5)(progress(delivered)).stop == stop
+
+
+def test_a_mistrial_uses_up_budget_although_it_is_not_told() -> None:
+    assert Budget(5)(Progress(delivered=5, told=0, estimate=WindowEstimate(0.5, None))).stop
+
+
+def test_the_budget_says_how_many_stimuli_are_left() -> None:
+    assert Budget(5)(progress(2)).reason == "3 stimuli are left."
+
+
+@pytest.mark.parametrize(("width_ms", "stop"), [(20.0, True), (40.0, False)])
+def test_narrow_intervals_of_both_edges_stop(width_ms: float, *, stop: bool) -> None:
+    assert CredibleWidth(30)(progress(edges_ms=edges_with_width(width_ms))).stop == stop
+
+
+def test_one_wide_edge_goes_on() -> None:
+    edges = [(100 + share, 200 + 50 * share) for share in np.linspace(0, 1, 101)]
+    assert not CredibleWidth(30)(progress(edges_ms=edges)).stop
+
+
+def test_narrow_intervals_of_an_unlikely_window_go_on() -> None:
+    assert not CredibleWidth(30)(progress(probability=0.89, edges_ms=edges_with_width(1))).stop
+    assert CredibleWidth(30, min_probability=0.8)(progress(probability=0.89, edges_ms=edges_with_width(1))).stop
+
+
+def test_narrow_intervals_without_a_known_probability_go_on() -> None:
+    assert not CredibleWidth(30)(progress(probability=None, edges_ms=edges_with_width(1))).stop
+
+
+@pytest.mark.parametrize("start_ms", [[-math.inf] * 3, [-math.inf, 10.0, 10.0]])
+def test_an_edge_that_may_lie_beyond_the_range_has_no_narrow_interval(start_ms: list[float]) -> None:
+    decision = CredibleWidth(30)(progress(edges_ms=[(start, 100.0) for start in start_ms]))
+    assert not decision.stop
+    assert "span inf and 0 ms" in decision.reason
+
+
+def test_without_intervals_the_edges_are_not_known() -> None:
+    assert not CredibleWidth(30)(progress()).stop
+
+
+@pytest.mark.parametrize(("probability", "stop"), [(0.05, True), (0.2, False), (None, False)])
+def test_no_window_stops_when_it_is_probable_enough(probability: float | None, *, stop: bool) -> None:
+    assert NoWindow(0.9)(progress(probability=probability)).stop == stop
+
+
+def test_any_of_gives_the_reason_of_the_first_rule_that_stops() -> None:
+    rule = AnyOf((NoWindow(), Budget(3), Budget(2)))
+    assert rule(progress(3)) == Budget(3)(progress(3))
+
+
+def test_any_of_goes_on_with_all_reasons() -> None:
+    rules = (NoWindow(), Budget(9))
+    decision = AnyOf(rules)(progress(3))
+    assert not decision.stop
+    assert all(rule(progress(3)).reason in decision.reason for rule in rules)
+
+
+def test_any_of_no_rules_would_never_stop_and_is_refused() -> None:
+    with pytest.raises(InvalidValueError, match="at least one rule"):
+        AnyOf(())
+
+
+@pytest.mark.parametrize(
+    "decide",
+    [Budget(1), Budget(9), CredibleWidth(30), CredibleWidth(1), NoWindow(0.01), NoWindow(), AnyOf((Budget(9),))],
+)
+@pytest.mark.parametrize("edges_ms", [None, edges_with_width(5)])
+def test_every_reason_is_a_full_sentence(decide: object, edges_ms: object) -> None:
+    reason = decide(progress(edges_ms=edges_ms)).reason
+    assert not reason[0].islower()
+    assert reason.endswith(".")
+
+
+@pytest.mark.parametrize("width_ms", [0, -1, math.nan, math.inf])
+def test_a_width_that_cannot_be_is_refused(width_ms: float) -> None:
+    with pytest.raises(InvalidValueError, match="width_ms"):
+        CredibleWidth(width_ms)
+
+
+@pytest.mark.parametrize(("level", "probability"), [(0, 0.9), (1, 0.9), (math.nan, 0.9), (0.9, -0.1), (0.9, 1.1)])
+def test_a_level_or_probability_outside_0_to_1_is_refused(level: float, probability: float) -> None:
+    with pytest.raises(InvalidValueError, match="0–1"):
+        CredibleWidth(30, level, probability)
+
+
+@pytest.mark.parametrize("probability", [0, -0.1, 1.1, math.nan])
+def test_no_window_needs_a_probability(probability: float) -> None:
+    with pytest.raises(InvalidValueError, match="0–1"):
+        NoWindow(probability)
+
+
+@pytest.mark.parametrize("max_trials", [0, -1])
+def test_a_budget_of_nothing_is_refused(max_trials: int) -> None:
+    with pytest.raises(InvalidValueError, match="at least 1"):
+        Budget(max_trials)
+
+
+def test_the_smallest_budget_says_how_many_stimuli_are_left() -> None:
+    rule = AnyOf((NoWindow(), Budget(9), AnyOf((Budget(7),))))
+    assert stimuli_left(rule, 3) == 4
+    assert stimuli_left(rule, 8) == 0
+    assert stimuli_left(AnyOf((NoWindow(),)), 3) is None
+    assert stimuli_left(CredibleWidth(30), 3) is None

@@ -1,0 +1,128 @@
+"""Stimuli, measurements, trials and their table: what they refuse and what they give back."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial, TrialTable
+
+NOT_FINITE = [math.nan, math.inf, -math.inf]
+
+
+def accepted(index: int, mep_mv: float = 0.05) -> Trial:
+    return Trial(index, Status.ACCEPTED, 100.0, isi_ms=101.0, mep_mv=mep_mv)
+
+
+def mistrial(index: int) -> Trial:
+    return Trial(index, Status.MISTRIAL, 100.0, reason=MistrialReason.NO_PULSE)
+
+
+def test_a_stimulus_without_an_isi_is_tms_alone() -> None:
+    assert Stimulus(0, None).isi_ms is None
+
+
+@pytest.mark.parametrize("isi_ms", NOT_FINITE)
+def test_a_stimulus_needs_a_finite_isi(isi_ms: float) -> None:
+    with pytest.raises(InvalidValueError, match=r"Stimulus\.isi_ms"):
+        Stimulus(0, isi_ms)
+
+
+def test_trials_count_from_0() -> None:
+    with pytest.raises(InvalidValueError, match="counts from 0"):
+        Stimulus(-1, 10.0)
+
+
+@pytest.mark.parametrize("name", ["mep_mv", "isi_sd_ms", "background_rms_uv"])
+@pytest.mark.parametrize("value", [*NOT_FINITE, -0.001])
+def test_an_amplitude_that_cannot_be_is_named(name: str, value: float) -> None:
+    values = {"mep_mv": 0.1, "isi_ms": 10.0, name: value}
+    with pytest.raises(InvalidValueError, match=name):
+        Measurement(**values)
+    with pytest.raises(InvalidValueError, match=name):
+        Trial(0, Status.ACCEPTED, 10.0, **({"mep_mv": 0.1} | {name: value}))
+
+
+@pytest.mark.parametrize("name", ["isi_ms", "t_valve_ms", "t_hit_ms", "t_tms_ms"])
+@pytest.mark.parametrize("value", NOT_FINITE)
+def test_a_time_that_is_not_finite_is_named(name: str, value: float) -> None:
+    with pytest.raises(InvalidValueError, match=name):
+        Measurement(**({"mep_mv": 0.1, "isi_ms": 10.0} | {name: value}))
+    with pytest.raises(InvalidValueError, match=name):
+        Trial(0, Status.ACCEPTED, 10.0, mep_mv=0.1, **{name: value})
+
+
+def test_a_channel_keeps_its_samples_as_floats() -> None:
+    channel = Channel([1, 2, 3], 1000.0, "mV")
+    assert channel.values.dtype == np.float64
+
+
+@pytest.mark.parametrize(
+    ("values", "rate_hz", "t0_ms"),
+    [([[1.0]], 1000.0, 0.0), ([1.0], 0.0, 0.0), ([1.0], math.nan, 0.0), ([1.0], math.inf, 0.0), ([1.0], 1e3, math.nan)],
+)
+def test_a_channel_that_is_no_waveform_is_refused(values: list[object], rate_hz: float, t0_ms: float) -> None:
+    with pytest.raises(InvalidValueError):
+        Channel(np.array(values), rate_hz, "mV", t0_ms)
+
+
+@pytest.mark.parametrize("times", [{"t_tms_ms": math.nan}, {"t_hit_ms": math.inf}, {"isi_sd_ms": -1.0}])
+def test_a_sweep_with_impossible_times_is_refused(times: dict[str, float]) -> None:
+    with pytest.raises(InvalidValueError, match=next(iter(times))):
+        Sweep({}, **times)
+
+
+def test_a_mistrial_needs_a_reason_and_an_accepted_trial_has_none() -> None:
+    with pytest.raises(InvalidValueError, match="needs a reason"):
+        Trial(0, Status.MISTRIAL, 10.0)
+    with pytest.raises(InvalidValueError, match="has none"):
+        Trial(0, Status.ACCEPTED, 10.0, reason=MistrialReason.NO_PULSE, mep_mv=0.1)
+
+
+def test_an_accepted_trial_needs_its_mep() -> None:
+    with pytest.raises(InvalidValueError, match="needs its MEP"):
+        Trial(0, Status.ACCEPTED, 10.0)
+
+
+def test_status_and_reason_may_be_given_in_words() -> None:
+    trial = Trial(0, "mistrial", 10.0, reason="no impact")
+    assert (trial.status, trial.reason) == (Status.MISTRIAL, MistrialReason.NO_IMPACT)
+
+
+def test_a_reason_outside_the_closed_list_is_refused() -> None:
+    with pytest.raises(ValueError, match="bad luck"):
+        Trial(0, Status.MISTRIAL, 10.0, reason="bad luck")
+
+
+def test_a_strategy_learns_neither_from_mistrials_nor_from_excluded_trials() -> None:
+    table = TrialTable((accepted(0), mistrial(1), accepted(2), accepted(3))).excluding([2])
+    assert [trial.index for trial in table.told] == [0, 3]
+    assert len(table) == 4
+
+
+def test_appending_and_excluding_leave_the_table_itself_as_it_was() -> None:
+    table = TrialTable((accepted(0),))
+    longer = table.appended(accepted(1)).excluding([0])
+    assert [trial.excluded for trial in longer] == [True, False]
+    assert [trial.excluded for trial in table] == [False]
+    assert longer[1] == accepted(1)
+
+
+@pytest.mark.parametrize("indices", [(1, 0), (0, 0)])
+def test_indices_ascend(indices: tuple[int, int]) -> None:
+    with pytest.raises(InvalidValueError, match="ascend"):
+        TrialTable(tuple(accepted(index) for index in indices))
+
+
+def test_the_frame_has_a_row_a_trial_and_its_values() -> None:
+    frame = TrialTable((accepted(0, 0.07), mistrial(2))).to_frame()
+    assert frame.index.tolist() == [0, 2]
+    assert frame.loc[0, "mep_mv"] == 0.07
+    assert frame.loc[2, "reason"] == "no pulse"
+
+
+def test_the_frame_of_no_trials_has_the_same_columns() -> None:
+    assert TrialTable().to_frame().columns.tolist() == TrialTable((accepted(0),)).to_frame().columns.tolist()
