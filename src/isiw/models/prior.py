@@ -81,7 +81,7 @@ class Prior:
     """
 
     p_window: float = 0.8
-    p_shape: tuple[float, float, float, float] = (0.5, 0.2, 0.12, 0.18)
+    p_shape: tuple[float, float, float, float] = (0.68, 0.12, 0.08, 0.12)
     p_noise: tuple[float, float, float] = (0.4, 0.15, 0.45)
     start_ms: tuple[float, float] = (0.0, 125.0)
     hit_delay_ms: tuple[float, float] = (180.0, 7.0)
