@@ -6,9 +6,12 @@ fail on fewer than one seed in ten thousand.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
+from isiw.errors import InvalidValueError
 from isiw.recruitment import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
 
 TRIALS = 40_000
@@ -125,3 +128,19 @@ def test_forearm_meps_at_90_pct_rmt_are_those_of_the_physiology_table(
     assert np.mean(mep_mv > 0.020) == pytest.approx(share_above_20_uv, abs=0.06)
     assert mep_mv.mean() == pytest.approx(mean_mv, rel=0.12)
     assert mep_mv.std() / mep_mv.mean() == pytest.approx(cv, rel=0.20)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: EmgFloor(0.0, 0.2),
+        lambda: EmgFloor(0.01, math.nan),
+        lambda: GainResponse(EmgFloor(0.01, 0.2), -0.1, 0.5),
+        lambda: GainResponse(EmgFloor(0.01, 0.2), 0.1, 0.5, max_response_probability=1.5),
+        lambda: RecruitmentResponse(EmgFloor(0.01, 0.2), 0.16, 0.0, 105.0, 12.0, 7.0, 0.4),
+        lambda: RecruitmentResponse(EmgFloor(0.01, 0.2), 0.16, 0.3, 105.0, math.inf, 7.0, 0.4),
+    ],
+)
+def test_a_response_that_cannot_be_is_refused(make) -> None:
+    with pytest.raises(InvalidValueError):
+        make()

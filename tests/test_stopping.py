@@ -53,7 +53,12 @@ def test_narrow_intervals_without_a_known_probability_go_on() -> None:
     assert not CredibleWidth(30)(progress(probability=None, edges_ms=edges_with_width(1))).stop
 
 
-@pytest.mark.parametrize("start_ms", [[-math.inf] * 3, [-math.inf, 10.0, 10.0]])
+def test_an_edge_beyond_the_range_for_certain_is_known() -> None:
+    edges = [(-math.inf, 200 + share) for share in np.linspace(0, 1, 11)]
+    assert CredibleWidth(30)(progress(edges_ms=edges)).stop
+
+
+@pytest.mark.parametrize("start_ms", [[-math.inf, 10.0, 10.0], [-math.inf, -math.inf, 10.0]])
 def test_an_edge_that_may_lie_beyond_the_range_has_no_narrow_interval(start_ms: list[float]) -> None:
     decision = CredibleWidth(30)(progress(edges_ms=[(start, 100.0) for start in start_ms]))
     assert not decision.stop

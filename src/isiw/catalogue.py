@@ -18,9 +18,6 @@ from isiw.stopping import AnyOf, Budget, CredibleWidth, NoWindow, StoppingRule
 
 __all__ = ["StrategySettings", "list_strategies", "make_strategy"]
 
-MIN_PARTICLES = 2
-"""Half of the particles move at a time, so that neither half may be empty."""
-
 
 @dataclass(frozen=True)
 class StrategySettings:
@@ -44,14 +41,7 @@ class StrategySettings:
     prior: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.particles, int) or self.particles < MIN_PARTICLES:
-            raise InvalidValueError(
-                "particles must be a whole number", got=self.particles, expected=f"{MIN_PARTICLES} or more"
-            )
-        known = [f.name for f in fields(Prior)]
-        unknown = sorted(set(self.prior) - set(known))
-        if unknown:
-            raise InvalidValueError("the prior has no such setting", got=unknown, expected=", ".join(known))
+        self.model()
         self.stopping()
 
     def stopping(self) -> StoppingRule:

@@ -91,7 +91,8 @@ class CredibleWidth:
         intervals = progress.estimate.interval(self.level)
         if intervals is None:
             return StopDecision(stop=False, reason="The edges have no credible intervals.")
-        widths = [high - low if math.isfinite(high - low) else math.inf for low, high in intervals]
+        # An edge that lies beyond the range for certain is an answer: its interval has no width.
+        widths = [0.0 if low == high else high - low for low, high in intervals]
         known = (progress.estimate.probability or 0.0) >= self.min_probability and max(widths) <= self.width_ms
         spans = f"the {self.level:.0%} intervals of start and end span {widths[0]:.0f} and {widths[1]:.0f} ms"
         if known:

@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from isiw.design import VALVE_SPACE
+from isiw.errors import InvalidValueError
 from isiw.metrics import covers
 from isiw.models.evidence import History, levels
 from isiw.models.moves import Mover
@@ -216,3 +217,11 @@ def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
     covered = np.array([covers(estimate, window, VALVE_SPACE) for estimate, window in pairs])
     assert len(covered) > 150
     assert ((covered.mean(0) > 0.83) & (covered.mean(0) < 0.96)).all()
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"particles": 1}, {"particles": 2.5}, {"moves": -1}, {"min_ess": 1.5}, {"detection_limit_mv": 0.0}]
+)
+def test_a_model_that_cannot_be_is_refused(wrong) -> None:
+    with pytest.raises(InvalidValueError):
+        ParticleModel(**wrong)

@@ -2,6 +2,7 @@ import pytest
 import torch
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.errors import InvalidValueError
 from isiw.models.prior import Prior
 
 MANY = 20_000
@@ -42,3 +43,26 @@ def test_kinds_come_as_often_as_the_prior_says() -> None:
 def test_a_prior_survives_its_settings() -> None:
     prior = Prior(p_window=0.7, width_ms=(80.0, 0.3))
     assert Prior.from_settings(prior.settings()) == prior
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"p_window": 2.0},
+        {"p_anywhere": float("nan")},
+        {"p_shape": (0.5, 0.5)},
+        {"p_noise": (0.5, 0.2, 0.2)},
+        {"p_noise": (1.2, -0.2, 0.0)},
+        {"width_ms": (float("nan"), 0.5)},
+        {"boost": (3.0, 0.0)},
+        {"start_ms": (100.0, 5.0)},
+    ],
+)
+def test_a_prior_that_cannot_be_is_refused(wrong) -> None:
+    with pytest.raises(InvalidValueError, match=next(iter(wrong))):
+        Prior(**wrong)
+
+
+def test_a_setting_that_the_prior_does_not_have_is_refused() -> None:
+    with pytest.raises(InvalidValueError, match="p_windov"):
+        Prior.from_settings({"p_windov": 0.5})

@@ -16,6 +16,7 @@ import numpy as np
 import torch
 
 from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
 from isiw.models.evidence import History, total_log_likelihood
 from isiw.models.moves import Mover
 from isiw.models.prior import Latents, Person, Prior
@@ -46,6 +47,9 @@ class ParticleModel:
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a told response is known to be above [mV].
         device: torch device.
+
+    Raises:
+        InvalidValueError: fewer than two particles, or a number that cannot be.
     """
 
     beliefs: Prior = field(default_factory=Prior)
@@ -57,6 +61,20 @@ class ParticleModel:
     detection_limit_mv: float = 0.005
     response_threshold_mv: float = 0.02
     device: str = "cpu"
+
+    def __post_init__(self) -> None:
+        # Half of the particles move at a time, so that neither half may be empty.
+        for name, least in (("particles", 2), ("thinned", 1), ("moves", 0), ("max_trial_moves", 0)):
+            value = getattr(self, name)
+            if not isinstance(value, int) or value < least:
+                raise InvalidValueError(f"{name} must be a whole number", got=value, expected=f"{least} or more")
+        if not 0.0 <= self.min_ess <= 1.0:
+            raise InvalidValueError("min_ess is a share of the particles", got=self.min_ess, expected="0–1")
+        if not (self.detection_limit_mv > 0 and self.response_threshold_mv > 0):
+            raise InvalidValueError(
+                "a detection limit and a threshold are positive",
+                got=(self.detection_limit_mv, self.response_threshold_mv),
+            )
 
     def prior(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
         """The posterior before the first trial."""

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, NamedTuple, Self
 
 import torch
 
 from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
 from isiw.models.protocol import Tensor
 from isiw.models.response import NoiseKind, Response
-from isiw.models.shapes import Shape
+from isiw.models.shapes import Shape, ShapeKind
 
 __all__ = ["LATENTS", "Latents", "Person", "Prior"]
 
@@ -27,6 +28,20 @@ LATENTS = ("start", "width", "form", "log_floor", "floor_log_sd", "log_ratio", "
 SHAPE_LATENTS = slice(0, 3)
 FLOOR_LATENTS = slice(3, 5)
 NOISE_LATENTS = slice(5, 10)
+
+
+_SCALES = (
+    "hit_delay_ms",
+    "width_ms",
+    "floor_mv",
+    "floor_log_sd",
+    "gain_ratio",
+    "cv",
+    "recruitment_ratio",
+    "input_sd",
+    "output_sd",
+    "boost",
+)
 
 
 class Latents(NamedTuple):
@@ -78,6 +93,9 @@ class Prior:
         output_sd: median and log SD of the output noise, natural log; 0.3–0.5.
         boost: median and log SD of the boost in logits: k times 5–18 % RMT.
         rest: mean and SD of the drive at rest in logits: k (90 % RMT − x50).
+
+    Raises:
+        InvalidValueError: probabilities that are none or do not sum to one, medians or SDs that are not positive.
     """
 
     p_window: float = 0.8
@@ -98,13 +116,37 @@ class Prior:
     boost: tuple[float, float] = (3.3, 0.45)
     rest: tuple[float, float] = (-4.6, 0.6)
 
+    def __post_init__(self) -> None:
+        for name in ("p_window", "p_anywhere"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise InvalidValueError(f"{name} must be a probability", got=getattr(self, name))
+        for name, kinds in (("p_shape", ShapeKind), ("p_noise", NoiseKind)):
+            shares = getattr(self, name)
+            if len(shares) != len(kinds) or not min(shares) >= 0 or not math.isclose(sum(shares), 1.0, abs_tol=1e-6):
+                raise InvalidValueError(
+                    f"{name} must hold a probability for each kind", got=shares, expected=f"{len(kinds)} that sum to 1"
+                )
+        for name in _SCALES:
+            if not all(math.isfinite(value) and value > 0 for value in getattr(self, name)):
+                raise InvalidValueError(f"{name} must be positive", got=getattr(self, name))
+        if not self.start_ms[0] < self.start_ms[1]:
+            raise InvalidValueError("start_ms is empty", got=self.start_ms, expected="earliest < latest")
+
     def settings(self) -> Mapping[str, Any]:
         """The prior as TOML values."""
         return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(self).items()}
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The prior that has these settings."""
+        """The prior that has these settings; what is not among them is as by default.
+
+        Raises:
+            InvalidValueError: a setting that the prior does not have.
+        """
+        known = [f.name for f in fields(cls)]
+        unknown = sorted(set(settings) - set(known))
+        if unknown:
+            raise InvalidValueError("the prior has no such setting", got=unknown, expected=", ".join(known))
         values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
         return cls(**values)
 
