@@ -98,7 +98,7 @@ class Prior:
         InvalidValueError: probabilities that are none or do not sum to one, medians or SDs that are not positive.
     """
 
-    p_window: float = 0.8
+    p_window: float = 0.75
     p_shape: tuple[float, float, float, float] = (0.68, 0.12, 0.08, 0.12)
     p_noise: tuple[float, float, float] = (0.4, 0.15, 0.45)
     start_ms: tuple[float, float] = (0.0, 125.0)
