@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,13 +64,6 @@ class RememberingModel:
         trial = (float(observation.isi_ms[0]), float(observation.mep_mv[0]))
         return replace(posterior, told=(*posterior.told, trial))
 
-    def settings(self) -> Mapping[str, Any]:
-        return {}
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        return cls(**settings)
-
 
 @dataclass(frozen=True)
 class WantedIsi:
@@ -78,13 +71,6 @@ class WantedIsi:
 
     def __call__(self, posterior: RememberingPosterior, isi_ms: Tensor) -> Tensor:
         return -torch.abs(isi_ms - posterior.wanted_ms)[None]
-
-    def settings(self) -> Mapping[str, Any]:
-        return {}
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        return cls(**settings)
 
 
 class ScriptedDevice:

@@ -69,12 +69,14 @@ def test_designs_that_do_not_look_at_the_responses_do_not() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_model_and_acquisition_function_are_rebuilt_from_their_settings(name: str) -> None:
+def test_a_named_strategy_is_rebuilt_from_its_recipe(name: str) -> None:
     strategy = make_strategy(name, seed=2, prior={"p_window": 0.6, "width_ms": (90.0, 0.4)}, **FEW)
     assert isinstance(strategy.model, ResponseModel)
     assert isinstance(strategy.acquisition, AcquisitionFunction)
-    assert type(strategy.model).from_settings(strategy.model.settings()) == strategy.model
-    assert type(strategy.acquisition).from_settings(strategy.acquisition.settings()) == strategy.acquisition
+    again = make_strategy(strategy.recipe.name, seed=strategy.recipe.seed, **strategy.recipe.settings)
+    assert again.model == strategy.model
+    assert again.acquisition == strategy.acquisition
+    assert again.stopping == strategy.stopping
 
 
 def test_settings_reach_the_parts_they_are_meant_for() -> None:

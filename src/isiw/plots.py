@@ -21,7 +21,7 @@ from isiw.trials import Trial
 from isiw.types import FloatArray
 from isiw.window import Window
 
-__all__ = ["save_session_plot", "session_figure"]
+__all__ = ["save_figure", "save_session_plot", "session_figure"]
 
 INK, FAINT, BLUE, ORANGE, GREEN, RED = "#222222", "#8a8a8a", "#0072b2", "#e69f00", "#009e73", "#d55e00"
 """Colours that remain distinct for colour-blind readers (Okabe and Ito)."""
@@ -41,7 +41,16 @@ def save_session_plot(record: SessionRecord, path: str | Path, *, truth: Window 
     Raises:
         InvalidValueError: a format that matplotlib does not know.
     """
-    figure, target = session_figure(record, truth=truth), Path(path)
+    return save_figure(session_figure(record, truth=truth), path)
+
+
+def save_figure(figure: Figure, path: str | Path) -> Path:
+    """Write a figure into a file, whose folder is made where it is missing; the suffix chooses the format.
+
+    Raises:
+        InvalidValueError: a format that matplotlib does not know.
+    """
+    target = Path(path)
     known = figure.canvas.get_supported_filetypes()
     if target.suffix.removeprefix(".").lower() not in known:
         raise InvalidValueError("the picture's format is unknown", got=target.name, expected=", ".join(sorted(known)))

@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from isiw.errors import InvalidValueError
-from isiw.plots import BLUE, FAINT, GREEN, INK, ORANGE, RED
+from isiw.plots import BLUE, FAINT, GREEN, INK, ORANGE, RED, save_figure
 from isiw.timing import TimingStudy
 
 __all__ = ["save_timing_plot", "timing_figure"]
@@ -34,13 +33,7 @@ def save_timing_plot(study: TimingStudy, path: str | Path) -> Path:
     Raises:
         InvalidValueError: a format that matplotlib does not know.
     """
-    figure, target = timing_figure(study), Path(path)
-    known = figure.canvas.get_supported_filetypes()
-    if target.suffix.removeprefix(".").lower() not in known:
-        raise InvalidValueError("the picture's format is unknown", got=target.name, expected=", ".join(sorted(known)))
-    target.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(target, dpi=200)
-    return target
+    return save_figure(timing_figure(study), path)
 
 
 def timing_figure(study: TimingStudy) -> Figure:

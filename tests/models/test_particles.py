@@ -57,11 +57,6 @@ def test_model_and_posterior_keep_their_protocols() -> None:
         assert isinstance(posterior, protocol)
 
 
-def test_a_model_survives_its_settings() -> None:
-    model = ParticleModel(particles=300, beliefs=Prior(p_window=0.6))
-    assert ParticleModel.from_settings(model.settings()) == model
-
-
 def test_an_update_changes_no_earlier_posterior() -> None:
     model = ParticleModel(particles=200)
     before = model.prior(VALVE_SPACE, 3)

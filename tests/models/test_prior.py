@@ -40,9 +40,9 @@ def test_kinds_come_as_often_as_the_prior_says() -> None:
     assert person.present.float().mean().item() == pytest.approx(prior.p_window, abs=0.012)
 
 
-def test_a_prior_survives_its_settings() -> None:
-    prior = Prior(p_window=0.7, width_ms=(80.0, 0.3))
-    assert Prior.from_settings(prior.settings()) == prior
+def test_a_prior_is_made_from_what_a_configuration_holds() -> None:
+    prior = Prior.from_settings({"p_window": 0.7, "width_ms": [80.0, 0.3]})
+    assert prior == Prior(p_window=0.7, width_ms=(80.0, 0.3))
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,8 @@ the window alone: how much the next MEP is expected to reduce the variance of ea
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, Self
+from typing import ClassVar, Protocol
 
 import torch
 
@@ -73,15 +72,6 @@ class MutualInformation:
         """Score the candidate ISIs."""
         return mutual_information(*posterior.outcome_mass(isi_ms))
 
-    def settings(self) -> Mapping[str, Any]:
-        """No settings."""
-        return {}
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The acquisition function that has these settings."""
-        return cls(**settings)
-
 
 @dataclass(frozen=True)
 class WindowGain:
@@ -93,15 +83,6 @@ class WindowGain:
         """Score the candidate ISIs."""
         weights, mass = posterior.outcome_mass(isi_ms)
         return window_gain(weights, mass, posterior.window_masks(isi_ms))
-
-    def settings(self) -> Mapping[str, Any]:
-        """No settings."""
-        return {}
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The acquisition function that has these settings."""
-        return cls(**settings)
 
 
 @dataclass(frozen=True)
@@ -117,12 +98,3 @@ class Alternating:
     def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
         return MutualInformation()(posterior, isi_ms) if posterior.trials % 2 else WindowGain()(posterior, isi_ms)
-
-    def settings(self) -> Mapping[str, Any]:
-        """No settings."""
-        return {}
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The acquisition function that has these settings."""
-        return cls(**settings)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import torch
 
@@ -22,13 +21,6 @@ class AcquisitionFunction(Protocol):
 
     def __call__(self, posterior: Any, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs [ms], shape (t,), for each person, shape (b, t)."""
-
-    def settings(self) -> Mapping[str, Any]:
-        """Everything needed to make this acquisition function again, as TOML values."""
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The acquisition function that has these settings."""
 
 
 def best_candidate(scores: Tensor) -> Tensor:

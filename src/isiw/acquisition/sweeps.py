@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -42,15 +41,6 @@ class EvenSpacing:
         """Score the ISI whose turn it is 1 and all others 0, shape (1, t)."""
         return _only(golden_index(posterior.trials, len(isi_ms)), isi_ms)
 
-    def settings(self) -> Mapping[str, Any]:
-        """No settings."""
-        return {}
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The design that has these settings."""
-        return cls(**settings)
-
 
 @dataclass(frozen=True)
 class RandomIsi:
@@ -67,12 +57,3 @@ class RandomIsi:
         """Score the ISI drawn for this trial 1 and all others 0, shape (1, t)."""
         rng = np.random.default_rng([self.seed, posterior.trials])
         return _only(int(rng.integers(len(isi_ms))), isi_ms)
-
-    def settings(self) -> Mapping[str, Any]:
-        """The settings as TOML values."""
-        return asdict(self)
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The design that has these settings."""
-        return cls(**settings)

@@ -7,10 +7,9 @@ resampled, and moved by Markov chain steps (resample-move: Gilks and Berzuini, J
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Self
 
 import numpy as np
 import torch
@@ -133,16 +132,6 @@ class ParticleModel:
         high = torch.where(observation.mep_mv == 0, limit, high)
         columns = (observation.isi_ms, observation.isi_sd_ms, low, high)
         return History(*(column.to(self.device, torch.float32).unsqueeze(-1) for column in columns))
-
-    def settings(self) -> Mapping[str, Any]:
-        """The model's settings as TOML values."""
-        return asdict(self) | {"beliefs": self.beliefs.settings()}
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The model that has these settings."""
-        beliefs = Prior.from_settings(settings.get("beliefs", {}))
-        return cls(**(dict(settings) | {"beliefs": beliefs}))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Self
 
 import torch
@@ -131,10 +131,6 @@ class Prior:
                 raise InvalidValueError(f"{name} must be positive", got=getattr(self, name))
         if not self.start_ms[0] < self.start_ms[1]:
             raise InvalidValueError("start_ms is empty", got=self.start_ms, expected="earliest < latest")
-
-    def settings(self) -> Mapping[str, Any]:
-        """The prior as TOML values."""
-        return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(self).items()}
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any]) -> Self:

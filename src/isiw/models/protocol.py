@@ -7,9 +7,8 @@ functions and strategies see these protocols only.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, Self, TypeAlias, runtime_checkable
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import torch
 
@@ -84,10 +83,3 @@ class ResponseModel(Protocol):
 
     def update(self, posterior: Any, observation: Observation) -> Posterior:
         """The posterior after one more trial."""
-
-    def settings(self) -> Mapping[str, Any]:
-        """Everything needed to make this model again, as TOML values."""
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The model that has these settings."""
