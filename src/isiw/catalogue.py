@@ -29,6 +29,8 @@ class StrategySettings:
         stop_no_window: stop when "there is no window" is at least this probable.
         particles: how many particles the posterior has.
         prior: settings of `isiw.models.prior.Prior` that differ from its defaults.
+        detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
+        response_threshold_mv: what a told response is known to be above [mV].
 
     Raises:
         InvalidValueError: a number that cannot be, or a setting that the prior does not have.
@@ -39,6 +41,8 @@ class StrategySettings:
     stop_no_window: float = 0.9
     particles: int = 1000
     prior: Mapping[str, Any] = field(default_factory=dict)
+    detection_limit_mv: float = 0.005
+    response_threshold_mv: float = 0.02
 
     def __post_init__(self) -> None:
         self.model()
@@ -50,7 +54,12 @@ class StrategySettings:
 
     def model(self) -> ParticleModel:
         """The particle model."""
-        return ParticleModel(beliefs=Prior.from_settings(self.prior), particles=self.particles)
+        return ParticleModel(
+            beliefs=Prior.from_settings(self.prior),
+            particles=self.particles,
+            detection_limit_mv=self.detection_limit_mv,
+            response_threshold_mv=self.response_threshold_mv,
+        )
 
 
 @dataclass(frozen=True)

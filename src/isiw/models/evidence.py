@@ -18,6 +18,9 @@ __all__ = ["History", "in_pieces", "levels", "total_log_likelihood"]
 CHUNK_ELEMENTS = 1 << 18
 """On a CPU the likelihood is worked through in pieces of this many nodes, which stay in its cache."""
 
+ISI_NODES = ((-math.sqrt(3.0), 1 / 6), (0.0, 2 / 3), (math.sqrt(3.0), 1 / 6))
+"""Nodes [SD] and weights of an uncertain ISI."""
+
 
 @dataclass(frozen=True, eq=False)
 class History:
@@ -50,37 +53,39 @@ class History:
         return History(*(torch.cat(pair, dim=-1) for pair in zip(self.columns, trial.columns, strict=True)))
 
 
-def levels(person: Person, isi_ms: Tensor, isi_sd_ms: Tensor | None = None) -> Tensor:
+def levels(person: Person, isi_ms: Tensor) -> Tensor:
     """Facilitation of each particle, shape (b, p, n).
 
     Args:
         person: particles, fields of shape (b, p).
         isi_ms: ISIs [ms], shape (b or 1, n); NaN is TMS alone.
-        isi_sd_ms: their SDs [ms], same shape. Such an ISI is averaged over three nodes of its Gaussian.
     """
     isi = isi_ms.unsqueeze(-2)
-    level = facilitation(person.shape, isi)
-    if isi_sd_ms is not None and bool((isi_sd_ms > 0).any()):
-        reach = math.sqrt(3.0) * isi_sd_ms.unsqueeze(-2)
-        sides = facilitation(person.shape, isi - reach) + facilitation(person.shape, isi + reach)
-        level = level * (2 / 3) + sides / 6
-    return torch.where(person.present.unsqueeze(-1) & ~isi.isnan(), level, 0.0)
+    return torch.where(person.present.unsqueeze(-1) & ~isi.isnan(), facilitation(person.shape, isi), 0.0)
 
 
 def total_log_likelihood(person: Person, history: History) -> Tensor:
     """Log likelihood of a history under each particle, shape (b, p).
 
+    An ISI that is known with an SD only is integrated out on three Gauss-Hermite nodes.
+
     Args:
         person: particles, fields of shape (b, p).
         history: trials of b people.
     """
-    level = levels(person, history.isi_ms, history.isi_sd_ms)
-    low, high = history.log_mep.unsqueeze(-2), history.log_mep_high.unsqueeze(-2)
+    if not bool((history.isi_sd_ms > 0).any()):
+        return _by_trial(person, history, history.isi_ms).sum(-1)
+    nodes = [
+        _by_trial(person, history, history.isi_ms + shift * history.isi_sd_ms) + math.log(weight)
+        for shift, weight in ISI_NODES
+    ]
+    return torch.logsumexp(torch.stack(nodes), dim=0).sum(-1)
 
-    def piece(response: Response, level: Tensor, low: Tensor, high: Tensor) -> Tensor:
-        return log_likelihood(response, level, low, high).sum(-1)
 
-    return in_pieces(piece, person.response, (level, low, high), NODES * history.isi_ms.shape[-1])
+def _by_trial(person: Person, history: History, isi_ms: Tensor) -> Tensor:
+    """Log likelihood of each trial at some ISIs, shape (b, p, n)."""
+    ends = (history.log_mep.unsqueeze(-2), history.log_mep_high.unsqueeze(-2))
+    return in_pieces(log_likelihood, person.response, (levels(person, isi_ms), *ends), NODES * isi_ms.shape[-1])
 
 
 def in_pieces(function: Callable[..., Tensor], response: Response, others: tuple[Tensor, ...], elements: int) -> Tensor:

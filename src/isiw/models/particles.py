@@ -99,9 +99,7 @@ class ParticleModel:
             posterior, log_weights=log_weights, log_likelihood=posterior.log_likelihood + gain, history=history
         )
         generator = _generator(self.device, posterior.seed, after.trials)
-        ess = torch.exp(-torch.logsumexp(2.0 * log_weights, dim=-1))
-        if bool((ess < self.min_ess * self.particles).any()):
-            after = self._resampled(after, generator)
+        after = self._resampled(after, generator)
         mover = Mover(self.beliefs, posterior.space, history, generator)
         latents, log_likelihood = after.latents, after.log_likelihood
         for _ in range(self._sweeps(after.trials)):
@@ -113,13 +111,19 @@ class ParticleModel:
         return min(self.moves, max(1, self.max_trial_moves // max(1, trials)))
 
     def _resampled(self, posterior: ParticlePosterior, generator: torch.Generator) -> ParticlePosterior:
-        picks = systematic(posterior.log_weights, self.particles)
+        """Resample those people whose effective sample size has fallen; nobody else notices."""
         # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
-        picks = picks[:, torch.randperm(self.particles, generator=generator, device=generator.device)]
+        shuffled = torch.randperm(self.particles, generator=generator, device=generator.device)
+        ess = torch.exp(-torch.logsumexp(2.0 * posterior.log_weights, dim=-1, keepdim=True))
+        worn = ess < self.min_ess * self.particles
+        if not bool(worn.any()):
+            return posterior
+        kept = torch.arange(self.particles, device=shuffled.device)
+        picks = torch.where(worn, systematic(posterior.log_weights, self.particles)[:, shuffled], kept)
         return replace(
             posterior,
             latents=Latents(*(_take(x, picks) for x in posterior.latents)),
-            log_weights=torch.full_like(posterior.log_weights, -math.log(self.particles)),
+            log_weights=torch.where(worn, -math.log(self.particles), posterior.log_weights),
             log_likelihood=_take(posterior.log_likelihood, picks),
         )
 
