@@ -167,18 +167,34 @@ def test_a_trial_is_excluded_once(interrupted):
         exclude(interrupted, 1, "sneezed")
 
 
-def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted, scripted_strategy, scripted_device):
-    whole = bytearray(interrupted.read_bytes())
+def lose_trial_1(log):
+    whole = bytearray(log.read_bytes())
     blocks = [at for at in range(len(whole)) if whole.startswith(b"\x04\x00\x00\x00zstd", at)]
     whole[blocks[5] + 40] ^= 0xFF  # header, then intent, trial, estimate of each trial: the trial of number 1
-    interrupted.write_bytes(whole)
-    assert [intent.trial for intent in read_session(interrupted).unknown] == [1]
+    log.write_bytes(whole)
+    assert [intent.trial for intent in read_session(log).unknown] == [1]
+
+
+def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted, scripted_strategy, scripted_device):
+    lose_trial_1(interrupted)
     result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
     assert result.trials[1].reason is MistrialReason.OUTCOME_UNKNOWN
     assert len(result.trials) == 10
     assert "fails its checksum" in read_session(interrupted).events[-1].text
     again = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
     assert again.trials == result.trials
+
+
+def test_a_log_with_a_lost_trial_goes_on_after_an_exclusion(interrupted, scripted_strategy, scripted_device):
+    lose_trial_1(interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        resume(interrupted, scripted_device(), scripted_strategy(10), on_trial=stop_after(6)).run()
+    exclude(interrupted, 2, "sneezed")
+    session = resume(interrupted, scripted_device(), scripted_strategy(10))
+    result = session.run()
+    assert [trial.index for trial in result.trials] == list(range(10))
+    assert [trial.index for trial in result.trials if not trial.told] == [1, 2]
+    assert len(session.strategy.posterior.told) == 8
 
 
 def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted, scripted_strategy, scripted_device):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,7 +115,8 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
             learn(strategy, entry)
             told.append(entry)
         elif isinstance(entry, Event) and entry.kind == "exclusion" and entry.trial is not None:
-            told = list(TrialTable(tuple(told)).excluding([entry.trial]))
+            # In the order of telling, in which a trial that was lost stands behind later ones.
+            told = [dataclasses.replace(t, excluded=True) if t.index == entry.trial else t for t in told]
             strategy = strategy.restarted()
             for trial in told:
                 learn(strategy, trial)
