@@ -136,6 +136,25 @@ def test_an_ask_that_was_answered_by_the_fallback_is_replayed_as_logged(
     assert len(resume(log, scripted_device(), scripted_strategy(10)).run().trials) == 10
 
 
+@pytest.mark.parametrize(
+    ("overrides", "timeout_s", "ask_deadline_s"),
+    [({}, 7.0, 40.0), ({"timeout_s": 9.0, "ask_deadline_s": 50.0}, 9.0, 50.0)],
+)
+def test_the_times_allowed_are_those_of_the_log_or_of_the_call(
+    scripted_strategy, scripted_device, log, monkeypatch, overrides, timeout_s, ask_deadline_s
+):
+    times = {"timeout_s": 7.0, "ask_deadline_s": 40.0}
+    with pytest.raises(KeyboardInterrupt):
+        Session(scripted_device(), scripted_strategy(4), log=log, on_trial=stop_after(2), **times).run()
+    device, deadlines, timeouts = scripted_device(), [], []
+    session = resume(log, device, scripted_strategy(4), **overrides)
+    ask, deliver = session.strategy.ask, device.deliver
+    monkeypatch.setattr(session.strategy, "ask", lambda s=None: deadlines.append(s) or ask(s))
+    monkeypatch.setattr(device, "deliver", lambda stimulus, s: timeouts.append(s) or deliver(stimulus, s))
+    session.run()
+    assert (set(timeouts), set(deadlines)) == ({timeout_s}, {ask_deadline_s})
+
+
 def test_a_strategy_of_own_objects_must_be_handed_over(interrupted, scripted_device):
     with pytest.raises(StrategyError, match="own objects"):
         resume(interrupted, scripted_device())

@@ -23,7 +23,7 @@ from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
 __all__ = ["Replayed", "exclude", "replay", "resume"]
 
 
-def resume(
+def resume(  # noqa: PLR0913 - all but three are keyword-only
     path: str | Path,
     device: Device,
     strategy: Strategy | None = None,
@@ -31,6 +31,8 @@ def resume(
     limits: Limits | None = None,
     clock: Clock | None = None,
     on_trial: Callable[[SessionUpdate], None] | None = None,
+    timeout_s: float | None = None,
+    ask_deadline_s: float | None = None,
     verify: bool = True,
 ) -> Session:
     """A session that goes on where a log ends. Nothing is delivered or written before its `run`.
@@ -44,6 +46,8 @@ def resume(
         limits: other limits than the logged ones.
         clock: as for `Session`.
         on_trial: as for `Session`.
+        timeout_s: another time for one delivery than the logged one [s].
+        ask_deadline_s: another time for one ask than the logged one [s].
         verify: whether the strategy must ask again what the log says it asked. With other versions or on another
             machine it may not; without verification the logged trials are told as they are.
 
@@ -67,6 +71,8 @@ def resume(
         subject=header.subject,
         signals=header.signals,
         config=header.config,
+        timeout_s=header.timeout_s if timeout_s is None else timeout_s,
+        ask_deadline_s=header.ask_deadline_s if ask_deadline_s is None else ask_deadline_s,
     )
     last = len(replayed.trials) - 1 if replayed.trials else None
     event = Event(kind="resume", trial=last, text=_resumption_text(record, replayed))

@@ -141,6 +141,8 @@ class Session:
             limits=self._limits,
             device=info,
             signals=self._signals,
+            timeout_s=timeout_s,
+            ask_deadline_s=ask_deadline_s,
             versions={"python": platform.python_version()} | {p: importlib.metadata.version(p) for p in _PACKAGES},
             config=dict(config or {}),
         )
