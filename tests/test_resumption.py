@@ -10,9 +10,10 @@ import pytest
 
 from isiw.catalogue import make_strategy
 from isiw.design import VALVE_SPACE
+from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice
-from isiw.errors import InvalidValueError, LogError, StrategyError
+from isiw.errors import DeviceError, InvalidValueError, LogError, StrategyError
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent
@@ -214,6 +215,17 @@ def test_a_log_with_a_lost_trial_goes_on_after_an_exclusion(interrupted, scripte
     assert [trial.index for trial in result.trials] == list(range(10))
     assert [trial.index for trial in result.trials if not trial.told] == [1, 2]
     assert len(session.strategy.posterior.told) == 8
+
+
+def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(scripted_strategy, scripted_device, log):
+    real, clock = scripted_device(simulated=False), VirtualClock()
+    with pytest.raises(KeyboardInterrupt):
+        Session(real, scripted_strategy(10), log=log, clock=clock, on_trial=stop_after(4)).run()
+    before = log.read_bytes()
+    with pytest.raises(DeviceError, match=r"run with a real device.*simulated=False"):
+        resume(log, scripted_device(), scripted_strategy(10))
+    assert log.read_bytes() == before
+    assert len(resume(log, real, scripted_strategy(10), clock=clock).run().trials) == 10
 
 
 def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted, scripted_strategy, scripted_device):

@@ -12,7 +12,7 @@ from isiw.catalogue import make_strategy
 from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, HasMemory
-from isiw.errors import InvalidValueError, StrategyError
+from isiw.errors import DeviceError, InvalidValueError, StrategyError
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Header
@@ -54,10 +54,12 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     Raises:
         LogError: no such log, or one of which not even the header can be read.
         StrategyError: the strategy cannot be made again, or asks something else.
+        DeviceError: a simulated device for a session with a real one.
     """
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
     header = record.header
+    _require_as_real(device, header)
     replayed = replay(record, strategy.restarted() if strategy else _strategy_of(header), verify=verify)
     if isinstance(device, HasMemory):
         device.resume_after([Stimulus(trial.index, trial.commanded_isi_ms) for trial in replayed.trials])
@@ -158,6 +160,19 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
         )
     with LogWriter.continuing(path, salvaged, record.header) as log:
         log.append(Event(kind="exclusion", trial=trial, text=reason))
+
+
+def _require_as_real(device: Device, header: Header) -> None:
+    """Raise where the session would go on without waiting, or with answers from nobody."""
+    info = device.describe()
+    if info.simulated and not header.device.simulated:
+        raise DeviceError(
+            "the session was run with a real device, and cannot go on with a simulated one",
+            got=info.name,
+            expected=f"a real one, as {header.device.name} was",
+            remedy="Describe the device with DeviceInfo(..., simulated=False), which makes the session wait between "
+            "trials in real time.",
+        )
 
 
 def _strategy_of(header: Header) -> Strategy:
