@@ -57,6 +57,12 @@ def test_a_file_changes_what_it_names(config_file):
         ("[limits]\nmin_iti_s = nan", ["limits.min_iti_s", "nan"]),
         ("[subject]\nkind = 'real'", ["subject.kind", "'real'", "'simulated' or 'recorded'"]),
         ("[space]\nreference = 'coil'", ["space.reference", "'coil'", "'impact' or 'valve'"]),
+        ("[strategy]\nname = 'foo'", ["session.toml", "value of strategy.name", "'foo'", "one of default,"]),
+        ("[subject]\ncohort = 'foo'", ["session.toml", "value of subject.cohort", "'foo'", "one of ", "nonresponder"]),
+        ("[space]\nlow_ms = 10\nhigh_ms = 5", ["session.toml", "value of space", "(10.0, 5.0)", "low_ms < high_ms"]),
+        ("[space]\nlow_ms = nan", ["session.toml", "value of space", "DesignSpace.low_ms", "got nan"]),
+        ("[space]\nstep_ms = 0.3", ["session.toml", "value of space", "whole number of steps"]),
+        ("[strategy.settings]\nmax_trials = 0", ["value of strategy.settings", "max_trials", "got 0", "at least 1"]),
         ("seed = = 7", ["session.toml", "not valid TOML", "line 1"]),
     ],
 )

@@ -23,7 +23,8 @@ def test_the_surface_that_lab_software_relies_on_is_pinned():
     assert {
         "CallbackDevice", "DesignSpace", "Device", "DeviceInfo", "Limits", "Measurement", "Session", "Stimulus",
         "StopDecision", "Sweep", "Trial", "TrialTable", "VirtualClock", "Window", "WindowEstimate", "errors",
-        "exclude", "list_strategies", "make_strategy", "metrics", "read_session", "resume", "signals", "subjects", "testing",
+        "exclude", "list_strategies", "make_strategy", "metrics", "read_session", "resume", "signals", "subjects",
+        "testing",
     } <= set(isiw.__all__)  # fmt: skip
 
 

@@ -16,24 +16,24 @@ import datetime as dt
 import difflib
 import itertools
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, fields, is_dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from isiw.catalogue import StrategySettings, make_strategy
+from isiw.catalogue import StrategySettings, list_strategies, make_strategy
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
 from isiw.devices.recorded import RecordedDevice, load_recordings
 from isiw.devices.simulated import SimulatedDevice
-from isiw.errors import ConfigError
+from isiw.errors import ConfigError, InvalidValueError, IsiwError
 from isiw.log.reader import SessionRecord
 from isiw.session import Session, SessionUpdate
-from isiw.subjects import SimulatedSubject, cohort
+from isiw.subjects import COHORTS, SimulatedSubject, cohort
 from isiw.types import Reference
 from isiw.window import Window
 
@@ -52,6 +52,12 @@ SESSIONS = Path("isiw-sessions")
 """Where sessions are logged that were given no path."""
 
 
+def _one_of(known: Iterable[str], name: str) -> str:
+    if name not in known:
+        raise InvalidValueError("the name is unknown", got=name, expected=f"one of {', '.join(known)}")
+    return name
+
+
 class _Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -64,6 +70,11 @@ class SubjectConfig(_Section):
     number: int = Field(default=0, ge=0)
     data: Path | None = None
 
+    @field_validator("cohort")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return _one_of(COHORTS, name)
+
 
 class SpaceConfig(_Section):
     """The design space, as in `isiw.DesignSpace`."""
@@ -74,12 +85,26 @@ class SpaceConfig(_Section):
     reference: Reference = "valve"
     tolerance_ms: float = 10.0
 
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        self.design()
+        return self
+
+    def design(self) -> DesignSpace:
+        """The design space."""
+        return DesignSpace(**self.model_dump())
+
 
 class StrategyConfig(_Section):
     """The strategy: a name from `isiw.list_strategies()` and its settings."""
 
     name: str = "default"
     settings: StrategySettings = StrategySettings()
+
+    @field_validator("name")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return _one_of(list_strategies(), name)
 
 
 class LimitsConfig(_Section):
@@ -153,16 +178,15 @@ def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
                 expected=f"one of {', '.join(known)}",
                 remedy=f"{guess}Correct it or remove it.",
             ) from error
+        own = first.get("ctx", {}).get("error")
+        what, remedy = f"{source}: the value of {key} cannot be used", "Correct it, or remove the key for its default."
+        if isinstance(own, IsiwError):
+            raise ConfigError(
+                f"{what}: {own.what}", got=own.got, expected=own.expected, remedy=own.remedy or remedy
+            ) from error
         raise ConfigError(
-            f"{source}: the value of {key} cannot be used",
-            got=first["input"],
-            expected=_expectation(first["msg"]),
-            remedy="Correct it, or remove the key to have its default.",
+            what, got=first["input"], expected=first["msg"].removeprefix("Input should be "), remedy=remedy
         ) from error
-
-
-def _expectation(message: str) -> str:
-    return message.removeprefix("Input should be ").removeprefix("Value error, ")
 
 
 def _known_keys(section: tuple[int | str, ...]) -> list[str]:
@@ -231,7 +255,7 @@ def device_for(config: RunConfig) -> Device:
 
 def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:
     """The session that a configuration describes, ready to run."""
-    space = DesignSpace(**config.space.model_dump())
+    space = config.space.design()
     log = config.log or fresh_log_path(config)
     kept = config.model_dump(mode="json", exclude_none=True, exclude={"log"})
     if config.subject.data is not None:
