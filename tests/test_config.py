@@ -130,7 +130,8 @@ def test_a_log_holds_the_configuration_it_was_run_with(tmp_path, config_file):
     assert len(record.table) == 2
 
 
-def test_a_log_of_other_software_has_no_configuration(tmp_path, scripted_strategy, scripted_device):
-    Session(scripted_device(), scripted_strategy(1), log=tmp_path / "s.mcap").run()
+@pytest.mark.parametrize("config", [{}, {"rig": "A"}, {"seed": 3}])
+def test_a_log_of_other_software_has_no_configuration(tmp_path, scripted_strategy, scripted_device, config):
+    Session(scripted_device(), scripted_strategy(1), log=tmp_path / "s.mcap", config=config).run()
     with pytest.raises(ConfigError, match=r"not run by isiw run.*isiw.resume"):
         config_of_log(read_session(tmp_path / "s.mcap"))

@@ -51,6 +51,9 @@ __all__ = [
 SESSIONS = Path("isiw-sessions")
 """Where sessions are logged that were given no path."""
 
+RUN_KEY = "isiw_run"
+"""What `isiw run` keeps its configuration under in a log; lab software may keep there what it likes."""
+
 
 def _one_of(known: Iterable[str], name: str) -> str:
     if name not in known:
@@ -202,13 +205,13 @@ def config_of_log(record: SessionRecord) -> RunConfig:
     Raises:
         ConfigError: it was run by other software than `isiw run`.
     """
-    if not record.header.config:
+    if RUN_KEY not in record.header.config:
         raise ConfigError(
             "the session was not run by isiw run, so its device is not known here",
             got=record.header.device.name,
             remedy="Resume it from the software that ran it: isiw.resume(path, device).run()",
         )
-    return _validated(record.header.config, str(record.path))
+    return _validated(record.header.config[RUN_KEY], str(record.path))
 
 
 def fresh_log_path(config: RunConfig) -> Path:
@@ -225,11 +228,9 @@ def subject_for(config: RunConfig) -> SimulatedSubject:
 
 
 def true_window(record: SessionRecord) -> Window | None:
-    """The true window of the simulated person in a log; None where there is none.
-
-    Raises:
-        ConfigError: the person is not simulated.
-    """
+    """The true window of the person whom `isiw run` simulated; None where it, or such a person, does not exist."""
+    if RUN_KEY not in record.header.config:
+        return None
     return subject_for(config_of_log(record)).window(record.header.space)
 
 
@@ -267,5 +268,5 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         limits=Limits.of_space(space, **config.limits.model_dump()),
         on_trial=on_trial,
         subject=f"{config.subject.cohort}-{config.seed}-{config.subject.number}",
-        config=kept,
+        config={RUN_KEY: kept},
     )
