@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from isiw.cli import app
+from isiw.config import true_window
 from isiw.log.reader import read_session
 from isiw.session import Session
 
@@ -115,6 +116,16 @@ def test_plot_draws_into_the_file(isiw, log, tmp_path):
     result = isiw("plot", log, "-o", "picture.pdf")
     assert result.exit_code == 0
     assert (tmp_path / "picture.pdf").stat().st_size > 5000
+
+
+def test_a_session_of_lab_software_with_its_own_configuration_is_drawn_without_a_truth(
+    isiw, tmp_path, scripted_strategy, scripted_device
+):
+    Session(scripted_device(), scripted_strategy(2), log=tmp_path / "lab.mcap", config={"rig": "A", "seed": 3}).run()
+    result = isiw("plot", "lab.mcap", "-o", "picture.png")
+    assert result.exit_code == 0, result.output
+    assert true_window(read_session("lab.mcap")) is None
+    assert isiw("show", "lab.mcap").exit_code == 0
 
 
 def test_exclude_appends_and_resume_learns_without_it(isiw, log):

@@ -57,6 +57,12 @@ def test_a_file_changes_what_it_names(config_file):
         ("[limits]\nmin_iti_s = nan", ["limits.min_iti_s", "nan"]),
         ("[subject]\nkind = 'real'", ["subject.kind", "'real'", "'simulated' or 'recorded'"]),
         ("[space]\nreference = 'coil'", ["space.reference", "'coil'", "'impact' or 'valve'"]),
+        ("[strategy]\nname = 'foo'", ["session.toml", "value of strategy.name", "'foo'", "one of default,"]),
+        ("[subject]\ncohort = 'foo'", ["session.toml", "value of subject.cohort", "'foo'", "one of ", "nonresponder"]),
+        ("[space]\nlow_ms = 10\nhigh_ms = 5", ["session.toml", "value of space", "(10.0, 5.0)", "low_ms < high_ms"]),
+        ("[space]\nlow_ms = nan", ["session.toml", "value of space", "DesignSpace.low_ms", "got nan"]),
+        ("[space]\nstep_ms = 0.3", ["session.toml", "value of space", "whole number of steps"]),
+        ("[strategy.settings]\nmax_trials = 0", ["value of strategy.settings", "max_trials", "got 0", "at least 1"]),
         ("seed = = 7", ["session.toml", "not valid TOML", "line 1"]),
     ],
 )
@@ -124,7 +130,8 @@ def test_a_log_holds_the_configuration_it_was_run_with(tmp_path, config_file):
     assert len(record.table) == 2
 
 
-def test_a_log_of_other_software_has_no_configuration(tmp_path, scripted_strategy, scripted_device):
-    Session(scripted_device(), scripted_strategy(1), log=tmp_path / "s.mcap").run()
+@pytest.mark.parametrize("config", [{}, {"rig": "A"}, {"seed": 3}])
+def test_a_log_of_other_software_has_no_configuration(tmp_path, scripted_strategy, scripted_device, config):
+    Session(scripted_device(), scripted_strategy(1), log=tmp_path / "s.mcap", config=config).run()
     with pytest.raises(ConfigError, match=r"not run by isiw run.*isiw.resume"):
         config_of_log(read_session(tmp_path / "s.mcap"))

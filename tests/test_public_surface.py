@@ -22,8 +22,9 @@ def test_an_unknown_name_is_an_attribute_error():
 def test_the_surface_that_lab_software_relies_on_is_pinned():
     assert {
         "CallbackDevice", "DesignSpace", "Device", "DeviceInfo", "Limits", "Measurement", "Session", "Stimulus",
-        "StopDecision", "Sweep", "Trial", "TrialTable", "Window", "WindowEstimate", "errors", "exclude",
-        "list_strategies", "make_strategy", "metrics", "read_session", "resume", "signals", "subjects", "testing",
+        "StopDecision", "Sweep", "Trial", "TrialTable", "VirtualClock", "Window", "WindowEstimate", "errors",
+        "exclude", "list_strategies", "make_strategy", "metrics", "read_session", "resume", "signals", "subjects",
+        "testing",
     } <= set(isiw.__all__)  # fmt: skip
 
 

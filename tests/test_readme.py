@@ -26,6 +26,10 @@ def test_the_python_examples_run_one_after_the_other(tmp_path, monkeypatch, caps
     assert "nothing is missing" in printed
 
 
+def test_a_copied_device_waits_between_its_trials():
+    assert "simulated=" not in "".join(blocks("python"))
+
+
 def test_the_examples_are_as_short_as_promised():
     for block in blocks("python")[:1]:
         assert len([line for line in block.splitlines() if line.strip()]) <= 20

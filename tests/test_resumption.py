@@ -10,9 +10,10 @@ import pytest
 
 from isiw.catalogue import make_strategy
 from isiw.design import VALVE_SPACE
+from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice
-from isiw.errors import InvalidValueError, LogError, StrategyError
+from isiw.errors import DeviceError, InvalidValueError, LogError, StrategyError
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent
@@ -136,6 +137,25 @@ def test_an_ask_that_was_answered_by_the_fallback_is_replayed_as_logged(
     assert len(resume(log, scripted_device(), scripted_strategy(10)).run().trials) == 10
 
 
+@pytest.mark.parametrize(
+    ("overrides", "timeout_s", "ask_deadline_s"),
+    [({}, 7.0, 40.0), ({"timeout_s": 9.0, "ask_deadline_s": 50.0}, 9.0, 50.0)],
+)
+def test_the_times_allowed_are_those_of_the_log_or_of_the_call(
+    scripted_strategy, scripted_device, log, monkeypatch, overrides, timeout_s, ask_deadline_s
+):
+    times = {"timeout_s": 7.0, "ask_deadline_s": 40.0}
+    with pytest.raises(KeyboardInterrupt):
+        Session(scripted_device(), scripted_strategy(4), log=log, on_trial=stop_after(2), **times).run()
+    device, deadlines, timeouts = scripted_device(), [], []
+    session = resume(log, device, scripted_strategy(4), **overrides)
+    ask, deliver = session.strategy.ask, device.deliver
+    monkeypatch.setattr(session.strategy, "ask", lambda s=None: deadlines.append(s) or ask(s))
+    monkeypatch.setattr(device, "deliver", lambda stimulus, s: timeouts.append(s) or deliver(stimulus, s))
+    session.run()
+    assert (set(timeouts), set(deadlines)) == ({timeout_s}, {ask_deadline_s})
+
+
 def test_a_strategy_of_own_objects_must_be_handed_over(interrupted, scripted_device):
     with pytest.raises(StrategyError, match="own objects"):
         resume(interrupted, scripted_device())
@@ -167,18 +187,45 @@ def test_a_trial_is_excluded_once(interrupted):
         exclude(interrupted, 1, "sneezed")
 
 
-def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted, scripted_strategy, scripted_device):
-    whole = bytearray(interrupted.read_bytes())
+def lose_trial_1(log):
+    whole = bytearray(log.read_bytes())
     blocks = [at for at in range(len(whole)) if whole.startswith(b"\x04\x00\x00\x00zstd", at)]
     whole[blocks[5] + 40] ^= 0xFF  # header, then intent, trial, estimate of each trial: the trial of number 1
-    interrupted.write_bytes(whole)
-    assert [intent.trial for intent in read_session(interrupted).unknown] == [1]
+    log.write_bytes(whole)
+    assert [intent.trial for intent in read_session(log).unknown] == [1]
+
+
+def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted, scripted_strategy, scripted_device):
+    lose_trial_1(interrupted)
     result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
     assert result.trials[1].reason is MistrialReason.OUTCOME_UNKNOWN
     assert len(result.trials) == 10
     assert "fails its checksum" in read_session(interrupted).events[-1].text
     again = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
     assert again.trials == result.trials
+
+
+def test_a_log_with_a_lost_trial_goes_on_after_an_exclusion(interrupted, scripted_strategy, scripted_device):
+    lose_trial_1(interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        resume(interrupted, scripted_device(), scripted_strategy(10), on_trial=stop_after(6)).run()
+    exclude(interrupted, 2, "sneezed")
+    session = resume(interrupted, scripted_device(), scripted_strategy(10))
+    result = session.run()
+    assert [trial.index for trial in result.trials] == list(range(10))
+    assert [trial.index for trial in result.trials if not trial.told] == [1, 2]
+    assert len(session.strategy.posterior.told) == 8
+
+
+def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(scripted_strategy, scripted_device, log):
+    real, clock = scripted_device(simulated=False), VirtualClock()
+    with pytest.raises(KeyboardInterrupt):
+        Session(real, scripted_strategy(10), log=log, clock=clock, on_trial=stop_after(4)).run()
+    before = log.read_bytes()
+    with pytest.raises(DeviceError, match=r"run with a real device.*simulated=False"):
+        resume(log, scripted_device(), scripted_strategy(10))
+    assert log.read_bytes() == before
+    assert len(resume(log, real, scripted_strategy(10), clock=clock).run().trials) == 10
 
 
 def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted, scripted_strategy, scripted_device):

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import signal
@@ -8,6 +9,7 @@ import threading
 import numpy as np
 import pytest
 
+from isiw.asktell import Recipe
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError
@@ -86,6 +88,27 @@ def test_the_header_tells_how_to_make_the_session_again(scripted_strategy, scrip
     assert header.space == session.strategy.space
     assert header.device.name == "scripted"
     assert {"python", "torch"} <= set(header.versions)
+
+
+def session_with_detection_limits(device, strategy, log, *, device_mv, strategy_mv):
+    settings = {} if strategy_mv is None else {"detection_limit_mv": strategy_mv}
+    strategy.recipe = Recipe("", 0, settings)
+    device.info = dataclasses.replace(device.info, detection_limit_mv=device_mv)
+    return Session(device, strategy, log=log)
+
+
+def test_another_detection_limit_than_the_strategys_is_refused(scripted_strategy, scripted_device, log):
+    with pytest.raises(DeviceError, match=r"0.05 mV.*0.005 mV.*make_strategy\(..., detection_limit_mv=0.05\)"):
+        session_with_detection_limits(scripted_device(), scripted_strategy(), log, device_mv=0.05, strategy_mv=0.005)
+    assert not log.exists()
+
+
+@pytest.mark.parametrize(("device_mv", "strategy_mv"), [(0.05, 0.05), (None, 0.005), (0.05, None)])
+def test_the_same_or_an_unknown_detection_limit_is_accepted(
+    scripted_strategy, scripted_device, log, device_mv, strategy_mv
+):
+    limits = {"device_mv": device_mv, "strategy_mv": strategy_mv}
+    assert session_with_detection_limits(scripted_device(), scripted_strategy(2), log, **limits).run().decision.stop
 
 
 def test_the_raw_sweeps_are_logged(scripted_strategy, scripted_device, log):

@@ -120,9 +120,9 @@ def test_no_window_needs_a_probability(probability: float) -> None:
         NoWindow(probability)
 
 
-@pytest.mark.parametrize("max_trials", [0, -1])
-def test_a_budget_of_nothing_is_refused(max_trials: int) -> None:
-    with pytest.raises(InvalidValueError, match="at least 1"):
+@pytest.mark.parametrize("max_trials", [0, -1, math.nan, math.inf, 3.0, True])
+def test_a_budget_that_is_no_count_of_at_least_1_is_refused(max_trials: int) -> None:
+    with pytest.raises(InvalidValueError, match="whole number of at least 1"):
         Budget(max_trials)
 
 

@@ -24,6 +24,7 @@ _HOME = {
     "StopDecision": "stopping",
     "VALVE_SPACE": "design",
     "Window": "window",
+    "VirtualClock": "devices.clock",
     "WindowEstimate": "window",
     "Channel": "trials",
     "Measurement": "trials",

@@ -87,7 +87,7 @@ def plot(
     """Draw a session: profile, trials, window, and how they came."""
     with _errors_reported():
         record = isiw.read_session(log)
-        truth = isiw.config.true_window(record) if record.header.config else None
+        truth = isiw.config.true_window(record)
         _print(f"picture: {isiw.plots.save_session_plot(record, output, truth=truth)}")
         _exit_if_damaged(record.losses)
 

@@ -16,24 +16,24 @@ import datetime as dt
 import difflib
 import itertools
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, fields, is_dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from isiw.catalogue import StrategySettings, make_strategy
+from isiw.catalogue import StrategySettings, list_strategies, make_strategy
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
 from isiw.devices.recorded import RecordedDevice, load_recordings
 from isiw.devices.simulated import SimulatedDevice
-from isiw.errors import ConfigError
+from isiw.errors import ConfigError, InvalidValueError, IsiwError
 from isiw.log.reader import SessionRecord
 from isiw.session import Session, SessionUpdate
-from isiw.subjects import SimulatedSubject, cohort
+from isiw.subjects import COHORTS, SimulatedSubject, cohort
 from isiw.types import Reference
 from isiw.window import Window
 
@@ -51,6 +51,15 @@ __all__ = [
 SESSIONS = Path("isiw-sessions")
 """Where sessions are logged that were given no path."""
 
+RUN_KEY = "isiw_run"
+"""What `isiw run` keeps its configuration under in a log; lab software may keep there what it likes."""
+
+
+def _one_of(known: Iterable[str], name: str) -> str:
+    if name not in known:
+        raise InvalidValueError("the name is unknown", got=name, expected=f"one of {', '.join(known)}")
+    return name
+
 
 class _Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -64,6 +73,11 @@ class SubjectConfig(_Section):
     number: int = Field(default=0, ge=0)
     data: Path | None = None
 
+    @field_validator("cohort")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return _one_of(COHORTS, name)
+
 
 class SpaceConfig(_Section):
     """The design space, as in `isiw.DesignSpace`."""
@@ -74,12 +88,26 @@ class SpaceConfig(_Section):
     reference: Reference = "valve"
     tolerance_ms: float = 10.0
 
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        self.design()
+        return self
+
+    def design(self) -> DesignSpace:
+        """The design space."""
+        return DesignSpace(**self.model_dump())
+
 
 class StrategyConfig(_Section):
     """The strategy: a name from `isiw.list_strategies()` and its settings."""
 
     name: str = "default"
     settings: StrategySettings = StrategySettings()
+
+    @field_validator("name")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return _one_of(list_strategies(), name)
 
 
 class LimitsConfig(_Section):
@@ -153,16 +181,15 @@ def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
                 expected=f"one of {', '.join(known)}",
                 remedy=f"{guess}Correct it or remove it.",
             ) from error
+        own = first.get("ctx", {}).get("error")
+        what, remedy = f"{source}: the value of {key} cannot be used", "Correct it, or remove the key for its default."
+        if isinstance(own, IsiwError):
+            raise ConfigError(
+                f"{what}: {own.what}", got=own.got, expected=own.expected, remedy=own.remedy or remedy
+            ) from error
         raise ConfigError(
-            f"{source}: the value of {key} cannot be used",
-            got=first["input"],
-            expected=_expectation(first["msg"]),
-            remedy="Correct it, or remove the key to have its default.",
+            what, got=first["input"], expected=first["msg"].removeprefix("Input should be "), remedy=remedy
         ) from error
-
-
-def _expectation(message: str) -> str:
-    return message.removeprefix("Input should be ").removeprefix("Value error, ")
 
 
 def _known_keys(section: tuple[int | str, ...]) -> list[str]:
@@ -178,13 +205,13 @@ def config_of_log(record: SessionRecord) -> RunConfig:
     Raises:
         ConfigError: it was run by other software than `isiw run`.
     """
-    if not record.header.config:
+    if RUN_KEY not in record.header.config:
         raise ConfigError(
             "the session was not run by isiw run, so its device is not known here",
             got=record.header.device.name,
             remedy="Resume it from the software that ran it: isiw.resume(path, device).run()",
         )
-    return _validated(record.header.config, str(record.path))
+    return _validated(record.header.config[RUN_KEY], str(record.path))
 
 
 def fresh_log_path(config: RunConfig) -> Path:
@@ -201,11 +228,9 @@ def subject_for(config: RunConfig) -> SimulatedSubject:
 
 
 def true_window(record: SessionRecord) -> Window | None:
-    """The true window of the simulated person in a log; None where there is none.
-
-    Raises:
-        ConfigError: the person is not simulated.
-    """
+    """The true window of the person whom `isiw run` simulated; None where it, or such a person, does not exist."""
+    if RUN_KEY not in record.header.config:
+        return None
     return subject_for(config_of_log(record)).window(record.header.space)
 
 
@@ -231,7 +256,7 @@ def device_for(config: RunConfig) -> Device:
 
 def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:
     """The session that a configuration describes, ready to run."""
-    space = DesignSpace(**config.space.model_dump())
+    space = config.space.design()
     log = config.log or fresh_log_path(config)
     kept = config.model_dump(mode="json", exclude_none=True, exclude={"log"})
     if config.subject.data is not None:
@@ -243,5 +268,5 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         limits=Limits.of_space(space, **config.limits.model_dump()),
         on_trial=on_trial,
         subject=f"{config.subject.cohort}-{config.seed}-{config.subject.number}",
-        config=kept,
+        config={RUN_KEY: kept},
     )

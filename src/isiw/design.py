@@ -46,7 +46,9 @@ class DesignSpace:
                 "DesignSpace.reference is unknown", got=self.reference, expected='"impact" or "valve"'
             )
         if self.high_ms <= self.low_ms:
-            raise InvalidValueError("the design space is empty", got=(self.low_ms, self.high_ms), expected="low < high")
+            raise InvalidValueError(
+                "the design space is empty", got=(self.low_ms, self.high_ms), expected="low_ms < high_ms"
+            )
         if self.step_ms <= 0 or self.tolerance_ms < 0:
             raise InvalidValueError(
                 "step_ms must be positive and tolerance_ms not negative", got=(self.step_ms, self.tolerance_ms)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from isiw.catalogue import make_strategy
 from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, HasMemory
-from isiw.errors import InvalidValueError, StrategyError
+from isiw.errors import DeviceError, InvalidValueError, StrategyError
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Header
@@ -22,7 +23,7 @@ from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
 __all__ = ["Replayed", "exclude", "replay", "resume"]
 
 
-def resume(
+def resume(  # noqa: PLR0913 - all but three are keyword-only
     path: str | Path,
     device: Device,
     strategy: Strategy | None = None,
@@ -30,6 +31,8 @@ def resume(
     limits: Limits | None = None,
     clock: Clock | None = None,
     on_trial: Callable[[SessionUpdate], None] | None = None,
+    timeout_s: float | None = None,
+    ask_deadline_s: float | None = None,
     verify: bool = True,
 ) -> Session:
     """A session that goes on where a log ends. Nothing is delivered or written before its `run`.
@@ -43,16 +46,20 @@ def resume(
         limits: other limits than the logged ones.
         clock: as for `Session`.
         on_trial: as for `Session`.
+        timeout_s: another time for one delivery than the logged one [s].
+        ask_deadline_s: another time for one ask than the logged one [s].
         verify: whether the strategy must ask again what the log says it asked. With other versions or on another
             machine it may not; without verification the logged trials are told as they are.
 
     Raises:
         LogError: no such log, or one of which not even the header can be read.
         StrategyError: the strategy cannot be made again, or asks something else.
+        DeviceError: a simulated device for a session with a real one.
     """
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
     header = record.header
+    _require_as_real(device, header)
     replayed = replay(record, strategy.restarted() if strategy else _strategy_of(header), verify=verify)
     if isinstance(device, HasMemory):
         device.resume_after([Stimulus(trial.index, trial.commanded_isi_ms) for trial in replayed.trials])
@@ -66,6 +73,8 @@ def resume(
         subject=header.subject,
         signals=header.signals,
         config=header.config,
+        timeout_s=header.timeout_s if timeout_s is None else timeout_s,
+        ask_deadline_s=header.ask_deadline_s if ask_deadline_s is None else ask_deadline_s,
     )
     last = len(replayed.trials) - 1 if replayed.trials else None
     event = Event(kind="resume", trial=last, text=_resumption_text(record, replayed))
@@ -114,7 +123,8 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
             learn(strategy, entry)
             told.append(entry)
         elif isinstance(entry, Event) and entry.kind == "exclusion" and entry.trial is not None:
-            told = list(TrialTable(tuple(told)).excluding([entry.trial]))
+            # In the order of telling, in which a trial that was lost stands behind later ones.
+            told = [dataclasses.replace(t, excluded=True) if t.index == entry.trial else t for t in told]
             strategy = strategy.restarted()
             for trial in told:
                 learn(strategy, trial)
@@ -150,6 +160,19 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
         )
     with LogWriter.continuing(path, salvaged, record.header) as log:
         log.append(Event(kind="exclusion", trial=trial, text=reason))
+
+
+def _require_as_real(device: Device, header: Header) -> None:
+    """Raise where the session would go on without waiting, or with answers from nobody."""
+    info = device.describe()
+    if info.simulated and not header.device.simulated:
+        raise DeviceError(
+            "the session was run with a real device, and cannot go on with a simulated one",
+            got=info.name,
+            expected=f"a real one, as {header.device.name} was",
+            remedy="Describe the device with DeviceInfo(..., simulated=False), which makes the session wait between "
+            "trials in real time.",
+        )
 
 
 def _strategy_of(header: Header) -> Strategy:

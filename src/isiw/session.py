@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import datetime as dt
 import importlib.metadata
+import math
 import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -20,7 +21,7 @@ from isiw.asktell import Strategy
 from isiw.design import DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
-from isiw.devices.protocol import Answer, Device
+from isiw.devices.protocol import Answer, Device, DeviceInfo
 from isiw.errors import DeviceError, LimitExceededError
 from isiw.interrupts import DeferredInterrupts
 from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform
@@ -79,6 +80,25 @@ def learn(strategy: Strategy, trial: Trial) -> None:
         strategy.count_mistrial()
 
 
+def _require_matching(info: DeviceInfo, strategy: Strategy) -> None:
+    """Raise where the strategy would take the device's answers for something else."""
+    if info.reference != strategy.space.reference:
+        raise DeviceError(
+            "the device and the design space count ISIs from different events",
+            got=info.reference,
+            expected=strategy.space.reference,
+            remedy="Give the DesignSpace the device's reference.",
+        )
+    limit_mv, assumed_mv = info.detection_limit_mv, strategy.recipe.settings.get("detection_limit_mv")
+    if limit_mv is not None and assumed_mv is not None and not math.isclose(limit_mv, assumed_mv):
+        raise DeviceError(
+            "the device and the strategy have different detection limits, so an MEP of 0 would be misunderstood",
+            got=f"{limit_mv:g} mV from the device",
+            expected=f"{assumed_mv:g} mV, as the strategy assumes",
+            remedy=f"Make the strategy with the device's: make_strategy(..., detection_limit_mv={limit_mv:g}).",
+        )
+
+
 class Session:
     """One person's session, from the first ask to the decision.
 
@@ -96,7 +116,8 @@ class Session:
         ask_deadline_s: how long the strategy may take for one ask [s]; past it, it falls back, and the log says so.
 
     Raises:
-        DeviceError: the device counts its ISIs from another event than the space.
+        DeviceError: the device counts its ISIs from another event than the space, or states another detection limit
+            than the strategy's.
     """
 
     def __init__(  # noqa: PLR0913 - the public surface of the design; all but two are keyword-only
@@ -115,13 +136,7 @@ class Session:
         ask_deadline_s: float | None = None,
     ) -> None:
         space, info = strategy.space, device.describe()
-        if info.reference != space.reference:
-            raise DeviceError(
-                "the device and the design space count ISIs from different events",
-                got=info.reference,
-                expected=space.reference,
-                remedy="Give the DesignSpace the device's reference.",
-            )
+        _require_matching(info, strategy)
         self.strategy = strategy
         self.trials = TrialTable()
         self.log_path = Path(log)
@@ -141,6 +156,8 @@ class Session:
             limits=self._limits,
             device=info,
             signals=self._signals,
+            timeout_s=timeout_s,
+            ask_deadline_s=ask_deadline_s,
             versions={"python": platform.python_version()} | {p: importlib.metadata.version(p) for p in _PACKAGES},
             config=dict(config or {}),
         )

@@ -47,13 +47,21 @@ class StoppingRule(Protocol):
 
 @dataclass(frozen=True)
 class Budget:
-    """Stop when `max_trials` stimuli have been delivered; mistrials count."""
+    """Stop when `max_trials` stimuli have been delivered; mistrials count.
+
+    Args:
+        max_trials: how many stimuli.
+
+    Raises:
+        InvalidValueError: not a whole number of at least 1.
+    """
 
     max_trials: int
 
     def __post_init__(self) -> None:
-        if self.max_trials < 1:
-            raise InvalidValueError("max_trials must be at least 1", got=self.max_trials)
+        # A NaN compares as false with any count, and so would never stop.
+        if isinstance(self.max_trials, bool) or not isinstance(self.max_trials, int) or self.max_trials < 1:
+            raise InvalidValueError("max_trials must be a whole number of at least 1", got=self.max_trials)
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""

@@ -134,6 +134,10 @@ def test_a_device_that_fails_to_stage_stays_disarmed(inner, clock):
         {"min_iti_s": -1},
         {"min_iti_s": math.nan},
         {"max_pulses": 0},
+        {"max_pulses": math.nan},
+        {"max_pulses": math.inf},
+        {"max_pulses": 3.0},
+        {"max_pulses": True},
     ],
 )
 def test_limits_that_limit_nothing_are_refused(values):

@@ -37,6 +37,13 @@ def test_a_waveform_survives_with_what_is_not_finite():
     assert (again.rate_hz, again.unit, again.t0_ms) == (3000.0, "mV", -50.0)
 
 
+def test_a_header_from_before_the_times_allowed_were_logged_can_be_read(header):
+    written = json.loads(encode("/header", header))
+    assert written.pop("timeout_s") == 30.0
+    assert written.pop("ask_deadline_s") is None
+    assert decode("/header", json.dumps(written).encode()) == header
+
+
 def test_what_is_not_finite_is_written_as_a_string():
     written = json.loads(encode("/estimate", Estimate(trial=0, probability=0.9, end_ms=math.inf)))
     assert written["end_ms"] == "Infinity"

@@ -25,7 +25,7 @@ class Limits:
         max_pulses: largest number of deliveries in a session, failed ones included.
 
     Raises:
-        InvalidValueError: values that are not finite or limit nothing.
+        InvalidValueError: values that are not finite or limit nothing, or a number of pulses that is not whole.
     """
 
     low_ms: float
@@ -38,8 +38,9 @@ class Limits:
             raise InvalidValueError("the limits of the ISI must be finite and ascend", got=(self.low_ms, self.high_ms))
         if not (math.isfinite(self.min_iti_s) and self.min_iti_s >= 0):
             raise InvalidValueError("min_iti_s must be finite and not negative", got=self.min_iti_s)
-        if self.max_pulses < 1:
-            raise InvalidValueError("max_pulses must be at least 1", got=self.max_pulses)
+        # A NaN compares as false with any count, and so would limit nothing.
+        if isinstance(self.max_pulses, bool) or not isinstance(self.max_pulses, int) or self.max_pulses < 1:
+            raise InvalidValueError("max_pulses must be a whole number of at least 1", got=self.max_pulses)
 
     @classmethod
     def of_space(cls, space: DesignSpace, *, min_iti_s: float = 5.0, max_pulses: int = 200) -> Limits:

@@ -86,6 +86,8 @@ class Header(_Record):
     limits: Limits
     device: DeviceInfo
     signals: SignalLimits
+    timeout_s: float = 30.0
+    ask_deadline_s: float | None = None
     versions: dict[str, str] = Field(default_factory=dict)
     config: dict[str, Any] = Field(default_factory=dict)
 
