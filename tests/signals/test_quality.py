@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
+from isiw.devices.presets import preset
+from isiw.devices.tapper import Tapper
 from isiw.errors import InvalidValueError
 from isiw.signals import SignalLimits, is_saturated, judge
 from isiw.trials import Channel, MistrialReason, Status, Stimulus, Sweep
@@ -149,13 +151,43 @@ def test_an_impact_that_the_device_only_predicts_carries_its_uncertainty(sweep_o
 
 
 def test_the_artefact_of_the_tap_counts_neither_as_background_nor_as_mep(sweep_of):
-    for isi_ms in (5.0, 40.0, 100.0):
+    for isi_ms in (11.0, 40.0, 100.0):
         emg = 0.002 * np.random.default_rng(5).standard_normal(5000)
         emg[3500:3530] += 0.5  # 20 ms after the impact
         judged = judge(with_channel(sweep_of(t_tms_ms=680.0 + isi_ms), "emg", emg), Stimulus(0, isi_ms), IMPACT)
         assert judged.reason is None
         assert judged.mep_mv < 0.02
         assert judged.background_rms_uv == pytest.approx(2.0, rel=0.2)
+
+
+class Evoked:
+    def __init__(self, mep_mv):
+        self.mep_mv = mep_mv
+
+
+def told_mv(isi_ms, evoked_mv, artefact_mv, name="subject1"):
+    geometry = replace(preset(name), artefact_mv=artefact_mv)
+    robot = Tapper(lambda _: Evoked(evoked_mv), geometry, seed=3)
+    robot.stage()
+    stimuli = [Stimulus(trial, float(isi_ms)) for trial in range(8)]
+    judged = [judge(robot.deliver(stimulus, 1.0), stimulus, IMPACT) for stimulus in stimuli]
+    return np.array([one.mep_mv for one in judged if one.reason is None])
+
+
+@pytest.mark.parametrize("isi_ms", range(16))
+def test_the_mep_is_never_taken_for_the_artefact_of_the_tap(isi_ms):
+    np.testing.assert_allclose(told_mv(isi_ms, 0.2, 0.0), 0.2, atol=0.01)
+
+
+@pytest.mark.parametrize("isi_ms", range(16))
+@pytest.mark.parametrize("name", ["subject1", "subject2"])
+def test_an_artefact_in_the_mep_changes_the_amplitude_by_less_than_itself(isi_ms, name):
+    np.testing.assert_allclose(told_mv(isi_ms, 0.2, 0.1, name), 0.2, atol=0.04)
+
+
+def test_an_artefact_that_begins_when_a_mep_could_is_told_as_one():
+    assert told_mv(0, 0.0, 0.1, "subject2").max() == pytest.approx(0.08, abs=0.02)
+    assert told_mv(25, 0.0, 0.1, "subject2").max() < 0.02
 
 
 def test_a_short_sweep_that_begins_after_the_valve_command_is_judged_by_what_there_is():

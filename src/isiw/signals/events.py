@@ -13,6 +13,7 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.signals.impact import HYSTERESIS_SD, VALVE_MS, impact_times
+from isiw.signals.mep import EARLIEST_ONSET_MS
 from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, per_waveform, rest_level
 from isiw.trials import Channel, Sweep
 from isiw.types import ArrayLike, FloatArray
@@ -22,6 +23,7 @@ __all__ = ["TapEvents", "detect_events", "sweep_events", "tap_artefact_times"]
 ONSET_SD = 3.0
 ARTEFACT_SEARCH_MS = (12.0, 30.0)  # four people: 18 to 23 ms after the impact, SD below 2 (Table 3.2)
 PULSE_SPAN_MS = (-1.0, 2.0)
+LATEST_MEP_MS = 50.0  # after the pulse, in hand muscles
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,12 +162,15 @@ def tap_artefact_times(
 ) -> FloatArray:
     """When the tap shows in the EMG [ms from the first sample], NaN where it does not, shape (n,).
 
+    What begins 10 to 50 ms after the pulse may be the MEP and is never taken for the tap.
+
     Args:
         emg: shape (n, w).
         rate_hz: sampling rate [Hz].
         hit_ms: the impacts [ms from the first sample], shape (n,), NaN where there is none.
         valve_ms: the valve command [ms from the first sample]; the EMG is at rest before it.
-        t_tms_ms: the magnetic pulse [ms from the first sample], shape (n,), whose own artefact is passed over.
+        t_tms_ms: the magnetic pulse [ms from the first sample], shape (n,); its own artefact and its MEP are passed
+            over.
     """
     waves = as_waveforms(emg, rate_hz, "EMG")
     level, noise = rest_level(waves, round(valve_ms * rate_hz / 1000), rate_hz)
@@ -175,5 +180,6 @@ def tap_artefact_times(
     deviation[(since_pulse >= PULSE_SPAN_MS[0]) & (since_pulse <= PULSE_SPAN_MS[1])] = 0.0
     since_hit = times - per_waveform(hit_ms, waves)[:, None]
     sought = (since_hit >= ARTEFACT_SEARCH_MS[0]) & (since_hit <= ARTEFACT_SEARCH_MS[1])
+    sought &= ~((since_pulse >= EARLIEST_ONSET_MS) & (since_pulse <= LATEST_MEP_MS))
     shown = first_true(sought & (deviation > HYSTERESIS_SD * noise))
     return crossing_before(deviation, ONSET_SD * noise, shown) * 1000 / rate_hz

@@ -49,8 +49,9 @@ class SignalLimits:
         full_scale_mv: the largest EMG that the amplifier can show [mV]; None to look for flat tops only.
         isi_tolerance_ms: how far the realised ISI may be from the commanded one [ms], where that is less than the
             space's tolerance.
-        tap_artefact_ms: how long the artefact of the tap lasts in the EMG [ms]; what it covers of the MEP window does
-            not count.
+        tap_artefact_ms: how long the artefact of the tap lasts in the EMG [ms]. Where it begins before a MEP can, what
+            it covers of the MEP window does not count; where it begins later, the two cannot be told apart, and the
+            whole window counts.
 
     Raises:
         InvalidValueError: a limit that is not positive, or an empty window.
