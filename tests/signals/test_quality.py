@@ -9,8 +9,8 @@ from isiw.design import DesignSpace
 from isiw.devices.presets import preset
 from isiw.devices.tapper import Tapper
 from isiw.errors import InvalidValueError
-from isiw.signals import SignalLimits, is_saturated, judge
-from isiw.trials import Channel, MistrialReason, Status, Stimulus, Sweep
+from isiw.signals import SignalLimits, is_saturated, judge, judge_measurement
+from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
 
 IMPACT = DesignSpace(0, 320, reference="impact")
 VALVE = DesignSpace(0, 500, reference="valve")
@@ -214,3 +214,20 @@ def test_a_sweep_with_too_little_rest_is_a_missing_channel():
 def test_limits_that_cannot_be_are_errors(wrong):
     with pytest.raises(InvalidValueError, match="SignalLimits"):
         SignalLimits(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("isi_ms", "commanded_ms", "space", "limits", "reason"),
+    [
+        (-3.0, 5.0, IMPACT, None, MistrialReason.TMS_BEFORE_IMPACT),
+        (-3.0, 5.0, VALVE, None, None),
+        (105.0, 100.0, IMPACT, None, None),
+        (105.0, 100.0, IMPACT, SignalLimits(isi_tolerance_ms=2.0), MistrialReason.ISI_OFF),
+        (None, None, IMPACT, None, None),
+    ],
+)
+def test_a_measurement_is_judged_by_the_rules_of_a_sweep(isi_ms, commanded_ms, space, limits, reason):
+    judged = judge_measurement(Measurement(0.1, isi_ms), Stimulus(0, commanded_ms), space, limits)
+    assert judged.reason is reason
+    assert judged.isi_ms == isi_ms
+    assert (judged.status, judged.mep_mv) == ((Status.ACCEPTED, 0.1) if reason is None else (Status.MISTRIAL, None))
