@@ -5,8 +5,8 @@
 
 The same people of the `recruitment` cohort are examined twice by the default strategy, with the same seeds: once by a
 device that reports the amplitude itself, and once by the simulated tapping robot, with waveforms. Both are judged by
-the same rules. Paired, for both trigger modes. Each session ends when the strategy says so. The robot's hit delay and its variation are the
-person's.
+the same rules. Paired, for both trigger modes. Each session ends when the strategy says so. The robot's hit delay and
+its variation are the person's.
 """
 
 from __future__ import annotations

@@ -17,7 +17,6 @@ from typing import Any
 
 import isiw
 from isiw.asktell import Strategy
-from isiw.design import DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
 from isiw.devices.protocol import Answer, Device
