@@ -14,7 +14,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.signals.impact import HYSTERESIS_SD, VALVE_MS, impact_times
 from isiw.signals.mep import EARLIEST_ONSET_MS
-from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, per_waveform, rest_level
+from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, is_recording, per_waveform, rest_level
 from isiw.trials import Channel, Sweep
 from isiw.types import ArrayLike, FloatArray
 
@@ -89,11 +89,13 @@ def detect_events(
 def sweep_events(sweep: Sweep) -> TapEvents:
     """Find the events of one recorded tap, in ms of the sweep's own clock.
 
+    A channel that is empty, constant or not finite shows no event; without a usable acceleration there is none at all.
+
     Args:
         sweep: with an acceleration and the valve's time; pressure and EMG where they have the same samples.
 
     Raises:
-        InvalidValueError: no acceleration, no valve time, or a waveform that is no recording.
+        InvalidValueError: no acceleration, no valve time, or too low a sampling rate.
     """
     channel = sweep.channels.get("acceleration")
     if channel is None or sweep.t_valve_ms is None:
@@ -102,6 +104,8 @@ def sweep_events(sweep: Sweep) -> TapEvents:
             got=sorted(sweep.channels),
             expected="a channel named acceleration, and t_valve_ms",
         )
+    if not is_recording(channel.values):
+        return TapEvents(*(np.full(1, math.nan) for _ in fields(TapEvents)))
     pressure, emg = (_same_samples(sweep.channels.get(name), channel) for name in ("pressure", "emg"))
     found = detect_events(
         channel.values,
@@ -115,10 +119,10 @@ def sweep_events(sweep: Sweep) -> TapEvents:
 
 
 def _same_samples(channel: Channel | None, other: Channel) -> FloatArray | None:
-    """The samples of a channel, where it was recorded at the same times as another."""
+    """The samples of a channel, where it was recorded, and at the same times as another."""
     if channel is None or (channel.rate_hz, channel.t0_ms) != (other.rate_hz, other.t0_ms):
         return None
-    return channel.values if channel.values.shape == other.values.shape else None
+    return channel.values if channel.values.shape == other.values.shape and is_recording(channel.values) else None
 
 
 def _like(values: ArrayLike, waves: FloatArray, rate_hz: float, name: str) -> FloatArray:

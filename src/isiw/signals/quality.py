@@ -25,6 +25,7 @@ from isiw.signals.mep import (
     background_rms,
     mep_amplitudes,
 )
+from isiw.signals.waveforms import is_recording
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
 from isiw.types import ArrayLike, BoolArray, FloatArray
 
@@ -250,11 +251,7 @@ def _impact(sweep: Sweep) -> tuple[float | None, MistrialReason | None]:
 
 
 def _usable(sweep: Sweep, name: str) -> bool:
-    """Whether a channel was recorded at all: samples, all finite, and not a flat line."""
-    if name not in sweep.channels:
-        return False
-    values = sweep.channels[name].values
-    return bool(values.size and np.isfinite(values).all() and values.min() < values.max())
+    return name in sweep.channels and is_recording(sweep.channels[name].values)
 
 
 def _of_one_length(sweep: Sweep) -> bool:
