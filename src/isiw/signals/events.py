@@ -22,6 +22,7 @@ __all__ = ["TapEvents", "detect_events", "sweep_events", "tap_artefact_times"]
 
 ONSET_SD = 3.0
 ARTEFACT_SEARCH_MS = (12.0, 30.0)  # four people: 18 to 23 ms after the impact, SD below 2 (Table 3.2)
+USUAL_ARTEFACT_MS = (12.0, 24.0)
 PULSE_SPAN_MS = (-1.0, 2.0)
 LATEST_MEP_MS = 50.0  # after the pulse, in hand muscles
 
@@ -163,18 +164,19 @@ def tap_artefact_times(
     *,
     valve_ms: float = VALVE_MS,
     t_tms_ms: ArrayLike | None = None,
+    even_as_mep: bool = False,
 ) -> FloatArray:
     """When the tap shows in the EMG [ms from the first sample], NaN where it does not, shape (n,).
 
-    What begins 10 to 50 ms after the pulse may be the MEP and is never taken for the tap.
+    What begins 10 to 50 ms after the pulse may be the MEP and is not taken for the tap, unless asked for.
 
     Args:
         emg: shape (n, w).
         rate_hz: sampling rate [Hz].
         hit_ms: the impacts [ms from the first sample], shape (n,), NaN where there is none.
         valve_ms: the valve command [ms from the first sample]; the EMG is at rest before it.
-        t_tms_ms: the magnetic pulse [ms from the first sample], shape (n,); its own artefact and its MEP are passed
-            over.
+        t_tms_ms: the magnetic pulse [ms from the first sample], shape (n,), whose own artefact is passed over.
+        even_as_mep: take what begins at the tap's usual time for the tap, even where it may be the MEP.
     """
     waves = as_waveforms(emg, rate_hz, "EMG")
     level, noise = rest_level(waves, round(valve_ms * rate_hz / 1000), rate_hz)
@@ -183,7 +185,9 @@ def tap_artefact_times(
     since_pulse = times - per_waveform(t_tms_ms, waves)[:, None]
     deviation[(since_pulse >= PULSE_SPAN_MS[0]) & (since_pulse <= PULSE_SPAN_MS[1])] = 0.0
     since_hit = times - per_waveform(hit_ms, waves)[:, None]
-    sought = (since_hit >= ARTEFACT_SEARCH_MS[0]) & (since_hit <= ARTEFACT_SEARCH_MS[1])
-    sought &= ~((since_pulse >= EARLIEST_ONSET_MS) & (since_pulse <= LATEST_MEP_MS))
+    first_ms, last_ms = USUAL_ARTEFACT_MS if even_as_mep else ARTEFACT_SEARCH_MS
+    sought = (since_hit >= first_ms) & (since_hit <= last_ms)
+    if not even_as_mep:
+        sought &= ~((since_pulse >= EARLIEST_ONSET_MS) & (since_pulse <= LATEST_MEP_MS))
     shown = first_true(sought & (deviation > HYSTERESIS_SD * noise))
     return crossing_before(deviation, ONSET_SD * noise, shown) * 1000 / rate_hz

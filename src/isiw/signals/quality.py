@@ -50,9 +50,8 @@ class SignalLimits:
         full_scale_mv: the largest EMG that the amplifier can show [mV]; None to look for flat tops only.
         isi_tolerance_ms: how far the realised ISI may be from the commanded one [ms], where that is less than the
             space's tolerance.
-        tap_artefact_ms: how long the artefact of the tap lasts in the EMG [ms]. Where it begins before a MEP can, what
-            it covers of the MEP window does not count; where it begins later, the two cannot be told apart, and the
-            whole window counts.
+        tap_artefact_ms: how long the artefact of the tap lasts in the EMG [ms]; what it covers of the MEP window does
+            not count.
 
     Raises:
         InvalidValueError: a limit that is not positive, or an empty window.
@@ -298,6 +297,11 @@ def _mep_mv(emg_mv: FloatArray, emg: Channel, timed: Judged, limits: SignalLimit
     shown = np.array([math.nan])
     if timed.t_hit_ms is not None and timed.t_valve_ms is not None:
         hit, valve = _on_channel(timed.t_hit_ms, emg), _on_channel(timed.t_valve_ms, emg)
-        shown = tap_artefact_times(emg_mv, emg.rate_hz, hit, valve_ms=valve, t_tms_ms=pulse)
+        # A silent trial must not be told the tap's amplitude: where the two coincide, too small is the lesser evil.
+        shown, coinciding = (
+            tap_artefact_times(emg_mv, emg.rate_hz, hit, valve_ms=valve, t_tms_ms=pulse, even_as_mep=even_as_mep)
+            for even_as_mep in (False, True)
+        )
+        shown = np.where(np.isnan(shown), coinciding, shown)
     blank = (shown, shown + limits.tap_artefact_ms)
     return float(mep_amplitudes(emg_mv, emg.rate_hz, pulse, limits.mep_window_ms, blank_ms=blank)[0])
