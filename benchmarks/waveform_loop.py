@@ -4,9 +4,9 @@
     python benchmarks/waveform_loop.py --reference valve > benchmarks/results/waveform_loop_valve.txt
 
 The same people of the `recruitment` cohort are examined twice by the default strategy, with the same seeds: once by a
-device that reports the amplitude itself, and once by the simulated tapping robot, whose waveforms are judged. Paired,
-for both trigger modes. Each session ends when the strategy says so. The robot's hit delay and its variation are the
-person's.
+device that reports the amplitude itself, and once by the simulated tapping robot, with waveforms. Both are judged by
+the same rules. Paired, for both trigger modes. Each session ends when the strategy says so. The robot's hit delay and
+its variation are the person's.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ def examine(
             break
         stimulus = isiw.Stimulus(trial, strategy.ask())
         answer = deliver(stimulus)
-        judged = isiw.signals.judge(answer, stimulus, space) if isinstance(answer, isiw.Sweep) else None
-        if judged is not None and judged.reason is not None:
+        judge = isiw.signals.judge if isinstance(answer, isiw.Sweep) else isiw.signals.judge_measurement
+        judged = judge(answer, stimulus, space)
+        if judged.reason is not None:
             outcomes[judged.reason.value] += 1
             strategy.count_mistrial()
         else:
             outcomes["accepted"] += 1
-            told = judged or answer
-            strategy.tell(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
+            strategy.tell(judged.isi_ms, judged.mep_mv, isi_sd_ms=judged.isi_sd_ms)
     return strategy.estimate(), outcomes
 
 

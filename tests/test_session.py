@@ -16,6 +16,7 @@ from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogE
 from isiw.log.reader import read_session
 from isiw.log.schema import Estimate, Intent
 from isiw.session import Session
+from isiw.signals import SignalLimits
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Sweep, Trial
 
 
@@ -248,7 +249,14 @@ def test_an_active_muscle_is_a_mistrial(scripted_strategy, scripted_device, log)
     device = scripted_device(lambda stimulus: Measurement(0.1, stimulus.isi_ms, background_rms_uv=10.5))
     result = Session(device, scripted_strategy(3), log=log).run()
     assert {trial.reason for trial in result.trials} == {MistrialReason.BACKGROUND_ACTIVITY}
+    assert {trial.mep_mv for trial in result.trials} == {None}
     assert result.decision.reason == "The budget of 3 stimuli is used up."
+
+
+def test_a_device_that_measures_keeps_the_sessions_limits(scripted_strategy, scripted_device, log):
+    device = scripted_device(lambda stimulus: Measurement(0.1, stimulus.isi_ms + 3.0))
+    result = Session(device, scripted_strategy(2), log=log, signals=SignalLimits(isi_tolerance_ms=2.0)).run()
+    assert {trial.reason for trial in result.trials} == {MistrialReason.ISI_OFF}
 
 
 def test_an_error_of_the_observer_ends_the_session_with_an_intact_log(scripted_strategy, scripted_device, log):

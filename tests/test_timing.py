@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -118,7 +120,32 @@ def test_a_logged_session_is_studied_like_a_preset(tmp_path, scripted_strategy):
     assert len(study.commanded_ms) == 12
     logged = [trial.t_hit_ms for trial in result.trials]
     np.testing.assert_allclose(study.events.hit_ms, logged, atol=0.01)
-    assert study.event_table.loc["memg", "n"] == 12
+    apart = [trial.isi_ms > 14 for trial in result.trials]  # sooner, the tap shows when the MEP does
+    assert 0 < sum(apart) < 12
+    assert study.event_table.loc["memg", "n"] == sum(apart)
+
+
+@pytest.mark.parametrize("fault", [0.0, np.nan])
+@pytest.mark.parametrize("name", ["acceleration", "emg"])
+def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path, scripted_strategy, name, fault):
+    class Silent:
+        mep_mv = 0.0
+
+    class Faulty(Tapper):
+        def deliver(self, stimulus, timeout_s):
+            sweep = super().deliver(stimulus, timeout_s)
+            if stimulus.trial != 1:
+                return sweep
+            dead = replace(sweep.channels[name], values=np.full_like(sweep.channels[name].values, fault))
+            return replace(sweep, channels={**sweep.channels, name: dead})
+
+    strategy = scripted_strategy(max_trials=4, space=DesignSpace(20, 200, reference="impact"))
+    result = Session(Faulty(lambda _: Silent(), "subject4"), strategy, log=tmp_path / "taps.mcap").run()
+    study = study_session(read_session(result.log))
+    event = "hit" if name == "acceleration" else "memg"
+    assert np.isnan(study.events.columns()[event]).tolist() == [False, True, False, False]
+    assert study.mistrials == (1 if name == "acceleration" else 0)
+    assert "4 taps" in timing_report(study)
 
 
 def test_the_report_says_all_of_it():

@@ -18,7 +18,6 @@ from typing import Any
 
 import isiw
 from isiw.asktell import Strategy
-from isiw.design import DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo
@@ -26,7 +25,7 @@ from isiw.errors import DeviceError, LimitExceededError
 from isiw.interrupts import DeferredInterrupts
 from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform
 from isiw.log.writer import LogWriter
-from isiw.signals.quality import Judged, SignalLimits, judge
+from isiw.signals.quality import SignalLimits, judge, judge_measurement
 from isiw.stopping import StopDecision, stimuli_left
 from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Sweep, Trial, TrialTable
 from isiw.window import WindowEstimate
@@ -288,7 +287,7 @@ class Session:
         if isinstance(answer, Sweep):
             judged = judge(answer, stimulus, space, self._signals)
         elif isinstance(answer, Measurement):
-            judged = _judge_measurement(answer, stimulus, space, self._signals)
+            judged = judge_measurement(answer, stimulus, space, self._signals)
         else:
             raise DeviceError("the device's answer is no answer", got=answer, expected="a Sweep or a Measurement")
         return Trial(index=stimulus.trial, commanded_isi_ms=stimulus.isi_ms, **dataclasses.asdict(judged))
@@ -296,20 +295,3 @@ class Session:
 
 def _unknown(stimulus: Stimulus) -> Trial:
     return Trial(stimulus.trial, Status.MISTRIAL, stimulus.isi_ms, MistrialReason.OUTCOME_UNKNOWN)
-
-
-def _judge_measurement(answer: Measurement, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Judged:
-    """What `judge` says of a sweep, for a device that measured the MEP itself."""
-    if (answer.isi_ms is None) != (stimulus.isi_ms is None):
-        raise DeviceError(
-            "the device reports another kind of trial than it was told to deliver",
-            got=f"a realised ISI of {answer.isi_ms}",
-            expected=f"one for the commanded ISI of {stimulus.isi_ms}",
-        )
-    reason = None
-    if (answer.background_rms_uv or 0.0) > limits.background_uv:
-        reason = MistrialReason.BACKGROUND_ACTIVITY
-    if answer.isi_ms is not None and stimulus.isi_ms is not None:
-        off = abs(answer.isi_ms - stimulus.isi_ms) > space.tolerance_ms
-        reason = MistrialReason.ISI_OFF if off else reason
-    return Judged(Status.MISTRIAL if reason else Status.ACCEPTED, reason, **dataclasses.asdict(answer))

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
+from isiw.devices.presets import preset
+from isiw.devices.tapper import Tapper
 from isiw.errors import InvalidValueError
-from isiw.signals import SignalLimits, is_saturated, judge
-from isiw.trials import Channel, MistrialReason, Status, Stimulus, Sweep
+from isiw.signals import SignalLimits, is_saturated, judge, judge_measurement
+from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
 
 IMPACT = DesignSpace(0, 320, reference="impact")
 VALVE = DesignSpace(0, 500, reference="valve")
@@ -158,6 +160,42 @@ def test_the_artefact_of_the_tap_counts_neither_as_background_nor_as_mep(sweep_o
         assert judged.background_rms_uv == pytest.approx(2.0, rel=0.2)
 
 
+class Evoked:
+    def __init__(self, mep_mv):
+        self.mep_mv = mep_mv
+
+
+def told_mv(isi_ms, evoked_mv, artefact_mv, name="subject1"):
+    geometry = replace(preset(name), artefact_mv=artefact_mv)
+    robot = Tapper(lambda _: Evoked(evoked_mv), geometry, seed=3)
+    robot.stage()
+    stimuli = [Stimulus(trial, float(isi_ms)) for trial in range(8)]
+    judged = [judge(robot.deliver(stimulus, 1.0), stimulus, IMPACT) for stimulus in stimuli]
+    return np.array([one.mep_mv for one in judged if one.reason is None])
+
+
+@pytest.mark.parametrize("artefact_mv", [0.0, 0.1])
+@pytest.mark.parametrize("name", ["subject1", "subject2"])
+@pytest.mark.parametrize("isi_ms", [11, 12, 13, 14, 15, 20])
+def test_from_11_ms_on_the_tap_changes_no_amplitude(isi_ms, name, artefact_mv):
+    np.testing.assert_allclose(told_mv(isi_ms, 0.2, artefact_mv, name), 0.2, atol=0.01)
+
+
+@pytest.mark.parametrize("artefact_mv", [0.0, 0.1])
+@pytest.mark.parametrize("name", ["subject1", "subject2"])
+@pytest.mark.parametrize("isi_ms", [0, 3, 6, 9])
+def test_where_tap_and_mep_coincide_at_least_half_of_the_mep_is_told(isi_ms, name, artefact_mv):
+    told = told_mv(isi_ms, 0.2, artefact_mv, name)
+    assert told.min() > 0.1
+    assert told.max() < 0.21
+
+
+@pytest.mark.parametrize("name", ["subject1", "subject2"])
+@pytest.mark.parametrize("isi_ms", [0, 3, 6, 9, 12, 15])
+def test_the_tap_of_a_silent_trial_is_never_told_as_a_mep(isi_ms, name):
+    assert told_mv(isi_ms, 0.0, 0.1, name).max() < 0.01
+
+
 def test_a_short_sweep_that_begins_after_the_valve_command_is_judged_by_what_there_is():
     rng = np.random.default_rng(3)
     emg = Channel(2.0 * rng.standard_normal(450), 3000.0, "uV", t0_ms=-50.0)
@@ -182,3 +220,20 @@ def test_a_sweep_with_too_little_rest_is_a_missing_channel():
 def test_limits_that_cannot_be_are_errors(wrong):
     with pytest.raises(InvalidValueError, match="SignalLimits"):
         SignalLimits(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("isi_ms", "commanded_ms", "space", "limits", "reason"),
+    [
+        (-3.0, 5.0, IMPACT, None, MistrialReason.TMS_BEFORE_IMPACT),
+        (-3.0, 5.0, VALVE, None, None),
+        (105.0, 100.0, IMPACT, None, None),
+        (105.0, 100.0, IMPACT, SignalLimits(isi_tolerance_ms=2.0), MistrialReason.ISI_OFF),
+        (None, None, IMPACT, None, None),
+    ],
+)
+def test_a_measurement_is_judged_by_the_rules_of_a_sweep(isi_ms, commanded_ms, space, limits, reason):
+    judged = judge_measurement(Measurement(0.1, isi_ms), Stimulus(0, commanded_ms), space, limits)
+    assert judged.reason is reason
+    assert judged.isi_ms == isi_ms
+    assert (judged.status, judged.mep_mv) == ((Status.ACCEPTED, 0.1) if reason is None else (Status.MISTRIAL, None))

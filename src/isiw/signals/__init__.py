@@ -11,7 +11,7 @@ from isiw.signals.mep import (
     mep_onsets,
     mep_present,
 )
-from isiw.signals.quality import Judged, SignalLimits, is_saturated, judge
+from isiw.signals.quality import Judged, SignalLimits, is_saturated, judge, judge_measurement
 
 __all__ = [
     "MEP_WINDOWS_MS",
@@ -24,6 +24,7 @@ __all__ = [
     "impact_times",
     "is_saturated",
     "judge",
+    "judge_measurement",
     "mep_amplitude",
     "mep_amplitudes",
     "mep_onset",

@@ -13,7 +13,8 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.signals.impact import HYSTERESIS_SD, VALVE_MS, impact_times
-from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, per_waveform, rest_level
+from isiw.signals.mep import EARLIEST_ONSET_MS
+from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, is_recording, per_waveform, rest_level
 from isiw.trials import Channel, Sweep
 from isiw.types import ArrayLike, FloatArray
 
@@ -21,7 +22,9 @@ __all__ = ["TapEvents", "detect_events", "sweep_events", "tap_artefact_times"]
 
 ONSET_SD = 3.0
 ARTEFACT_SEARCH_MS = (12.0, 30.0)  # four people: 18 to 23 ms after the impact, SD below 2 (Table 3.2)
+USUAL_ARTEFACT_MS = (12.0, 24.0)
 PULSE_SPAN_MS = (-1.0, 2.0)
+LATEST_MEP_MS = 50.0  # after the pulse, in hand muscles
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +90,13 @@ def detect_events(
 def sweep_events(sweep: Sweep) -> TapEvents:
     """Find the events of one recorded tap, in ms of the sweep's own clock.
 
+    A channel that is empty, constant or not finite shows no event; without a usable acceleration there is none at all.
+
     Args:
         sweep: with an acceleration and the valve's time; pressure and EMG where they have the same samples.
 
     Raises:
-        InvalidValueError: no acceleration, no valve time, or a waveform that is no recording.
+        InvalidValueError: no acceleration, no valve time, or too low a sampling rate.
     """
     channel = sweep.channels.get("acceleration")
     if channel is None or sweep.t_valve_ms is None:
@@ -100,6 +105,8 @@ def sweep_events(sweep: Sweep) -> TapEvents:
             got=sorted(sweep.channels),
             expected="a channel named acceleration, and t_valve_ms",
         )
+    if not is_recording(channel.values):
+        return TapEvents(*(np.full(1, math.nan) for _ in fields(TapEvents)))
     pressure, emg = (_same_samples(sweep.channels.get(name), channel) for name in ("pressure", "emg"))
     found = detect_events(
         channel.values,
@@ -113,10 +120,10 @@ def sweep_events(sweep: Sweep) -> TapEvents:
 
 
 def _same_samples(channel: Channel | None, other: Channel) -> FloatArray | None:
-    """The samples of a channel, where it was recorded at the same times as another."""
+    """The samples of a channel, where it was recorded, and at the same times as another."""
     if channel is None or (channel.rate_hz, channel.t0_ms) != (other.rate_hz, other.t0_ms):
         return None
-    return channel.values if channel.values.shape == other.values.shape else None
+    return channel.values if channel.values.shape == other.values.shape and is_recording(channel.values) else None
 
 
 def _like(values: ArrayLike, waves: FloatArray, rate_hz: float, name: str) -> FloatArray:
@@ -157,8 +164,11 @@ def tap_artefact_times(
     *,
     valve_ms: float = VALVE_MS,
     t_tms_ms: ArrayLike | None = None,
+    even_as_mep: bool = False,
 ) -> FloatArray:
     """When the tap shows in the EMG [ms from the first sample], NaN where it does not, shape (n,).
+
+    What begins 10 to 50 ms after the pulse may be the MEP and is not taken for the tap, unless asked for.
 
     Args:
         emg: shape (n, w).
@@ -166,6 +176,7 @@ def tap_artefact_times(
         hit_ms: the impacts [ms from the first sample], shape (n,), NaN where there is none.
         valve_ms: the valve command [ms from the first sample]; the EMG is at rest before it.
         t_tms_ms: the magnetic pulse [ms from the first sample], shape (n,), whose own artefact is passed over.
+        even_as_mep: take what begins at the tap's usual time for the tap, even where it may be the MEP.
     """
     waves = as_waveforms(emg, rate_hz, "EMG")
     level, noise = rest_level(waves, round(valve_ms * rate_hz / 1000), rate_hz)
@@ -174,6 +185,9 @@ def tap_artefact_times(
     since_pulse = times - per_waveform(t_tms_ms, waves)[:, None]
     deviation[(since_pulse >= PULSE_SPAN_MS[0]) & (since_pulse <= PULSE_SPAN_MS[1])] = 0.0
     since_hit = times - per_waveform(hit_ms, waves)[:, None]
-    sought = (since_hit >= ARTEFACT_SEARCH_MS[0]) & (since_hit <= ARTEFACT_SEARCH_MS[1])
+    first_ms, last_ms = USUAL_ARTEFACT_MS if even_as_mep else ARTEFACT_SEARCH_MS
+    sought = (since_hit >= first_ms) & (since_hit <= last_ms)
+    if not even_as_mep:
+        sought &= ~((since_pulse >= EARLIEST_ONSET_MS) & (since_pulse <= LATEST_MEP_MS))
     shown = first_true(sought & (deviation > HYSTERESIS_SD * noise))
     return crossing_before(deviation, ONSET_SD * noise, shown) * 1000 / rate_hz

@@ -18,6 +18,7 @@ from isiw.signals.waveforms import as_waveforms, crossing_before, cut, first_tru
 from isiw.types import ArrayLike, BoolArray, FloatArray
 
 __all__ = [
+    "EARLIEST_ONSET_MS",
     "MEP_WINDOWS_MS",
     "MEP_WINDOW_MS",
     "MIN_BACKGROUND_MS",
@@ -52,7 +53,9 @@ PULSE_GUARD_MS = 1.0
 SURE_SHARE = 0.2
 SURE_SD = 6.0
 ONSET_SD = 4.0
+
 EARLIEST_ONSET_MS = 10.0
+"""No MEP begins sooner after the pulse."""
 
 
 def mep_amplitude(

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
+from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals.events import tap_artefact_times
 from isiw.signals.impact import impact_time
 from isiw.signals.mep import (
@@ -25,10 +25,11 @@ from isiw.signals.mep import (
     background_rms,
     mep_amplitudes,
 )
-from isiw.trials import Channel, MistrialReason, Status, Stimulus, Sweep
+from isiw.signals.waveforms import is_recording
+from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
 from isiw.types import ArrayLike, BoolArray, FloatArray
 
-__all__ = ["ACCELERATION_UNITS", "EMG_UNITS_MV", "Judged", "SignalLimits", "is_saturated", "judge"]
+__all__ = ["ACCELERATION_UNITS", "EMG_UNITS_MV", "Judged", "SignalLimits", "is_saturated", "judge", "judge_measurement"]
 
 EMG_UNITS_MV: Mapping[str, float] = MappingProxyType({"V": 1e3, "mV": 1.0, "uV": 1e-3, "µV": 1e-3, "μV": 1e-3})
 """One of each unit in mV; both of Unicode's micro signs are known."""
@@ -134,6 +135,35 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
     return _mistrial(timed, MistrialReason.OUTCOME_UNKNOWN) if math.isnan(mep_mv) else replace(timed, mep_mv=mep_mv)
 
 
+def judge_measurement(
+    measurement: Measurement, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None
+) -> Judged:
+    """Judge what a device reports that measured the MEP itself, by the same rules as a sweep.
+
+    Args:
+        measurement: what the device reports.
+        stimulus: what was commanded.
+        space: says which event the ISI counts from, and how far it may be off.
+        limits: what the measurement must keep.
+
+    Raises:
+        DeviceError: a pair reported where TMS alone was commanded, or the other way round.
+    """
+    limits = limits or SignalLimits()
+    if (measurement.isi_ms is None) != (stimulus.isi_ms is None):
+        raise DeviceError(
+            "the device reports another kind of trial than it was told to deliver",
+            got=f"a realised ISI of {measurement.isi_ms}",
+            expected=f"one for the commanded ISI of {stimulus.isi_ms}",
+        )
+    judged, wrong = Judged(**asdict(measurement)), None
+    if measurement.isi_ms is not None and stimulus.isi_ms is not None:
+        wrong = _wrong_isi(measurement.isi_ms, stimulus.isi_ms, space, limits)
+    if wrong is None and (measurement.background_rms_uv or 0.0) > limits.background_uv:
+        wrong = MistrialReason.BACKGROUND_ACTIVITY
+    return judged if wrong is None else _mistrial(judged, wrong)
+
+
 def is_saturated(
     emg_mv: ArrayLike,
     rate_hz: float,
@@ -168,7 +198,7 @@ def _longest_run(mask: BoolArray) -> int:
 
 
 def _mistrial(judged: Judged, reason: MistrialReason) -> Judged:
-    return replace(judged, status=Status.MISTRIAL, reason=reason)
+    return replace(judged, status=Status.MISTRIAL, reason=reason, mep_mv=None)
 
 
 def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Judged:
@@ -188,11 +218,18 @@ def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: 
         return _mistrial(judged, wrong or MistrialReason.MISSING_CHANNEL)
     isi_ms = sweep.t_tms_ms - start
     judged = replace(judged, isi_ms=isi_ms)
+    wrong = _wrong_isi(isi_ms, stimulus.isi_ms, space, limits)
+    return judged if wrong is None else _mistrial(judged, wrong)
+
+
+def _wrong_isi(
+    isi_ms: float, commanded_isi_ms: float, space: DesignSpace, limits: SignalLimits
+) -> MistrialReason | None:
+    """What is wrong with a realised ISI."""
     if space.reference == "impact" and isi_ms < 0:
-        return _mistrial(judged, MistrialReason.TMS_BEFORE_IMPACT)
+        return MistrialReason.TMS_BEFORE_IMPACT
     tolerance = min(space.tolerance_ms, limits.isi_tolerance_ms or math.inf)
-    off = abs(isi_ms - stimulus.isi_ms) > tolerance
-    return _mistrial(judged, MistrialReason.ISI_OFF) if off else judged
+    return MistrialReason.ISI_OFF if abs(isi_ms - commanded_isi_ms) > tolerance else None
 
 
 def _impact(sweep: Sweep) -> tuple[float | None, MistrialReason | None]:
@@ -213,11 +250,7 @@ def _impact(sweep: Sweep) -> tuple[float | None, MistrialReason | None]:
 
 
 def _usable(sweep: Sweep, name: str) -> bool:
-    """Whether a channel was recorded at all: samples, all finite, and not a flat line."""
-    if name not in sweep.channels:
-        return False
-    values = sweep.channels[name].values
-    return bool(values.size and np.isfinite(values).all() and values.min() < values.max())
+    return name in sweep.channels and is_recording(sweep.channels[name].values)
 
 
 def _of_one_length(sweep: Sweep) -> bool:
@@ -264,6 +297,11 @@ def _mep_mv(emg_mv: FloatArray, emg: Channel, timed: Judged, limits: SignalLimit
     shown = np.array([math.nan])
     if timed.t_hit_ms is not None and timed.t_valve_ms is not None:
         hit, valve = _on_channel(timed.t_hit_ms, emg), _on_channel(timed.t_valve_ms, emg)
-        shown = tap_artefact_times(emg_mv, emg.rate_hz, hit, valve_ms=valve, t_tms_ms=pulse)
+        # A silent trial must not be told the tap's amplitude: where the two coincide, too small is the lesser evil.
+        shown, coinciding = (
+            tap_artefact_times(emg_mv, emg.rate_hz, hit, valve_ms=valve, t_tms_ms=pulse, even_as_mep=even_as_mep)
+            for even_as_mep in (False, True)
+        )
+        shown = np.where(np.isnan(shown), coinciding, shown)
     blank = (shown, shown + limits.tap_artefact_ms)
     return float(mep_amplitudes(emg_mv, emg.rate_hz, pulse, limits.mep_window_ms, blank_ms=blank)[0])

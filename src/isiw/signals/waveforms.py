@@ -18,6 +18,7 @@ __all__ = [
     "crossing_before",
     "cut",
     "first_true",
+    "is_recording",
     "per_waveform",
     "rest_level",
 ]
@@ -63,6 +64,11 @@ def as_waveforms(values: ArrayLike, rate_hz: float, name: str = "waveform") -> F
             f"the {name} is constant", got=float(low.flat[0]), remedy="Check that the sensor is connected."
         )
     return waves.reshape(-1, waves.shape[-1])
+
+
+def is_recording(values: FloatArray) -> bool:
+    """Whether one waveform, shape (w,), was recorded at all: samples, all finite, and not a flat line."""
+    return bool(values.size and np.isfinite(values).all() and values.min() < values.max())
 
 
 def per_waveform(value: ArrayLike | None, waves: FloatArray) -> FloatArray:
