@@ -79,7 +79,8 @@ def write(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
     header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
     body = "\n".join(f"| {line} |" for line in lines)
     out.with_suffix(".md").write_text(f"{header}\n\n{body}\n")
-    out.with_suffix(".json").write_text(json.dumps({"facts": facts, "summary": table.to_dict("records")}, indent=1))
+    records = json.loads(table.to_json(orient="records", double_precision=6))
+    out.with_suffix(".json").write_text(json.dumps({"facts": facts, "summary": records}, indent=1))
     figure(table).savefig(out.with_suffix(".png"), dpi=110)
 
 
