@@ -51,7 +51,7 @@ class Recipe:
     Args:
         name: its name in the catalogue; empty for a strategy built from a user's own objects.
         seed: the seed of all its randomness.
-        settings: the settings that differ from the named strategy's own, as TOML values.
+        settings: the settings it was made with, as TOML values.
     """
 
     name: str

@@ -21,6 +21,9 @@ JUMP_PROBABILITY = 0.3
 BLOCK_PROBABILITY = (0.35, 0.35, 0.30)
 """How often a difference moves all latents, those of the profile alone, and those of the response alone."""
 
+FORM_JUMPS, NOISE_JUMPS = 0.30, 0.25
+"""Shares of the jumps that draw the profile's kind and form, and the noise's kind; the others draw window or none."""
+
 
 @dataclass(frozen=True)
 class Mover:
@@ -42,7 +45,7 @@ class Mover:
         """Move every particle once.
 
         Args:
-            latents: equally weighted particles, fields of shape (b, p).
+            latents: particles, fields of shape (b, p); whatever weights they have, they keep.
             log_likelihood: of the history under each of them, shape (b, p).
         """
         half = latents.present.shape[-1] // 2
@@ -85,7 +88,8 @@ class Mover:
         shape, noise, present = self.prior.sample_kinds(tuple(mine.present.shape), self.generator)
         fresh = self._normal(mine.z)
         which = self._uniform(mine.present)
-        new_form, new_noise, new_window = which < 0.3, (which >= 0.3) & (which < 0.55), which >= 0.55
+        new_form, new_window = which < FORM_JUMPS, which >= FORM_JUMPS + NOISE_JUMPS
+        new_noise = ~(new_form | new_window)
         index = torch.arange(len(LATENTS), device=mine.z.device)
         redraw = (
             (new_form.unsqueeze(-1) & (index == SHAPE_LATENTS.stop - 1))

@@ -26,7 +26,6 @@ LATENTS = ("start", "width", "form", "log_floor", "floor_log_sd", "log_ratio", "
 """Names of the latents, in order."""
 
 SHAPE_LATENTS = slice(0, 3)
-FLOOR_LATENTS = slice(3, 5)
 NOISE_LATENTS = slice(5, 10)
 
 
