@@ -211,11 +211,59 @@ def test_a_tie_is_asked_at_the_first_isi_and_a_score_that_is_not_finite_never(sc
     assert Strategy(space, model, tie, Budget(3)).ask() == 3.0
 
 
-def test_no_finite_score_at_all_is_an_error_and_not_the_first_isi(scripted_strategy: MakeStrategy) -> None:
+def test_where_no_score_is_finite_the_isi_is_evenly_spaced_and_says_why(scripted_strategy: MakeStrategy) -> None:
     nothing = Scores(torch.full((5,), math.nan))
     strategy = Strategy(DesignSpace(0, 4), scripted_strategy().model, nothing, Budget(3))
-    with pytest.raises(StrategyError, match="Scores gives no ISI a finite score"):
-        strategy.ask()
+    asked = []
+    for _ in range(3):
+        asked.append(strategy.ask())
+        assert "Scores gives no ISI a finite score" in (strategy.fallback_reason or "")
+        strategy.tell(asked[-1], 0.02)
+    assert len(set(asked)) == 3
+
+
+def test_the_initial_isis_come_first_and_a_mistrial_repeats_one(scripted_strategy: MakeStrategy) -> None:
+    usual = scripted_strategy()
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, initial_ms=(0.0, 120.2, 200.0))
+    assert strategy.ask() == 0.0
+    strategy.count_mistrial()
+    assert strategy.ask() == 0.0
+    strategy.tell(1.0, 0.02)
+    strategy.tell(None, 0.02)
+    assert strategy.ask() == 120.0
+    assert strategy.restarted().ask() == 0.0
+
+
+def test_a_cost_is_taken_off_the_scores(scripted_strategy: MakeStrategy) -> None:
+    level = Scores(torch.tensor([1.0, 2.0, 3.0, 4.0, 5.0]))
+    model = scripted_strategy().model
+    assert Strategy(DesignSpace(0, 4), model, level, Budget(3)).ask() == 4.0
+    assert Strategy(DesignSpace(0, 4), model, level, Budget(3), cost=lambda isi_ms: 2 * isi_ms).ask() == 0.0
+
+
+def test_a_batch_begins_with_what_is_asked_and_repeats_no_isi_that_has_been_learnt() -> None:
+    strategy = make_strategy("particles-window", particles=200)
+    for isi_ms, mep_mv in ((100.0, 0.01), (250.0, 0.2), (400.0, 0.01)):
+        strategy.tell(isi_ms, mep_mv)
+    batch = strategy.ask_batch(4)
+    assert batch[0] == strategy.ask()
+    assert batch == strategy.ask_batch(4)
+    assert len(set(batch)) == 4
+
+
+def test_a_batch_takes_up_the_initial_isis_first(scripted_strategy: MakeStrategy) -> None:
+    usual = scripted_strategy()
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, initial_ms=(0.0, 100.0, 200.0))
+    assert strategy.ask_batch(3) == [0.0, 100.0, 200.0]
+    assert strategy.ask_batch(2) == [0.0, 100.0]
+
+
+def test_a_batch_from_a_model_that_imagines_no_trials_is_refused(scripted_strategy: MakeStrategy) -> None:
+    with pytest.raises(StrategyError, match="cannot imagine trials"):
+        scripted_strategy().ask_batch(2)
+    assert len(scripted_strategy().ask_batch(1)) == 1
+    with pytest.raises(InvalidValueError, match="at least one"):
+        scripted_strategy().ask_batch(0)
 
 
 @pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE, DesignSpace(0, 1), DesignSpace(-20, 30, step_ms=0.1)])

@@ -9,11 +9,12 @@ import pytest
 
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.asktell import Recipe
-from isiw.catalogue import StrategySettings, list_strategies, make_strategy
+from isiw.catalogue import list_strategies, make_strategy
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.particles import ParticleModel
 from isiw.models.protocol import ResponseModel
+from isiw.settings import ParticleSettings
 
 NAMES = sorted(list_strategies())
 FEW: dict[str, Any] = {"particles": 64}
@@ -85,7 +86,9 @@ def test_settings_reach_the_parts_they_are_meant_for() -> None:
     assert isinstance(model, ParticleModel)
     assert (model.particles, model.beliefs.p_window) == (32, 0.6)
     assert "7 stimuli are left" in strategy.decision().reason
-    assert strategy.recipe == Recipe("default", 0, vars(StrategySettings(7, 30.0, 0.9, 32, {"p_window": 0.6})))
+    assert strategy.recipe == Recipe(
+        "default", 0, vars(ParticleSettings(max_trials=7, particles=32, prior={"p_window": 0.6}))
+    )
 
 
 def test_the_prior_as_a_list_of_numbers_is_the_prior_as_a_pair() -> None:

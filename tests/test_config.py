@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from isiw.catalogue import StrategySettings
 from isiw.config import (
     RunConfig,
     config_of_log,
@@ -19,6 +18,7 @@ from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError
 from isiw.log.reader import read_session
 from isiw.session import Session
+from isiw.settings import ParticleSettings
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def config_file(tmp_path):
 
 def test_without_a_file_there_are_defaults():
     config = load_config()
-    assert config == RunConfig()
+    assert config.model_dump() == RunConfig().model_dump()
     assert (config.space.reference, config.subject.cohort) == ("valve", "recruitment")
 
 
@@ -41,7 +41,7 @@ def test_a_file_changes_what_it_names(config_file):
     config = load_config(config_file('seed = 7\n[subject]\ncohort = "gaussian"\n[strategy.settings]\nmax_trials = 4\n'))
     assert config.seed == 7
     assert config.subject.cohort == "gaussian"
-    assert config.strategy.settings == StrategySettings(max_trials=4)
+    assert config.strategy.settings == ParticleSettings(max_trials=4)
     assert config.limits == RunConfig().limits
 
 

@@ -6,7 +6,7 @@ import torch
 
 import isiw
 from isiw.asktell import Strategy
-from isiw.errors import InvalidValueError, StrategyError
+from isiw.errors import InvalidValueError
 from isiw.stopping import Budget
 
 
@@ -72,13 +72,12 @@ def test_within_the_deadline_the_choice_is_the_usual_one(held_up, go):
 def test_a_choice_that_fails_within_the_deadline_is_an_error_not_a_fallback(scripted_strategy):
     usual = scripted_strategy()
 
-    def nothing_finite(posterior, isi_ms):
-        del posterior
-        return torch.full((1, len(isi_ms)), torch.nan)
+    def broken(posterior, isi_ms):
+        raise ArithmeticError(f"no scores for {posterior.told} at {len(isi_ms)} ISIs")
 
-    nothing_finite.needs = ()
-    with pytest.raises(StrategyError, match="finite score"):
-        Strategy(usual.space, usual.model, nothing_finite, Budget(2)).ask(deadline_s=30.0)
+    broken.needs = ()
+    with pytest.raises(ArithmeticError, match="no scores"):
+        Strategy(usual.space, usual.model, broken, Budget(2)).ask(deadline_s=30.0)
 
 
 @pytest.mark.parametrize("deadline_s", [-1.0, float("nan")])

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from typing import Any, TypeVar
 
 import torch
 
+from isiw.acquisition.batch import greedy_batch
 from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
 from isiw.acquisition.sweeps import golden_index
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
-from isiw.models.protocol import Observation, Posterior, ResponseModel, Tensor
-from isiw.stopping import Progress, StopDecision, StoppingRule
+from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel, Tensor
+from isiw.stopping import Progress, StopDecision, StoppingRule, looks_back
 from isiw.window import WindowEstimate
 
 __all__ = ["Recipe", "Strategy", "candidate_isis"]
 
 MAX_CANDIDATES = 101
+
+_T = TypeVar("_T")
 
 
 def candidate_isis(space: DesignSpace, max_candidates: int = MAX_CANDIDATES) -> Tensor:
@@ -37,7 +42,7 @@ def candidate_isis(space: DesignSpace, max_candidates: int = MAX_CANDIDATES) -> 
     return torch.as_tensor(grid[picked], dtype=torch.float32)
 
 
-def _fulfil(answer: Future[int], choose: Callable[[], int]) -> None:
+def _fulfil(answer: Future[_T], choose: Callable[[], _T]) -> None:
     try:
         answer.set_result(choose())
     except Exception as error:  # noqa: BLE001 - handed over to whoever waits for the answer
@@ -67,11 +72,14 @@ class Strategy:
         model: the model of the person's responses.
         acquisition: the acquisition function that scores candidate ISIs.
         stopping: the rule that says when to stop.
+        initial_ms: ISIs to ask for first [ms], whatever the responses; each becomes the nearest on the grid.
+        cost: what each of some ISIs [ms] (shape (t,)) costs, in the unit of the scores, shape (t,).
         seed: seed of all randomness; the same seed and tells give the same asks.
         recipe: how the catalogue made this strategy; None where it was built by hand.
 
     Raises:
         StrategyError: the model's posterior lacks a capability that the acquisition function needs.
+        InvalidValueError: an initial ISI that is no finite number.
     """
 
     def __init__(
@@ -81,12 +89,15 @@ class Strategy:
         acquisition: AcquisitionFunction,
         stopping: StoppingRule,
         *,
+        initial_ms: Sequence[float] = (),
+        cost: Callable[[Tensor], Tensor] | None = None,
         seed: int = 0,
         recipe: Recipe | None = None,
     ) -> None:
         self.space, self.model, self.acquisition, self.stopping = space, model, acquisition, stopping
+        self.initial_ms = tuple(space.snap(isi_ms) for isi_ms in initial_ms)
         self.recipe = recipe or Recipe(name="", seed=seed)
-        self._seed = seed
+        self._cost, self._seed = cost, seed
         self._candidates = candidate_isis(space)
         self._posterior: Posterior = model.prior(space, seed)
         missing = [c.__name__ for c in acquisition.needs if not isinstance(self._posterior, c)]
@@ -97,14 +108,25 @@ class Strategy:
                 remedy="Choose another acquisition function, or a model whose posterior has the capability.",
             )
         self._told = 0
+        self._told_alone = 0
         self._mistrials = 0
+        self._past: deque[WindowEstimate] = deque(maxlen=looks_back(stopping))
         self._next_isi_ms: float | None = None
         self._estimate: WindowEstimate | None = None
         self._fallback_reason: str | None = None
 
     def restarted(self) -> Strategy:
         """The same strategy before its first trial."""
-        return Strategy(self.space, self.model, self.acquisition, self.stopping, seed=self._seed, recipe=self.recipe)
+        return Strategy(
+            self.space,
+            self.model,
+            self.acquisition,
+            self.stopping,
+            initial_ms=self.initial_ms,
+            cost=self._cost,
+            seed=self._seed,
+            recipe=self.recipe,
+        )
 
     @property
     def posterior(self) -> Posterior:
@@ -118,39 +140,69 @@ class Strategy:
             deadline_s: answer within this time [s]: past it with an evenly spaced ISI, and a `fallback_reason`.
 
         Raises:
-            StrategyError: no candidate ISI has a finite score.
             InvalidValueError: a deadline that is negative or not a number.
         """
+        if deadline_s is not None and not deadline_s >= 0:
+            raise InvalidValueError("deadline_s must be a time from 0 up", got=deadline_s)
         if self._next_isi_ms is None:
-            index = self._best() if deadline_s is None else self._best_within(deadline_s)
-            self._next_isi_ms = self.space.snap(float(self._candidates[index]))
+            if initial := self._initial_left():
+                self._next_isi_ms = initial[0]
+            else:
+                self._next_isi_ms, self._fallback_reason = (
+                    self._best(self._posterior) if deadline_s is None else self._best_within(deadline_s)
+                )
         return self._next_isi_ms
+
+    def ask_batch(self, n: int) -> list[float]:
+        """The next n ISIs [ms], to be delivered before anything is told; the first is what `ask` answers.
+
+        Args:
+            n: how many.
+
+        Raises:
+            InvalidValueError: fewer than one.
+            StrategyError: the model cannot imagine trials, or does not plan so far ahead.
+        """
+        if n < 1:
+            raise InvalidValueError("a batch has at least one ISI", got=n)
+        chosen = (self._initial_left() or [self.ask()])[:n]
+        return greedy_batch(self._posterior, self.acquisition, chosen, n, lambda posterior: self._best(posterior)[0])
+
+    def _initial_left(self) -> list[float]:
+        return list(self.initial_ms[self._told - self._told_alone :])
 
     @property
     def fallback_reason(self) -> str | None:
         """Why the current ISI is not the acquisition function's choice; None where it is."""
         return self._fallback_reason
 
-    def _best(self) -> int:
-        scores = self.acquisition(self._posterior, self._candidates)
-        if not scores[0].isfinite().any():
-            raise StrategyError(
-                f"{type(self.acquisition).__name__} gives no ISI a finite score",
-                remedy="Check the settings of the model and its prior.",
-            )
-        return int(best_candidate(scores)[0])
+    @property
+    def trouble(self) -> str | None:
+        """What went wrong with the last fit and what stands in for it; None where nothing did."""
+        return self._posterior.trouble if isinstance(self._posterior, ReportsTrouble) else None
 
-    def _best_within(self, deadline_s: float) -> int:
-        if not deadline_s >= 0:
-            raise InvalidValueError("deadline_s must be a time from 0 up", got=deadline_s)
-        answer: Future[int] = Future()
+    def _best(self, posterior: Posterior) -> tuple[float, str | None]:
+        """The best ISI [ms], or an evenly spaced one and why."""
+        scores = self.acquisition(posterior, self._candidates)
+        turn = golden_index(self._told, len(self._candidates))
+        reason = None
+        if not scores[0].isfinite().any():
+            reason = f"{type(self.acquisition).__name__} gives no ISI a finite score: an evenly spaced one instead."
+        cost = None if self._cost is None else self._cost(self._candidates)
+        return self._isi_ms(int(best_candidate(scores, cost, first=turn)[0])), reason
+
+    def _isi_ms(self, candidate: int) -> float:
+        return self.space.snap(float(self._candidates[candidate]))
+
+    def _best_within(self, deadline_s: float) -> tuple[float, str | None]:
+        answer: Future[tuple[float, str | None]] = Future()
         # A posterior never changes, so a late thread can go on with it and be forgotten.
-        threading.Thread(target=_fulfil, args=(answer, self._best), daemon=True).start()
+        threading.Thread(target=_fulfil, args=(answer, partial(self._best, self._posterior)), daemon=True).start()
         try:
             return answer.result(deadline_s)
         except TimeoutError:
-            self._fallback_reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
-            return golden_index(self._told, len(self._candidates))
+            reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
+            return self._isi_ms(golden_index(self._told, len(self._candidates))), reason
 
     def tell(
         self,
@@ -171,6 +223,7 @@ class Strategy:
         Raises:
             InvalidValueError: NaN, infinite or negative values, or not exactly one of `mep_mv` and `response`.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
+            StrategyError: a kind of outcome that the model cannot learn from.
         """
         if (mep_mv is None) == (response is None):
             raise InvalidValueError("tell needs either mep_mv or response", got=(mep_mv, response))
@@ -191,7 +244,10 @@ class Strategy:
         )
         self._posterior = self.model.update(self._posterior, observation)
         self._told += 1
+        self._told_alone += isi_ms is None
         self._next_isi_ms = self._estimate = self._fallback_reason = None
+        if self._past.maxlen:
+            self._past.append(self.estimate())
 
     def count_mistrial(self) -> None:
         """Count a delivered stimulus whose outcome is not told: it uses up budget and changes nothing else."""
@@ -205,4 +261,6 @@ class Strategy:
 
     def decision(self) -> StopDecision:
         """Whether to stop now, and why."""
-        return self.stopping(Progress(self._told + self._mistrials, self._told, self.estimate()))
+        return self.stopping(
+            Progress(self._told + self._mistrials, self._told, self.estimate(), past=tuple(self._past))
+        )

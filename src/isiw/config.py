@@ -18,13 +18,22 @@ import itertools
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, fields, is_dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Final, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
-from isiw.catalogue import StrategySettings, list_strategies, make_strategy
+from isiw.catalogue import list_strategies, make_strategy, settings_of
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
@@ -53,6 +62,9 @@ SESSIONS = Path("isiw-sessions")
 
 RUN_KEY = "isiw_run"
 """What `isiw run` keeps its configuration under in a log; lab software may keep there what it likes."""
+
+
+_FILLED: Final[Any] = Field(default_factory=dict, validate_default=True)
 
 
 def _one_of(known: Iterable[str], name: str) -> str:
@@ -99,15 +111,27 @@ class SpaceConfig(_Section):
 
 
 class StrategyConfig(_Section):
-    """The strategy: a name from `isiw.list_strategies()` and its settings."""
+    """The strategy: a name from `isiw.list_strategies()`, and settings of its family."""
 
     name: str = "default"
-    settings: StrategySettings = StrategySettings()
+    settings: Any = _FILLED
 
     @field_validator("name")
     @classmethod
     def _known(cls, name: str) -> str:
         return _one_of(list_strategies(), name)
+
+    @field_validator("settings", mode="before")
+    @classmethod
+    def _as_the_name_means(cls, settings: Any, info: ValidationInfo) -> Any:
+        known = isinstance(settings, Mapping) and "name" in info.data
+        return {**settings_of(info.data["name"])[1], **settings} if known else settings
+
+    @field_validator("settings")
+    @classmethod
+    def _of_the_family(cls, settings: Any, info: ValidationInfo) -> Any:
+        known = isinstance(settings, Mapping) and "name" in info.data
+        return settings_of(info.data["name"])[0](**settings) if known else settings
 
 
 class LimitsConfig(_Section):
@@ -153,7 +177,7 @@ def load_config(path: str | Path | None = None) -> RunConfig:
         ConfigError: it cannot be read, or has an unknown key or a bad value; the message names file, key and value.
     """
     if path is None:
-        return RunConfig()
+        return _validated({}, "the defaults")
     try:
         values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
@@ -166,13 +190,14 @@ def load_config(path: str | Path | None = None) -> RunConfig:
 
 
 def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
+    kind = _kind(_named(values))
     try:
-        return RunConfig.model_validate(values)
+        return kind.model_validate(values)
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         if first["type"] in {"extra_forbidden", "unexpected_keyword_argument"}:
-            known = _known_keys(first["loc"][:-1])
+            known = _known_keys(kind, first["loc"][:-1])
             close = difflib.get_close_matches(str(first["loc"][-1]), known, n=1)
             guess = f"Did you mean {close[0]}? " if close else ""
             raise ConfigError(
@@ -192,8 +217,22 @@ def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
         ) from error
 
 
-def _known_keys(section: tuple[int | str, ...]) -> list[str]:
-    kind: Any = RunConfig
+def _named(values: Mapping[str, Any]) -> str:
+    """The strategy that is named, or the default where none or an unknown one is: that is told with all else."""
+    strategy = values.get("strategy")
+    name = strategy.get("name") if isinstance(strategy, Mapping) else None
+    return name if name in list_strategies() else "default"
+
+
+@cache
+def _kind(strategy: str) -> type[RunConfig]:
+    """The configuration whose strategy has the settings of its name."""
+    family, _ = settings_of(strategy)
+    settings = create_model("StrategyConfig", __base__=StrategyConfig, settings=(family, _FILLED))
+    return create_model("RunConfig", __base__=RunConfig, strategy=(settings, _FILLED))
+
+
+def _known_keys(kind: Any, section: tuple[int | str, ...]) -> list[str]:
     for name in section:
         kind = kind.model_fields[str(name)].annotation
     return sorted(f.name for f in fields(kind)) if is_dataclass(kind) else sorted(kind.model_fields)

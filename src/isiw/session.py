@@ -240,6 +240,8 @@ class Session:
             self._log.append(Event(kind="fallback", trial=stimulus.trial, text=self.strategy.fallback_reason))
         trial = self._delivered(stimulus)
         learn(self.strategy, trial)
+        if trial.told and self.strategy.trouble is not None:
+            self._log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
         decision, next_isi_ms = self._log_estimate(trial.index)
         if self._on_trial is not None:
             update = SessionUpdate(trial, self.strategy.estimate(), decision, next_isi_ms, self._stimuli_left())

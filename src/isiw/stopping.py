@@ -6,13 +6,25 @@ A rule is a frozen settings object called with a `Progress`. Rules compose with 
 from __future__ import annotations
 
 import math
+import statistics
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 from isiw.errors import InvalidValueError
 from isiw.window import WindowEstimate
 
-__all__ = ["AnyOf", "Budget", "CredibleWidth", "NoWindow", "Progress", "StopDecision", "StoppingRule", "stimuli_left"]
+__all__ = [
+    "AnyOf",
+    "Budget",
+    "CredibleWidth",
+    "EdgeVariance",
+    "NoWindow",
+    "Progress",
+    "StopDecision",
+    "StoppingRule",
+    "looks_back",
+    "stimuli_left",
+]
 
 
 @dataclass(frozen=True)
@@ -31,11 +43,13 @@ class Progress:
         delivered: stimuli delivered so far; mistrials count.
         told: trials told so far.
         estimate: what is believed about the window now.
+        past: the estimates after the last few trials told, the present one last; as many as `looks_back(rule)`.
     """
 
     delivered: int
     told: int
     estimate: WindowEstimate
+    past: tuple[WindowEstimate, ...] = ()
 
 
 class StoppingRule(Protocol):
@@ -136,6 +150,45 @@ class NoWindow:
 
 
 @dataclass(frozen=True)
+class EdgeVariance:
+    """Stop when the reported edges have settled: the dissertation's rule (4.3).
+
+    Args:
+        variance_ms2: the variance [ms²] of an edge's last values below which it has settled.
+        last: how many values.
+        edges: whether both edges must have settled, as the text says, or either, as its pseudo-code does.
+
+    Raises:
+        InvalidValueError: a variance that is not positive, fewer than two values, or another word for the edges.
+    """
+
+    variance_ms2: float = 50.0
+    last: int = 5
+    edges: Literal["both", "either"] = "both"
+
+    def __post_init__(self) -> None:
+        if not self.variance_ms2 > 0 or self.last < 2:
+            raise InvalidValueError(
+                "a variance is positive and taken of two values or more", got=(self.variance_ms2, self.last)
+            )
+        if self.edges not in {"both", "either"}:
+            raise InvalidValueError("edges settle both or either", got=self.edges, expected="both or either")
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        windows = [estimate.window for estimate in progress.past[-self.last :]]
+        edges = [(window.start_ms, window.end_ms) for window in windows if window is not None]
+        if len(edges) < self.last:
+            return StopDecision(stop=False, reason=f"There are not {self.last} windows in a row yet.")
+        start, end = (statistics.variance(values) for values in zip(*edges, strict=True))
+        settled = (max if self.edges == "both" else min)(start, end) < self.variance_ms2
+        spread = f"the last {self.last} values of start and end have variances of {start:.0f} and {end:.0f} ms²"
+        if settled:
+            return StopDecision(stop=True, reason=f"The window has settled: {spread}.")
+        return StopDecision(stop=False, reason=f"The window has not settled: {spread}.")
+
+
+@dataclass(frozen=True)
 class AnyOf:
     """Stop as soon as one of the rules says so; its reason is given.
 
@@ -173,3 +226,14 @@ def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:
     if isinstance(rule, AnyOf):
         return min((left for r in rule.rules if (left := stimuli_left(r, delivered)) is not None), default=None)
     return None
+
+
+def looks_back(rule: StoppingRule) -> int:
+    """How many past estimates a rule needs.
+
+    Args:
+        rule: the stopping rule.
+    """
+    if isinstance(rule, AnyOf):
+        return max(looks_back(r) for r in rule.rules)
+    return rule.last if isinstance(rule, EdgeVariance) else 0

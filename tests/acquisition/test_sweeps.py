@@ -12,7 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
-from isiw.acquisition.sweeps import EvenSpacing, RandomIsi, golden_index
+from isiw.acquisition.sweeps import EvenSpacing, IncrementalSweep, OwnProposal, RandomIsi, SobolIsi, golden_index
+from isiw.errors import InvalidValueError
+from isiw.models.protocol import ProposesIsi, Tensor
 from isiw.window import WindowEstimate
 
 CANDIDATES = 101
@@ -69,18 +71,48 @@ def test_each_random_trial_is_a_new_draw() -> None:
     assert abs(np.corrcoef(order[1:], order[:-1])[0, 1]) < 4 / math.sqrt(1000)
 
 
-@pytest.mark.parametrize("acquisition", [EvenSpacing(), RandomIsi(7)])
+@pytest.mark.parametrize("acquisition", [EvenSpacing(), RandomIsi(7), SobolIsi(7)])
 def test_one_isi_is_scored_1_and_the_others_0(acquisition: AcquisitionFunction) -> None:
     scores = acquisition(CountingPosterior(3), ISIS_MS)
     assert scores.shape == (1, CANDIDATES)
     assert sorted(scores[0].tolist()) == [0.0] * (CANDIDATES - 1) + [1.0]
 
 
-@pytest.mark.parametrize("acquisition", [EvenSpacing(), RandomIsi(7)])
+@pytest.mark.parametrize("acquisition", [EvenSpacing(), RandomIsi(7), SobolIsi(7)])
 def test_a_design_is_an_acquisition_function(acquisition: AcquisitionFunction) -> None:
     assert isinstance(acquisition, AcquisitionFunction)
 
 
-@pytest.mark.parametrize("acquisition", [EvenSpacing(), RandomIsi()])
+@pytest.mark.parametrize("acquisition", [EvenSpacing(), RandomIsi(), SobolIsi(), IncrementalSweep()])
 def test_a_design_needs_nothing_of_the_posterior(acquisition: AcquisitionFunction) -> None:
     assert acquisition.needs == ()
+
+
+@pytest.mark.parametrize("trials", [8, 16, 32])
+def test_the_sobol_order_has_one_isi_in_each_of_as_many_equal_parts(trials: int) -> None:
+    parts = np.array(picks(SobolIsi(3), trials)) * trials // CANDIDATES
+    assert len(set(parts.tolist())) >= trials - 2  # two are granted for candidates that straddle a boundary
+
+
+def test_the_sweep_stays_at_each_isi_for_its_trials_and_begins_again_at_the_end() -> None:
+    order = picks(IncrementalSweep(step_ms=100.0, trials_per_isi=3), 21)
+    assert order == [k for k in (0, 20, 40, 60, 80, 100, 0) for _ in range(3)]
+
+
+@pytest.mark.parametrize("settings", [{"step_ms": 0.0}, {"trials_per_isi": 0}])
+def test_a_sweep_without_step_or_trials_is_refused(settings: dict[str, float]) -> None:
+    with pytest.raises(InvalidValueError, match="sweep"):
+        IncrementalSweep(**settings)
+
+
+class Planner(CountingPosterior):
+    """Wants two ISIs."""
+
+    def proposed_isis_ms(self) -> Tensor:
+        return torch.tensor([[253.0, 10.0], [6.0, 400.0]])
+
+
+def test_what_the_method_wants_first_is_asked_as_nearly_as_can_be() -> None:
+    planner = Planner(0)
+    assert isinstance(planner, ProposesIsi)
+    assert ISIS_MS[best_candidate(OwnProposal()(planner, ISIS_MS))].tolist() == [255.0, 5.0]

@@ -1,9 +1,8 @@
 """Acquisition functions from information: what the next MEP is expected to say.
 
-`mutual_information` is with all unknowns of the model (Houlsby et al., arXiv:1112.5745, BALD). `window_gain` is about
-the window alone: how much the next MEP is expected to reduce the variance of each ISI's membership in the window
-(stepwise uncertainty reduction for excursion sets: Bect et al., Stat. Comput. 22, 2012; Chevalier et al., Technometrics
-56, 2014).
+With all unknowns of the model (Houlsby et al., arXiv:1112.5745, BALD), or about the window alone: its place, or each
+ISI's membership in it (stepwise uncertainty reduction for excursion sets: Bect et al., Stat. Comput. 22, 2012;
+Chevalier et al., Technometrics 56, 2014).
 """
 
 from __future__ import annotations
@@ -13,9 +12,19 @@ from typing import ClassVar, Protocol
 
 import torch
 
+from isiw.acquisition.lookahead import expected_variance_reduction
+from isiw.errors import InvalidValueError
 from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesWindows, Tensor
 
-__all__ = ["Alternating", "MutualInformation", "WindowGain", "mutual_information", "window_gain"]
+__all__ = [
+    "Alternating",
+    "MutualInformation",
+    "WindowGain",
+    "WindowInformation",
+    "mutual_information",
+    "window_gain",
+    "window_information",
+]
 
 
 class _WindowPosterior(Posterior, PredictsOutcomes, SamplesWindows, Protocol):
@@ -27,39 +36,61 @@ def _entropy(mass: Tensor) -> Tensor:
     return entropy
 
 
-def mutual_information(weights: Tensor, mass: Tensor) -> Tensor:
-    """Mutual information of the next MEP and all unknowns [nat].
+def mutual_information(posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
+    """Mutual information of the next MEP and all unknowns [nat], shape (b, t).
 
     Args:
-        weights: of the posterior samples, shape (b, s).
-        mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
-
-    Returns:
-        Shape (b, t).
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
     """
-    mixture = torch.einsum("bs,bsty->bty", weights, mass)
-    return _entropy(mixture) - torch.einsum("bs,bst->bt", weights, _entropy(mass))
+    mass = posterior.outcome_mass(isi_ms)
+    return _entropy(mass.mean(dim=1)) - _entropy(mass).mean(dim=1)
 
 
-def window_gain(weights: Tensor, mass: Tensor, masks: Tensor) -> Tensor:
-    """Expected reduction of the summed variance of membership in the window.
+def window_information(posterior: _WindowPosterior, isi_ms: Tensor, cells: int = 5) -> Tensor:
+    """Mutual information of the next MEP and the window alone [nat], shape (b, t).
+
+    The window is told as precisely as the samples allow: the quantile cell of its start and of its end, or that there
+    is none. Whatever else differs among the samples of a cell is averaged out.
 
     Args:
-        weights: of the posterior samples, shape (b, s).
-        mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
-        masks: the samples' windows on a grid, shape (b, s, g).
-
-    Returns:
-        Shape (b, t).
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
+        cells: into how many cells each edge falls.
     """
-    people, _, candidates, outcomes = mass.shape
-    joint = (weights[..., None, None] * mass).flatten(2).transpose(1, 2)
-    probability = joint.sum(-1).clamp_min(1e-12)
-    inside = joint @ masks
-    # Summed over outcomes, P(y) m(1 - m) is P(in) - sum of P(y, in)^2 / P(y): only the second part depends on the ISI.
-    sharpness = (inside.square() / probability.unsqueeze(-1)).sum(-1).view(people, candidates, outcomes).sum(-1)
-    prior = torch.einsum("bs,bsg->bg", weights, masks).square().sum(-1, keepdim=True)
-    return sharpness - prior
+    mass, cell = posterior.outcome_mass(isi_ms), _cells(posterior.window_masks(isi_ms), cells)
+    members = torch.nn.functional.one_hot(cell, cells * cells + 1).to(mass.dtype)
+    share = members.mean(dim=1)
+    within = torch.einsum("bsc,bsty->bcty", members, mass) / members.sum(dim=1).clamp_min(1.0)[..., None, None]
+    return _entropy(mass.mean(dim=1)) - torch.einsum("bc,bct->bt", share, _entropy(within))
+
+
+def _cells(masks: Tensor, cells: int) -> Tensor:
+    """Which cell of starts and ends each sampled window falls into, shape (b, s); 0 is no window."""
+    first, last = masks.argmax(-1), masks.shape[-1] - 1 - masks.flip(-1).argmax(-1)
+    found = masks.any(-1)
+    start, end = (_quantile_cell(edge, found, cells) for edge in (first, last))
+    return torch.where(found, 1 + start * cells + end, 0)
+
+
+def _quantile_cell(edge: Tensor, found: Tensor, cells: int) -> Tensor:
+    """Rank of each edge among those of the same person, in equal cells; equal edges share one, shape (b, s)."""
+    below = (edge.unsqueeze(-1) > edge.unsqueeze(-2)) & found.unsqueeze(-2)
+    return (
+        (below.sum(-1) * cells)
+        .div(found.sum(-1, keepdim=True).clamp_min(1), rounding_mode="floor")
+        .clamp_max(cells - 1)
+    )
+
+
+def window_gain(posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+    """Expected reduction of the summed variance of membership in the window, shape (b, t).
+
+    Args:
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
+    """
+    return expected_variance_reduction(posterior.outcome_mass(isi_ms), posterior.window_masks(isi_ms))
 
 
 @dataclass(frozen=True)
@@ -70,7 +101,30 @@ class MutualInformation:
 
     def __call__(self, posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
-        return mutual_information(*posterior.outcome_mass(isi_ms))
+        return mutual_information(posterior, isi_ms)
+
+
+@dataclass(frozen=True)
+class WindowInformation:
+    """Mutual information of the next MEP and the window alone.
+
+    Args:
+        cells: into how many cells each edge falls.
+
+    Raises:
+        InvalidValueError: fewer than two cells, which would tell nothing.
+    """
+
+    cells: int = 5
+    needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
+
+    def __post_init__(self) -> None:
+        if self.cells < 2:
+            raise InvalidValueError("an edge falls into at least two cells", got=self.cells)
+
+    def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return window_information(posterior, isi_ms, self.cells)
 
 
 @dataclass(frozen=True)
@@ -81,8 +135,7 @@ class WindowGain:
 
     def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
-        weights, mass = posterior.outcome_mass(isi_ms)
-        return window_gain(weights, mass, posterior.window_masks(isi_ms))
+        return window_gain(posterior, isi_ms)
 
 
 @dataclass(frozen=True)
@@ -97,4 +150,4 @@ class Alternating:
 
     def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
-        return MutualInformation()(posterior, isi_ms) if posterior.trials % 2 else WindowGain()(posterior, isi_ms)
+        return mutual_information(posterior, isi_ms) if posterior.trials % 2 else window_gain(posterior, isi_ms)

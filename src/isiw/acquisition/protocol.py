@@ -23,10 +23,14 @@ class AcquisitionFunction(Protocol):
         """Score the candidate ISIs [ms], shape (t,), for each person, shape (b, t)."""
 
 
-def best_candidate(scores: Tensor) -> Tensor:
-    """Index of the best candidate for each person, shape (b,); a tie goes to the first, a score not finite loses.
+def best_candidate(scores: Tensor, cost: Tensor | None = None, first: int = 0) -> Tensor:
+    """Index of the best candidate for each person, shape (b,); a score that is not finite loses.
 
     Args:
         scores: shape (b, t).
+        cost: what each candidate costs, in the unit of the scores, shape (t,).
+        first: a tie goes to this candidate, or to the next one behind it, in a circle.
     """
-    return torch.where(torch.isfinite(scores), scores, -torch.inf).argmax(dim=-1)
+    net = scores if cost is None else scores - cost
+    net = torch.where(torch.isfinite(net), net, -torch.inf).roll(-first, dims=-1)
+    return (net.argmax(dim=-1) + first) % scores.shape[-1]

@@ -1,4 +1,4 @@
-"""Designs that do not look at the responses: random and evenly spaced ISIs."""
+"""Designs that do not look at the responses, and those that leave the choice to the method itself."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 import torch
+from scipy.stats import qmc
 
-from isiw.models.protocol import Posterior, Tensor
+from isiw.errors import InvalidValueError
+from isiw.models.protocol import Posterior, ProposesIsi, Tensor
 
-__all__ = ["EvenSpacing", "RandomIsi", "golden_index"]
+__all__ = ["EvenSpacing", "IncrementalSweep", "OwnProposal", "RandomIsi", "SobolIsi", "golden_index"]
 
 _GOLDEN = (5**0.5 - 1) / 2
 
@@ -26,7 +28,7 @@ def golden_index(trial: int, candidates: int) -> int:
 
 
 def _only(index: int, isi_ms: Tensor) -> Tensor:
-    scores = torch.zeros((1, len(isi_ms)))
+    scores = torch.zeros((1, len(isi_ms)), device=isi_ms.device)
     scores[0, index] = 1.0
     return scores
 
@@ -57,3 +59,58 @@ class RandomIsi:
         """Score the ISI drawn for this trial 1 and all others 0, shape (1, t)."""
         rng = np.random.default_rng([self.seed, posterior.trials])
         return _only(int(rng.integers(len(isi_ms))), isi_ms)
+
+
+@dataclass(frozen=True)
+class SobolIsi:
+    """ISIs from a scrambled Sobol sequence (Owen, J. Complexity 14, 1998): random, and yet evenly spread.
+
+    Args:
+        seed: seed of the scrambling.
+    """
+
+    seed: int = 0
+    needs: ClassVar[tuple[type, ...]] = ()
+
+    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+        """Score the ISI whose turn it is 1 and all others 0, shape (1, t)."""
+        share = float(qmc.Sobol(1, seed=self.seed).random_base2(posterior.trials.bit_length())[posterior.trials, 0])
+        return _only(min(int(share * len(isi_ms)), len(isi_ms) - 1), isi_ms)
+
+
+@dataclass(frozen=True)
+class IncrementalSweep:
+    """From the lowest ISI to the highest, some trials at each: the conventional search; then from the start again.
+
+    Args:
+        step_ms: from one ISI to the next [ms].
+        trials_per_isi: trials at each.
+
+    Raises:
+        InvalidValueError: a step that is not positive, or no trials.
+    """
+
+    step_ms: float = 5.0
+    trials_per_isi: int = 12
+    needs: ClassVar[tuple[type, ...]] = ()
+
+    def __post_init__(self) -> None:
+        if not self.step_ms > 0 or self.trials_per_isi < 1:
+            raise InvalidValueError("a sweep needs a step and trials", got=(self.step_ms, self.trials_per_isi))
+
+    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+        """Score ISIs by their distance [ms] from the one whose turn it is, negative, shape (1, t)."""
+        stops = int((isi_ms[-1] - isi_ms[0]) / self.step_ms) + 1
+        turn = posterior.trials // self.trials_per_isi % stops
+        return -(isi_ms - (isi_ms[0] + turn * self.step_ms)).abs().unsqueeze(0)
+
+
+@dataclass(frozen=True)
+class OwnProposal:
+    """The ISI that the method itself wants."""
+
+    needs: ClassVar[tuple[type, ...]] = (ProposesIsi,)
+
+    def __call__(self, posterior: ProposesIsi, isi_ms: Tensor) -> Tensor:
+        """Score ISIs by their distance [ms] from the one it wants, negative, shape (b, t)."""
+        return -(isi_ms - posterior.proposed_isis_ms()[:, :1]).abs()

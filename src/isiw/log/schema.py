@@ -195,7 +195,7 @@ def _rounded(values: FloatArray) -> tuple[float, ...]:
     return tuple(np.asarray(values, dtype=np.float64).round(PROFILE_DECIMALS).tolist())
 
 
-EventKind: TypeAlias = Literal["exclusion", "limit", "fault", "resume", "fallback"]
+EventKind: TypeAlias = Literal["exclusion", "limit", "fault", "resume", "fallback", "fit"]
 
 
 class Event(_Record):

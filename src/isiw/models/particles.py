@@ -86,25 +86,32 @@ class ParticleModel:
             latents=latents,
             log_weights=torch.full(size, -math.log(self.particles), device=device),
             log_likelihood=torch.zeros(size, device=device),
+            evidence=torch.zeros(people, device=device),
             history=History.empty(people, device),
         )
 
     def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The posterior after one more trial."""
-        trial = self._trial(observation)
-        history = posterior.history.appended(trial)
-        gain = total_log_likelihood(posterior.person, trial)
-        log_weights = torch.log_softmax(posterior.log_weights + gain, dim=-1)
-        after = replace(
-            posterior, log_weights=log_weights, log_likelihood=posterior.log_likelihood + gain, history=history
-        )
+        after = self.reweighted(posterior, observation)
         generator = _generator(self.device, posterior.seed, after.trials)
         after = self._resampled(after, generator)
-        mover = Mover(self.beliefs, posterior.space, history, generator)
+        mover = Mover(self.beliefs, posterior.space, after.history, generator)
         latents, log_likelihood = after.latents, after.log_likelihood
         for _ in range(self._sweeps(after.trials)):
             latents, log_likelihood = mover.sweep(latents, log_likelihood)
         return replace(after, latents=latents, log_likelihood=log_likelihood)
+
+    def reweighted(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
+        """The same particles, weighted by one more trial as well."""
+        trial = self._trial(observation)
+        gain = total_log_likelihood(posterior.person, trial)
+        return replace(
+            posterior,
+            log_weights=torch.log_softmax(posterior.log_weights + gain, dim=-1),
+            log_likelihood=posterior.log_likelihood + gain,
+            evidence=posterior.evidence + torch.logsumexp(posterior.log_weights + gain, dim=-1),
+            history=posterior.history.appended(trial),
+        )
 
     def _sweeps(self, trials: int) -> int:
         """As many sweeps as asked for, but fewer where the history has become long."""
@@ -149,6 +156,7 @@ class ParticlePosterior:
         latents: the particles, fields of shape (b, p).
         log_weights: their normalised log weights, shape (b, p).
         log_likelihood: of the history under each of them, shape (b, p).
+        evidence: log marginal likelihood of the history [nat], shape (b,).
         history: the trials so far.
     """
 
@@ -158,6 +166,7 @@ class ParticlePosterior:
     latents: Latents
     log_weights: Tensor
     log_likelihood: Tensor
+    evidence: Tensor
     history: History
 
     @property
@@ -175,13 +184,31 @@ class ParticlePosterior:
         picks = systematic(self.log_weights, self.model.thinned)
         return PersonSample(_each(self.person, lambda x: _take(x, picks)))
 
-    def outcome_mass(self, isi_ms: Tensor) -> tuple[Tensor, Tensor]:
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
         return self._thinned.outcome_mass(isi_ms.to(self.log_weights.device))
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows; see `SamplesWindows`."""
         return self._thinned.window_masks(isi_ms.to(self.log_weights.device))
+
+    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+        """Sampled profiles; see `SamplesProfiles`."""
+        return self._thinned.expected_mep_mv(isi_ms.to(self.log_weights.device))
+
+    def baselines_mv(self) -> Tensor:
+        """Sampled baselines; see `SamplesProfiles`."""
+        return self._thinned.baselines_mv()
+
+    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> ParticlePosterior:
+        """The same particles, weighted by an imagined trial; see `Conditions`."""
+        unknown = torch.full_like(mep_mv, torch.nan)
+        imagined = Observation(isi_ms, mep_mv, isi_sd_ms=torch.zeros_like(mep_mv), response=unknown)
+        return self.model.reweighted(self, imagined)
+
+    def log_evidence(self) -> Tensor:
+        """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
+        return self.evidence
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""

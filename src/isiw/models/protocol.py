@@ -3,6 +3,9 @@
 A model is a frozen settings object with two verbs: `prior` gives the posterior before any trial, `update` gives the
 posterior after one more. A posterior never changes; it holds `b` people at once, and one person is b = 1. Acquisition
 functions and strategies see these protocols only.
+
+What else a posterior can answer is a capability. All capabilities of one posterior speak of the same `s` samples, in
+the same order and equally weighted.
 """
 
 from __future__ import annotations
@@ -15,7 +18,19 @@ import torch
 from isiw.design import DesignSpace
 from isiw.window import WindowEstimate
 
-__all__ = ["Observation", "Posterior", "PredictsOutcomes", "ResponseModel", "SamplesWindows", "Tensor"]
+__all__ = [
+    "Conditions",
+    "HasEvidence",
+    "Observation",
+    "Posterior",
+    "PredictsOutcomes",
+    "ProposesIsi",
+    "ReportsTrouble",
+    "ResponseModel",
+    "SamplesProfiles",
+    "SamplesWindows",
+    "Tensor",
+]
 
 Tensor: TypeAlias = torch.Tensor
 
@@ -54,24 +69,70 @@ class Posterior(Protocol):
 class PredictsOutcomes(Protocol):
     """Capability: the predictive distribution of the next MEP, sample by sample."""
 
-    def outcome_mass(self, isi_ms: Tensor) -> tuple[Tensor, Tensor]:
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Probability of each value of the next MEP, on a grid of values that covers all of them.
 
         Args:
             isi_ms: candidate ISIs [ms], shape (t,).
 
         Returns:
-            Weights of the posterior samples, shape (b, s), and the probability of each value given each sample,
-            shape (b, s, t, y), summing to 1 over y.
+            Given each posterior sample, shape (b, s, t, y), summing to 1 over y.
         """
 
 
 @runtime_checkable
 class SamplesWindows(Protocol):
-    """Capability: windows sampled from the posterior, the same samples as in `outcome_mass`."""
+    """Capability: windows sampled from the posterior."""
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Which ISIs [ms] (shape (t,)) each sampled window holds, as 0 or 1, shape (b, s, t); all 0 means no window."""
+
+
+@runtime_checkable
+class SamplesProfiles(Protocol):
+    """Capability: profiles sampled from the posterior."""
+
+    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+        """Expected MEP [mV] at some ISIs [ms] (shape (t,)) under each sample, shape (b, s, t)."""
+
+    def baselines_mv(self) -> Tensor:
+        """Expected MEP without a tap [mV] under each sample, shape (b, s)."""
+
+
+@runtime_checkable
+class Conditions(Protocol):
+    """Capability: fantasies, for batches and look-ahead."""
+
+    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> Posterior:
+        """What would be believed after one more trial of each person at these ISIs [ms] with these MEPs [mV].
+
+        It may be rougher than `ResponseModel.update`. Shapes (b,).
+        """
+
+
+@runtime_checkable
+class HasEvidence(Protocol):
+    """Capability: how well the model as a whole predicted the trials."""
+
+    def log_evidence(self) -> Tensor:
+        """Log marginal likelihood of the trials told so far [nat], shape (b,)."""
+
+
+@runtime_checkable
+class ProposesIsi(Protocol):
+    """Capability: a method with a plan of its own."""
+
+    def proposed_isis_ms(self) -> Tensor:
+        """The ISIs [ms] that it wants for each person, in order, before it learns anything, shape (b, k)."""
+
+
+@runtime_checkable
+class ReportsTrouble(Protocol):
+    """Capability: a fit that can fail, and says so."""
+
+    @property
+    def trouble(self) -> str | None:
+        """What went wrong with the last fit and what stands in for it, as full sentences; None where nothing did."""
 
 
 @runtime_checkable
@@ -82,4 +143,8 @@ class ResponseModel(Protocol):
         """The posterior before the first trial."""
 
     def update(self, posterior: Any, observation: Observation) -> Posterior:
-        """The posterior after one more trial."""
+        """The posterior after one more trial.
+
+        Raises:
+            StrategyError: an observation of a kind that the model cannot learn from.
+        """

@@ -50,9 +50,8 @@ class PersonSample:
         response = self.person.response
         excess = self._evoked - self._evoked[..., :1]
         peak = excess[..., -1]
-        floor_mv = response.log_floor.exp()
-        baseline_mv = floor_mv * (torch.exp(0.5 * response.floor_log_sd.square()) + self._evoked[..., 0])
-        enough = peak * floor_mv >= (MIN_EXCESS_OF_BASELINE * baseline_mv).clamp_min(MIN_EXCESS_MV)
+        least_mv = (MIN_EXCESS_OF_BASELINE * self.baselines_mv()).clamp_min(MIN_EXCESS_MV)
+        enough = peak * response.log_floor.exp() >= least_mv
         share = (excess / peak.clamp_min(1e-12).unsqueeze(-1)).contiguous()
         right = torch.searchsorted(share, torch.full_like(share[..., :1], EDGE_LEVEL)).clamp(1, LEVELS - 1)
         low, high = share.gather(-1, right - 1), share.gather(-1, right)
@@ -66,8 +65,16 @@ class PersonSample:
 
     def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
         """Expected MEP [mV], shape (b, s, t)."""
-        response = self.person.response
         evoked = (self._hats(levels(self.person, isi_ms.unsqueeze(0))) @ self._evoked.unsqueeze(-1)).squeeze(-1)
+        return self._with_floor_mv(evoked)
+
+    def baselines_mv(self) -> Tensor:
+        """Expected MEP without a tap [mV], shape (b, s)."""
+        return self._with_floor_mv(self._evoked[..., :1]).squeeze(-1)
+
+    def _with_floor_mv(self, evoked: Tensor) -> Tensor:
+        """From an expected MEP above the floor, in floors, to mV, shape (b, s, ...)."""
+        response = self.person.response
         rest = torch.exp(0.5 * response.floor_log_sd.square()).unsqueeze(-1)
         return response.log_floor.exp().unsqueeze(-1) * (evoked + rest)
 
@@ -85,8 +92,6 @@ class PersonSample:
         )
         return density / density.sum(-1, keepdim=True)
 
-    def outcome_mass(self, isi_ms: Tensor) -> tuple[Tensor, Tensor]:
-        """Weights of the samples (b, s), and the predictive distribution of each, shape (b, s, t, y)."""
-        hats = self._hats(levels(self.person, isi_ms.unsqueeze(0)))
-        weights = torch.full_like(self.person.response.log_floor, 1.0 / self.person.present.shape[-1])
-        return weights, hats @ self._outcome_table
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
+        return self._hats(levels(self.person, isi_ms.unsqueeze(0))) @ self._outcome_table

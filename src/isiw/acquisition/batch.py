@@ -1,0 +1,65 @@
+"""A batch of ISIs to deliver before anything is learnt: greedily, each as if those before it had gone as expected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+
+from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.errors import StrategyError
+from isiw.models.protocol import Conditions, Posterior, ProposesIsi, SamplesProfiles
+
+__all__ = ["greedy_batch"]
+
+
+def greedy_batch(
+    posterior: Posterior,
+    acquisition: AcquisitionFunction,
+    chosen_ms: list[float],
+    n: int,
+    choose: Callable[[Posterior], float],
+) -> list[float]:
+    """ISIs [ms] for the next n trials of one person.
+
+    A method with a plan of its own is asked for it. For all others the posterior is conditioned on the median MEP that
+    it expects at each ISI chosen so far (the kriging believer: Ginsbourger et al., 2010, chapter 6 of Computational
+    Intelligence in Expensive Optimization Problems).
+
+    Args:
+        posterior: what is believed before the batch.
+        acquisition: the acquisition function.
+        chosen_ms: the ISIs [ms] that are chosen already; they come first.
+        n: how many ISIs in all.
+        choose: from a posterior to the next ISI [ms].
+
+    Raises:
+        StrategyError: the posterior can imagine no trials, or the method's own plan is shorter.
+    """
+    if ProposesIsi in acquisition.needs and isinstance(posterior, ProposesIsi):
+        plan = posterior.proposed_isis_ms()[0].tolist()
+        if len(plan) < n - len(chosen_ms):
+            raise StrategyError(
+                "the method plans no further ahead", got=n, expected=f"at most {len(plan) + len(chosen_ms)} ISIs"
+            )
+        return [*chosen_ms, *plan[: n - len(chosen_ms)]]
+    batch = chosen_ms[:n]
+    imagined = 0
+    while len(batch) < n:
+        for isi_ms in batch[imagined:]:
+            posterior = _as_expected(posterior, isi_ms)
+        imagined = len(batch)
+        batch.append(choose(posterior))
+    return batch
+
+
+def _as_expected(posterior: Posterior, isi_ms: float) -> Posterior:
+    missing = [c.__name__ for c in (Conditions, SamplesProfiles) if not isinstance(posterior, c)]
+    if not (isinstance(posterior, Conditions) and isinstance(posterior, SamplesProfiles)):
+        raise StrategyError(
+            f"{type(posterior).__name__} cannot imagine trials, which a batch needs",
+            got=f"a posterior without {', '.join(missing)}",
+            remedy="Ask for one ISI at a time, or choose another model.",
+        )
+    isi = torch.tensor([isi_ms])
+    return posterior.condition(isi, posterior.profiles_mv(isi).median(dim=1).values.squeeze(-1))

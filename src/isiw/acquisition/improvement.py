@@ -1,0 +1,157 @@
+"""Acquisition functions for those who seek the best ISI only: where the expected MEP is largest.
+
+Expected improvement on the logarithmic scale (Ament et al., arXiv:2310.20708), upper confidence bound (Srinivas et al.,
+arXiv:0912.3995), Thompson sampling (Thompson, Biometrika 25, 1933) and knowledge gradient (Frazier et al., SIAM J.
+Control Optim. 47, 2008).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+import torch
+
+from isiw.acquisition.lookahead import lookahead
+from isiw.errors import InvalidValueError
+from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesProfiles, Tensor
+
+__all__ = [
+    "KnowledgeGradient",
+    "LogExpectedImprovement",
+    "Thompson",
+    "UpperConfidenceBound",
+    "knowledge_gradient",
+    "log_expected_improvement",
+    "thompson",
+    "upper_confidence_bound",
+]
+
+
+class _ProfilePosterior(PredictsOutcomes, SamplesProfiles, Protocol):
+    """A posterior of profiles that predicts the next MEP."""
+
+
+class _CountedProfiles(Posterior, SamplesProfiles, Protocol):
+    """A posterior of profiles that knows how many trials there were."""
+
+
+def log_expected_improvement(posterior: SamplesProfiles, isi_ms: Tensor, softness: float = 0.01) -> Tensor:
+    """Log expected improvement of the expected MEP over the best posterior mean [log mV], shape (b, t).
+
+    Where no sample improves, a soft hinge still tells near from far.
+
+    Args:
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
+        softness: width of the hinge, as a share of the profiles' posterior SD.
+    """
+    profiles = posterior.profiles_mv(isi_ms)
+    best = profiles.mean(dim=1).amax(dim=-1)[:, None, None]
+    scale = (softness * profiles.std(dim=1, correction=0).amax(dim=-1)).clamp_min(1e-9)[:, None, None]
+    steps = (profiles - best) / scale
+    # log softplus(x) is x itself far below the hinge, where softplus would underflow.
+    log_hinge = torch.where(steps < -15.0, steps, torch.log(torch.nn.functional.softplus(steps.clamp_min(-15.0))))
+    score: Tensor = torch.logsumexp(log_hinge, dim=1) - math.log(profiles.shape[1]) + scale.squeeze(-1).log()
+    return score
+
+
+def upper_confidence_bound(posterior: SamplesProfiles, isi_ms: Tensor, width_sd: float = 2.0) -> Tensor:
+    """Posterior mean of the expected MEP and some SDs [mV], shape (b, t).
+
+    Args:
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
+        width_sd: how many SDs.
+    """
+    profiles = posterior.profiles_mv(isi_ms)
+    return profiles.mean(dim=1) + width_sd * profiles.std(dim=1, correction=0)
+
+
+def thompson(posterior: _CountedProfiles, isi_ms: Tensor, seed: int = 0) -> Tensor:
+    """The expected MEP under one posterior sample [mV], shape (b, t).
+
+    Args:
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
+        seed: seed of the choice, with the number of trials.
+    """
+    profiles = posterior.profiles_mv(isi_ms)
+    people, samples = profiles.shape[:2]
+    rng = np.random.default_rng([seed, posterior.trials])
+    return profiles[torch.arange(people), torch.as_tensor(rng.integers(samples, size=people))]
+
+
+def knowledge_gradient(posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
+    """By how much the next MEP is expected to raise the largest posterior mean [mV], shape (b, t).
+
+    Args:
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
+    """
+    profiles = posterior.profiles_mv(isi_ms)
+    ahead = lookahead(posterior.outcome_mass(isi_ms), profiles)
+    return (ahead.probability * ahead.mean.amax(dim=-1)).sum(-1) - profiles.mean(dim=1).amax(dim=-1, keepdim=True)
+
+
+@dataclass(frozen=True)
+class LogExpectedImprovement:
+    """Log expected improvement over the best posterior mean."""
+
+    needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
+
+    def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return log_expected_improvement(posterior, isi_ms)
+
+
+@dataclass(frozen=True)
+class UpperConfidenceBound:
+    """Posterior mean and some SDs.
+
+    Args:
+        width_sd: how many SDs; larger explores more.
+
+    Raises:
+        InvalidValueError: a negative number of SDs.
+    """
+
+    width_sd: float = 2.0
+    needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
+
+    def __post_init__(self) -> None:
+        if not self.width_sd >= 0:
+            raise InvalidValueError("width_sd must not be negative", got=self.width_sd)
+
+    def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return upper_confidence_bound(posterior, isi_ms, self.width_sd)
+
+
+@dataclass(frozen=True)
+class Thompson:
+    """The best ISI of one posterior sample, another one on each trial.
+
+    Args:
+        seed: seed of the choice of the sample.
+    """
+
+    seed: int = 0
+    needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
+
+    def __call__(self, posterior: _CountedProfiles, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return thompson(posterior, isi_ms, self.seed)
+
+
+@dataclass(frozen=True)
+class KnowledgeGradient:
+    """Expected gain in the best posterior mean."""
+
+    needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
+
+    def __call__(self, posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return knowledge_gradient(posterior, isi_ms)

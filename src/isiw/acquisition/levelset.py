@@ -1,0 +1,132 @@
+"""Acquisition functions for level sets: ask where it is least clear on which side of the window's edge an ISI lies.
+
+The level is the 0.135 rule's, and so is uncertain itself: each posterior sample has a margin, by which its expected MEP
+exceeds the share `EDGE_LEVEL` of its own largest excess over its own baseline. Straddle: Bryan et al., NIPS 2005.
+Expected feasibility: Bichon et al., AIAA J. 46, 2008, here integrated over the range and one step ahead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import torch
+
+from isiw.acquisition.lookahead import lookahead
+from isiw.errors import InvalidValueError
+from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, Tensor
+from isiw.window import EDGE_LEVEL
+
+__all__ = ["IntegratedFeasibility", "Straddle", "expected_feasibility", "integrated_feasibility_reduction", "straddle"]
+
+_INV_SQRT_2PI = 0.3989422804014327
+
+
+class _ProfilePosterior(PredictsOutcomes, SamplesProfiles, Protocol):
+    """A posterior of profiles that predicts the next MEP."""
+
+
+def _margins_mv(posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
+    """By how much each sample is above the level of its window's edge [mV], shape (b, s, t)."""
+    excess = posterior.profiles_mv(isi_ms) - posterior.baselines_mv().unsqueeze(-1)
+    return excess - EDGE_LEVEL * excess.amax(dim=-1, keepdim=True).clamp_min(0.0)
+
+
+def straddle(posterior: SamplesProfiles, isi_ms: Tensor, width_sd: float = 1.96) -> Tensor:
+    """How far the margin's credible interval reaches across zero [mV], shape (b, t).
+
+    Args:
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
+        width_sd: half the interval's width [SD].
+    """
+    margins = _margins_mv(posterior, isi_ms)
+    return width_sd * margins.std(dim=1, correction=0) - margins.mean(dim=1).abs()
+
+
+def expected_feasibility(mean: Tensor, sd: Tensor, band_sd: float = 2.0) -> Tensor:
+    """Expected depth inside a band of `band_sd` SDs around the level, of a Gaussian margin.
+
+    Args:
+        mean: of the margin, any shape.
+        sd: of the margin, of the same shape.
+        band_sd: half the band's width [SD].
+    """
+    z = mean / sd.clamp_min(1e-12)
+    low, high = -band_sd - z, band_sd - z
+    below, at, above = (torch.special.ndtr(x) for x in (low, -z, high))
+    inside = band_sd * (above - below)
+    # By parts: the expected distance from the level, where the margin is inside the band.
+    distance = z * (below + above - 2.0 * at) + 2.0 * _density(z) - _density(low) - _density(high)
+    feasibility: Tensor = sd * (inside - distance)
+    return feasibility
+
+
+def _density(z: Tensor) -> Tensor:
+    """Of a standard Gaussian."""
+    return _INV_SQRT_2PI * torch.exp(-0.5 * z.square())
+
+
+def integrated_feasibility_reduction(posterior: _ProfilePosterior, isi_ms: Tensor, band_sd: float = 2.0) -> Tensor:
+    """By how much the next MEP is expected to reduce the summed expected feasibility [mV], shape (b, t).
+
+    Args:
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
+        band_sd: half the band's width [SD].
+    """
+    margins = _margins_mv(posterior, isi_ms)
+    now = expected_feasibility(margins.mean(dim=1), margins.std(dim=1, correction=0), band_sd).sum(-1, keepdim=True)
+    centre = margins.mean(dim=1, keepdim=True)
+    offset = margins - centre
+    ahead = lookahead(posterior.outcome_mass(isi_ms), torch.cat((offset, offset.square()), dim=-1))
+    first, second = ahead.mean.chunk(2, dim=-1)
+    sd = (second - first.square()).clamp_min(0.0).sqrt()
+    later = expected_feasibility(centre.unsqueeze(1) + first, sd, band_sd).sum(-1)
+    return now - (ahead.probability * later).sum(-1)
+
+
+@dataclass(frozen=True)
+class Straddle:
+    """Ask where the margin's credible interval reaches furthest across the edge's level.
+
+    Args:
+        width_sd: half the interval's width [SD]; larger explores more.
+
+    Raises:
+        InvalidValueError: a width that is not positive.
+    """
+
+    width_sd: float = 1.96
+    needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
+
+    def __post_init__(self) -> None:
+        if not self.width_sd > 0:
+            raise InvalidValueError("width_sd must be positive", got=self.width_sd)
+
+    def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return straddle(posterior, isi_ms, self.width_sd)
+
+
+@dataclass(frozen=True)
+class IntegratedFeasibility:
+    """Ask what is expected to leave the fewest ISIs near the edge's level.
+
+    Args:
+        band_sd: half the width of the band around the level [SD].
+
+    Raises:
+        InvalidValueError: a band that is not positive.
+    """
+
+    band_sd: float = 2.0
+    needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
+
+    def __post_init__(self) -> None:
+        if not self.band_sd > 0:
+            raise InvalidValueError("band_sd must be positive", got=self.band_sd)
+
+    def __call__(self, posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return integrated_feasibility_reduction(posterior, isi_ms, self.band_sd)

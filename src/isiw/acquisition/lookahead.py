@@ -1,0 +1,54 @@
+"""One step ahead: what each value of the next MEP would make of the posterior samples."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from isiw.models.protocol import Tensor
+
+__all__ = ["Lookahead", "expected_variance_reduction", "lookahead"]
+
+
+class Lookahead(NamedTuple):
+    """Expectations after the next MEP.
+
+    Args:
+        probability: of each value of the next MEP, shape (b, t, y).
+        mean: expectation of each quantity given that value, shape (b, t, y, g).
+    """
+
+    probability: Tensor
+    mean: Tensor
+
+
+def lookahead(mass: Tensor, values: Tensor) -> Lookahead:
+    """Expectations of some quantities after each value of the next MEP.
+
+    Args:
+        mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
+        values: the quantities under each sample, shape (b, s, g).
+    """
+    people, samples, candidates, outcomes = mass.shape
+    joint = mass.flatten(2).transpose(1, 2) / samples
+    probability = joint.sum(-1, keepdim=True).clamp_min(1e-12)
+    mean = (joint @ values) / probability
+    return Lookahead(
+        probability.view(people, candidates, outcomes), mean.view(people, candidates, outcomes, values.shape[-1])
+    )
+
+
+def expected_variance_reduction(mass: Tensor, values: Tensor) -> Tensor:
+    """By how much the next MEP is expected to reduce the summed variance of some quantities.
+
+    By the law of total variance it is the variance of their means after the next MEP.
+
+    Args:
+        mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
+        values: the quantities under each sample, shape (b, s, g).
+
+    Returns:
+        Shape (b, t).
+    """
+    # Centred, so that a small reduction is not the difference of two large numbers.
+    ahead = lookahead(mass, values - values.mean(dim=1, keepdim=True))
+    return (ahead.probability * ahead.mean.square().sum(-1)).sum(-1)

@@ -1,0 +1,104 @@
+"""Acquisition functions from variance: of the profile where it is asked, of the whole profile, and of the edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import torch
+
+from isiw.acquisition.lookahead import expected_variance_reduction
+from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
+
+__all__ = [
+    "EdgeVariance",
+    "IntegratedVariance",
+    "ProfileVariance",
+    "edge_variance_reduction",
+    "integrated_variance_reduction",
+    "profile_variance",
+]
+
+
+class _ProfilePosterior(PredictsOutcomes, SamplesProfiles, Protocol):
+    """A posterior of profiles that predicts the next MEP."""
+
+
+class _WindowPosterior(PredictsOutcomes, SamplesWindows, Protocol):
+    """A posterior of windows that predicts the next MEP."""
+
+
+def profile_variance(posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
+    """Posterior variance of the expected MEP at each ISI [mV²], shape (b, t).
+
+    Args:
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
+    """
+    return posterior.profiles_mv(isi_ms).var(dim=1, correction=0)
+
+
+def integrated_variance_reduction(posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
+    """Expected reduction of the profile's variance, summed over the candidates [mV²], shape (b, t).
+
+    The best ISI is the one of least integrated posterior variance: qNIPV of BoTorch with one point (Seo et al., IJCNN
+    2000), for any posterior.
+
+    Args:
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
+    """
+    return expected_variance_reduction(posterior.outcome_mass(isi_ms), posterior.profiles_mv(isi_ms))
+
+
+def edge_variance_reduction(posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+    """Expected reduction of the summed variance of start and end of the window, given that there is one, shape (b, t).
+
+    Edges are counted in candidates, so that the score does not depend on the range; an edge beyond the range is on it.
+
+    Args:
+        posterior: what is believed.
+        isi_ms: candidate ISIs [ms], shape (t,).
+    """
+    masks = posterior.window_masks(isi_ms)
+    edges = torch.stack((masks.argmax(-1), masks.shape[-1] - 1 - masks.flip(-1).argmax(-1)), dim=-1).to(masks.dtype)
+    found = masks.any(-1)
+    # Samples without a window have no edges, and are left out.
+    count = found.sum(-1).clamp_min(1)[:, None, None]
+    mean = torch.where(found.unsqueeze(-1), edges, 0.0).sum(dim=1, keepdim=True) / count
+    centred = torch.where(found.unsqueeze(-1), edges - mean, 0.0)
+    mass = posterior.outcome_mass(isi_ms) * found[..., None, None]
+    return expected_variance_reduction(mass, centred)
+
+
+@dataclass(frozen=True)
+class ProfileVariance:
+    """Posterior variance of the expected MEP: ask where the profile is least known."""
+
+    needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
+
+    def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return profile_variance(posterior, isi_ms)
+
+
+@dataclass(frozen=True)
+class IntegratedVariance:
+    """Expected reduction of the integrated posterior variance: ask what says most about the whole profile."""
+
+    needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
+
+    def __call__(self, posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return integrated_variance_reduction(posterior, isi_ms)
+
+
+@dataclass(frozen=True)
+class EdgeVariance:
+    """Expected reduction of the variance of both edges."""
+
+    needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
+
+    def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs."""
+        return edge_variance_reduction(posterior, isi_ms)
