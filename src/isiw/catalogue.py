@@ -9,7 +9,15 @@ from typing import Any, Final
 from isiw.asktell import Recipe, Strategy
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
-from isiw.settings import ParticleSettings, Settings
+from isiw.settings import (
+    GPRSettings,
+    NRSettings,
+    ParticleSettings,
+    PFSettings,
+    Settings,
+    SVMRSettings,
+    SweepSettings,
+)
 
 __all__ = ["list_strategies", "make_strategy", "settings_of"]
 
@@ -43,6 +51,16 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
     "random": _Entry(
         "Particle posterior; random ISIs, whatever the responses.", ParticleSettings, {"acquisition": "random"}
     ),
+    "nr": _Entry("Dissertation: nonlinear regression of one Gaussian.", NRSettings),
+    "nr2": _Entry(
+        "Dissertation: nonlinear regression of two Gaussians.",
+        NRSettings,
+        {"peaks": 2, "initial": 7, "segments": "all"},
+    ),
+    "svmr": _Entry("Dissertation: support vector regression.", SVMRSettings),
+    "gpr": _Entry("Dissertation: Gaussian process regression of the amplitudes.", GPRSettings),
+    "pf": _Entry("Dissertation: bootstrap particle filter over ISIs, a generation of particles at a time.", PFSettings),
+    "incremental": _Entry("Conventional search: twelve trials each 5 ms, until the window was passed.", SweepSettings),
 }
 
 

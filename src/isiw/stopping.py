@@ -23,6 +23,7 @@ __all__ = [
     "Progress",
     "StopDecision",
     "StoppingRule",
+    "SweptPast",
     "looks_back",
     "stimuli_left",
 ]
@@ -222,6 +223,36 @@ class ParticleSpread:
         if spread_ms <= self.sd_ms:
             return StopDecision(stop=True, reason=f"The particles have converged: {spread}.")
         return StopDecision(stop=False, reason=f"The particles have not converged: {spread}.")
+
+
+@dataclass(frozen=True)
+class SweptPast:
+    """Stop a sweep that has left the window behind: the dissertation's manual termination (4.2.1).
+
+    Only an estimate whose `grid_ms` is what was swept so far can be judged by it.
+
+    Args:
+        quiet_ms: how far behind the window's end nothing was enhanced [ms].
+
+    Raises:
+        InvalidValueError: a distance that is not positive.
+    """
+
+    quiet_ms: float = 25.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.quiet_ms) and self.quiet_ms > 0):
+            raise InvalidValueError("quiet_ms must be positive", got=self.quiet_ms)
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        window, swept_ms = progress.estimate.window, progress.estimate.grid_ms
+        if window is None or swept_ms is None:
+            return StopDecision(stop=False, reason="The sweep has met no window yet.")
+        behind = f"it has come {swept_ms[-1] - window.end_ms:.0f} ms behind the window's end"
+        if swept_ms[-1] - window.end_ms >= self.quiet_ms:
+            return StopDecision(stop=True, reason=f"The sweep has passed the window: {behind}.")
+        return StopDecision(stop=False, reason=f"The sweep has not passed the window: {behind}.")
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ def normalised(weights: FloatArray) -> FloatArray:
         weights: not negative, shape (b, p).
     """
     total = weights.sum(axis=-1, keepdims=True)
-    return np.where(total > 0, weights, 1.0) / np.where(total > 0, total, weights.shape[-1])
+    return np.asarray(np.where(total > 0, weights, 1.0) / np.where(total > 0, total, weights.shape[-1]))
 
 
 def resampled(particles: FloatArray, weights: FloatArray, uniform: FloatArray) -> FloatArray:

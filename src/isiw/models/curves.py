@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 
 from isiw.errors import InvalidValueError
 from isiw.models.told import PersonTrials
-from isiw.types import ArrayLike, BoolArray, FloatArray
+from isiw.types import BoolArray, FloatArray
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
 
 __all__ = ["FittedCurve", "Floor", "FloorKind", "Segments", "curve_masks"]
@@ -54,13 +54,8 @@ class Floor:
             return float(trials.baseline_mv.mean())
         return float(np.median(trials.mep_mv)) if len(trials.mep_mv) else 0.0
 
-    def excess_mv(self, mep_mv: FloatArray, level_mv: ArrayLike) -> FloatArray:
-        """What MEPs have above the floor [mV], same shape.
-
-        Args:
-            mep_mv: MEPs [mV].
-            level_mv: the floor [mV]; broadcast.
-        """
+    def excess_mv(self, mep_mv: FloatArray, level_mv: FloatArray | float) -> FloatArray:
+        """What MEPs [mV] have above the floor [mV]; broadcast shape."""
         return np.where(mep_mv < self.threshold_mv, 0.0, mep_mv) if self.kind == "zeroed" else mep_mv - level_mv
 
 
@@ -99,21 +94,25 @@ class FittedCurve:
         return self.mean_mv - reach, self.mean_mv + reach
 
 
-def curve_masks(curves_mv: FloatArray, floor_mv: float, segments: Segments = "peak") -> BoolArray:
+def curve_masks(
+    curves_mv: FloatArray, floor_mv: float, segments: Segments = "peak", level: float = EDGE_LEVEL
+) -> BoolArray:
     """Which grid points lie in the windows of some curves, by the rule of `isiw.window.window_from_excess`.
 
     Args:
         curves_mv: expected MEPs above the floor [mV], shape (s, t).
         floor_mv: expected MEP without a tap [mV].
         segments: `"all"` of them, or the one that holds the `"peak"`.
+        level: the share of the largest excess that an edge has.
 
     Returns:
         Shape (s, t); all False where there is no window.
     """
     peak = curves_mv.max(axis=-1, keepdims=True)
     enough = peak >= max(MIN_EXCESS_OF_BASELINE * floor_mv, MIN_EXCESS_MV)
-    masks = np.asarray(enough & (curves_mv >= EDGE_LEVEL * peak))
+    masks: BoolArray = enough & (curves_mv >= level * peak)
     if segments == "all":
         return masks
     gaps_before = (~masks).cumsum(axis=-1)
-    return masks & (gaps_before == np.take_along_axis(gaps_before, curves_mv.argmax(axis=-1)[..., None], axis=-1))
+    at_peak = np.take_along_axis(gaps_before, curves_mv.argmax(axis=-1)[..., None], axis=-1)
+    return np.asarray(masks & (gaps_before == at_peak))

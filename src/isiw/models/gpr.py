@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,8 @@ class GaussianProcessRegression:
 
     Args:
         length_ms: the kernel's length where the search for it starts [ms].
-        length_bounds_ms: between which it is searched [ms].
+        min_length_ms: shortest length that is searched [ms].
+        max_length_ms: longest length that is searched [ms].
         noise: noise SD where the search starts, as a share of the largest excess.
         max_iterations: iterations after which the search gives up.
         samples: how many curves are drawn.
@@ -45,15 +47,16 @@ class GaussianProcessRegression:
     """
 
     length_ms: float = 40.0
-    length_bounds_ms: tuple[float, float] = (25.0, 100.0)
+    min_length_ms: float = 25.0
+    max_length_ms: float = 100.0
     noise: float = 0.3
-    max_iterations: int = 20
+    max_iterations: int = 40
     samples: int = 64
 
     def __post_init__(self) -> None:
-        low, high = self.length_bounds_ms
-        if not 0 < low <= self.length_ms <= high < math.inf:
-            raise InvalidValueError("the length lies within its bounds", got=(low, self.length_ms, high))
+        lengths = (self.min_length_ms, self.length_ms, self.max_length_ms)
+        if not 0 < lengths[0] <= lengths[1] <= lengths[2] < math.inf:
+            raise InvalidValueError("min_length_ms, length_ms and max_length_ms ascend from above 0", got=lengths)
         if not 0 < self.noise < 1:
             raise InvalidValueError("noise is a share of the largest excess", got=self.noise, expected="0–1")
         if self.max_iterations < 1 or self.samples < 2:
@@ -89,25 +92,27 @@ class GaussianProcessRegression:
         from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
 
         signal = ConstantKernel(1.0, (0.01, 10.0))
-        kernel = signal * RBF(self.length_ms, self.length_bounds_ms) + WhiteKernel(self.noise**2, (1e-4, 1.0))
+        kernel = signal * RBF(self.length_ms, (self.min_length_ms, self.max_length_ms)) + WhiteKernel(
+            self.noise**2, (1e-4, 1.0)
+        )
         process = GaussianProcessRegressor(kernel, optimizer=None)
         if not len(isi):
             return process, self.noise, "There are no trials to fit yet: the Gaussian process before any stands in."
         process.fit(isi, scaled)
         found = minimize(
-            lambda theta: _negative(process.log_marginal_likelihood(theta, eval_gradient=True, clone_kernel=False)),
+            partial(_cost, process),
             kernel.theta,
             jac=True,
+            method="L-BFGS-B",
             bounds=kernel.bounds,
-            options={"maxiter": self.max_iterations},
+            options={"maxiter": self.max_iterations, "ftol": 1e-5},
         )
         process = GaussianProcessRegressor(kernel.clone_with_theta(found.x), optimizer=None).fit(isi, scaled)
-        trouble = None if found.success else (
-            f"The kernel's parameters did not converge in {self.max_iterations} iterations: the best found stand in."
-        )
-        return process, math.exp(0.5 * found.x[-1]), trouble
+        gave_up = f"The kernel did not converge in {self.max_iterations} iterations: its best parameters stand in."
+        return process, math.exp(0.5 * found.x[-1]), None if found.success else gave_up
 
 
-def _negative(value_and_gradient: tuple[float, FloatArray]) -> tuple[float, FloatArray]:
-    value, gradient = value_and_gradient
-    return -value, -gradient
+def _cost(process: Any, theta: FloatArray) -> tuple[float, FloatArray]:
+    """Negative log marginal likelihood of a process, and its gradient."""
+    value, gradient = process.log_marginal_likelihood(theta, eval_gradient=True, clone_kernel=False)
+    return -float(value), -gradient

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -70,11 +71,13 @@ class NonlinearRegression:
 
     The text starts the mean at mid-range and takes width and amplitude from prior knowledge (5.4.2), whose values it
     does not give; two Gaussians start a quarter of the window's width to either side of it. Amplitudes are not
-    negative, means stay in the range, and SDs between a fifth of their start value and half the range.
+    negative, and means stay in the range.
 
     Args:
         peaks: how many Gaussians, 1 or 2.
         width_ms: width of a window before anything is known [ms]; a Gaussian's SD is a quarter of it. Table 4.1: 108.
+        min_width_ms: the narrowest window that is fitted [ms]; Table 4.1 has 60–220, and no bounds.
+        max_width_ms: the widest [ms].
         amplitude_mv: amplitude before anything is known [mV]; the text's figures have 0.03–0.3 mV.
         max_evaluations: evaluations after which the search gives up.
         samples: how many curves are drawn from the parameters' asymptotic distribution.
@@ -85,7 +88,8 @@ class NonlinearRegression:
 
     peaks: int = 1
     width_ms: float = 108.0
-    width_bounds_ms: tuple[float, float] = (40.0, 250.0)
+    min_width_ms: float = 40.0
+    max_width_ms: float = 250.0
     amplitude_mv: float = 0.05
     max_evaluations: int = 100
     samples: int = 64
@@ -93,8 +97,11 @@ class NonlinearRegression:
     def __post_init__(self) -> None:
         if self.peaks not in {1, 2}:
             raise InvalidValueError("a nonlinear regression has 1 or 2 peaks", got=self.peaks)
-        if not (0 < self.width_ms < math.inf and 0 < self.amplitude_mv < math.inf):
-            raise InvalidValueError("width and amplitude must be positive", got=(self.width_ms, self.amplitude_mv))
+        widths = (self.min_width_ms, self.width_ms, self.max_width_ms)
+        if not 0 < widths[0] <= widths[1] <= widths[2] < math.inf or widths[0] == widths[2]:
+            raise InvalidValueError("min_width_ms, width_ms and max_width_ms ascend from above 0", got=widths)
+        if not 0 < self.amplitude_mv < math.inf:
+            raise InvalidValueError("amplitude_mv must be positive", got=self.amplitude_mv)
         if self.max_evaluations < 1 or self.samples < 2:
             raise InvalidValueError(
                 "a search needs evaluations and two samples", got=(self.max_evaluations, self.samples)
@@ -127,7 +134,8 @@ class NonlinearRegression:
         apart_ms = 0.0 if self.peaks == 1 else self.width_ms / 4.0
         start = [[self.amplitude_mv, middle_ms + side * apart_ms, sd_ms] for side in (-1, 1)[: self.peaks]]
         sd = [self.amplitude_mv, range_ms / math.sqrt(12.0), 0.5 * sd_ms]
-        low, high = ([a, edge, b / 4.0] for a, edge, b in zip((0.0, math.inf), (space.low_ms, space.high_ms), self.width_bounds_ms))
+        low = [0.0, space.low_ms, 0.25 * self.min_width_ms]
+        high = [math.inf, space.high_ms, 0.25 * self.max_width_ms]
         return _Beliefs(np.ravel(start), *(np.tile(values, self.peaks) for values in (sd, low, high)))
 
     def _least_squares(self, isi_ms: FloatArray, excess_mv: FloatArray, beliefs: _Beliefs) -> _Estimate:
@@ -138,19 +146,24 @@ class NonlinearRegression:
             trouble = f"{len(isi_ms)} trials do not determine {len(flat)} parameters: a flat curve stands in."
             return _Estimate(flat, np.diag(beliefs.sd**2), self.amplitude_mv, trouble=trouble)
         found = least_squares(
-            lambda parameters: gaussians_mv(isi_ms, parameters) - excess_mv,
+            partial(_residuals_mv, isi_ms, excess_mv),
             beliefs.start,
-            jac=lambda parameters: gradient_mv(isi_ms, parameters),
+            jac=partial(gradient_mv, isi_ms),
             bounds=(beliefs.low, beliefs.high),
             x_scale=beliefs.sd,
+            ftol=1e-6,
+            xtol=1e-6,
             max_nfev=self.max_evaluations,
         )
         noise_mv = max(math.sqrt(2.0 * found.cost / free), LEAST_NOISE_MV)
-        covariance, trouble = _covariance(gradient_mv(isi_ms, found.x) / noise_mv, beliefs.sd)
-        if not found.success:
-            gave_up = f"The fit did not converge in {self.max_evaluations} evaluations: its best curve stands in."
-            trouble = f"{gave_up} {trouble}" if trouble else gave_up
-        return _Estimate(found.x, covariance, noise_mv, free, trouble)
+        covariance, doubt = _covariance(gradient_mv(isi_ms, found.x) / noise_mv, beliefs.sd)
+        gave_up = f"The fit did not converge in {self.max_evaluations} evaluations: its best curve stands in."
+        trouble = " ".join(filter(None, ("" if found.success else gave_up, doubt)))
+        return _Estimate(found.x, covariance, noise_mv, free, trouble or None)
+
+
+def _residuals_mv(isi_ms: FloatArray, excess_mv: FloatArray, parameters: FloatArray) -> FloatArray:
+    return gaussians_mv(isi_ms, parameters) - excess_mv
 
 
 def _covariance(gradient: FloatArray, prior_sd: FloatArray) -> tuple[FloatArray, str | None]:

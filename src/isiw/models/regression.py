@@ -63,7 +63,9 @@ class RegressionModel:
 
     def __post_init__(self) -> None:
         if self.segments not in {"peak", "all"}:
-            raise InvalidValueError("a window has all segments or the peak's", got=self.segments, expected="peak or all")
+            raise InvalidValueError(
+                "a window has all segments or the peak's", got=self.segments, expected="peak or all"
+            )
 
     def prior(self, space: DesignSpace, seed: int, people: int = 1) -> RegressionPosterior:
         """The posterior before the first trial."""
@@ -187,5 +189,3 @@ class RegressionPosterior:
             grid_ms=curve.grid_ms,
             profile_quantiles_mv=np.stack((low, curve.mean_mv, high)) + floor_mv,
         )
-
-
