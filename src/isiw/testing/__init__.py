@@ -1,0 +1,13 @@
+"""Conformance suites: what every implementation of one of isiw's protocols must pass.
+
+Run them from your own tests, and `check_device` for hardware with the coil on a phantom.
+"""
+
+from __future__ import annotations
+
+from isiw.testing.acquisition import check_acquisition
+from isiw.testing.devices import check_device
+from isiw.testing.models import check_model
+from isiw.testing.strategies import check_strategy
+
+__all__ = ["check_acquisition", "check_device", "check_model", "check_strategy"]

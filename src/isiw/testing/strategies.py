@@ -1,0 +1,113 @@
+"""The conformance suite of strategies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from isiw.asktell import Strategy
+from isiw.errors import InvalidValueError, StrategyError
+from isiw.stopping import StopDecision
+from isiw.testing.promises import (
+    Trials,
+    check_estimate,
+    require,
+    same_estimates,
+    trials_that_break_things,
+    usual_trials,
+)
+
+__all__ = ["check_strategy"]
+
+
+def check_strategy(make: Callable[[], Strategy], *, trials: int = 12) -> None:
+    """Check that a strategy keeps the promises of ask and tell.
+
+    Args:
+        make: makes the strategy, before its first trial, the same each time.
+        trials: how many trials each check runs at most; a strategy that plans several trials at once needs more.
+
+    Raises:
+        AssertionError: a promise is broken; the message says which.
+    """
+    _check_asking(make())
+    _check_refusals(make())
+    for what, told in trials_that_break_things(make().space, trials).items():
+        _check_learning(make(), told, f"after: {what}")
+    _check_replay(make, usual_trials(make().space)[:trials])
+    _check_mistrials(make)
+    _check_deadline(make())
+
+
+def _check_asking(strategy: Strategy) -> None:
+    isi_ms = strategy.ask()
+    require(isi_ms in strategy.space.grid_ms, f"ask answers an ISI on the grid, here {isi_ms}")
+    require(strategy.ask() == isi_ms, "ask answers the same until the next tell")
+    require(strategy.ask_batch(1) == [isi_ms], "a batch of one is what ask answers")
+    try:
+        batch = strategy.ask_batch(3)
+    except StrategyError:
+        return
+    require(len(batch) == 3 and batch[0] == isi_ms, f"a batch has n ISIs and begins with ask's, here {batch}")
+    require(all(isi in strategy.space.grid_ms for isi in batch), f"a batch is on the grid, here {batch}")
+
+
+def _check_refusals(strategy: Strategy) -> None:
+    isi_ms, far_ms = strategy.ask(), strategy.space.high_ms + 2 * strategy.space.tolerance_ms + 1
+    before = strategy.estimate()
+    refused: list[tuple[float | None, dict[str, Any]]] = [
+        (isi_ms, {"mep_mv": math.nan}),
+        (isi_ms, {"mep_mv": -1.0}),
+        (isi_ms, {}),
+        (isi_ms, {"mep_mv": 0.1, "response": True}),
+        (math.nan, {"mep_mv": 0.1}),
+        (far_ms, {"mep_mv": 0.1}),
+    ]
+    for isi, outcome in refused:
+        try:
+            strategy.tell(isi, **outcome)
+        except InvalidValueError:
+            continue
+        raise AssertionError(f"broken promise: tell refuses {outcome} at {isi} ms")
+    unchanged = strategy.ask() == isi_ms and same_estimates(strategy.estimate(), before)
+    require(unchanged, "a tell that was refused changes nothing")
+
+
+def _check_learning(strategy: Strategy, told: Trials, when: str) -> None:
+    for isi_ms, mep_mv in told:
+        strategy.tell(isi_ms, mep_mv)
+    require(strategy.ask() in strategy.space.grid_ms, f"ask answers an ISI on the grid {when}")
+    check_estimate(strategy.estimate(), strategy.space, when)
+    decision = strategy.decision()
+    require(isinstance(decision, StopDecision) and decision.reason.endswith("."), f"a decision has its reason {when}")
+    require(strategy.decision() == decision, f"deciding changes nothing {when}")
+
+
+def _check_replay(make: Callable[[], Strategy], told: Trials) -> None:
+    first = make()
+    asked = _asks(first, told)
+    for what, other in (("the same again", make()), ("restarted()", first.restarted())):
+        require(_asks(other, told) == asked, f"{what} asks the same after the same tells")
+        require(same_estimates(other.estimate(), first.estimate()), f"{what} estimates the same after the same tells")
+
+
+def _asks(strategy: Strategy, told: Trials) -> list[float]:
+    asked = []
+    for isi_ms, mep_mv in told:
+        asked.append(strategy.ask())
+        strategy.tell(isi_ms, mep_mv)
+    return [*asked, strategy.ask()]
+
+
+def _check_mistrials(make: Callable[[], Strategy]) -> None:
+    strategy, other = make(), make()
+    strategy.count_mistrial()
+    require(strategy.ask() == other.ask(), "a mistrial does not change what is asked")
+    require(same_estimates(strategy.estimate(), other.estimate()), "a mistrial does not change what is believed")
+
+
+def _check_deadline(strategy: Strategy) -> None:
+    isi_ms = strategy.ask(deadline_s=0.0)
+    require(isi_ms in strategy.space.grid_ms, "ask answers an ISI on the grid although its deadline has passed")
+    require(strategy.ask() == isi_ms, "what a deadline was answered with stays until the next tell")

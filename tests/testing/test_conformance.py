@@ -1,0 +1,203 @@
+"""Everything of ours passes the suites that others are given, and the suites find what is broken."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import pytest
+import torch
+
+from isiw.acquisition.information import MutualInformation
+from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.asktell import Strategy
+from isiw.catalogue import list_strategies, make_strategy
+from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.errors import StrategyError
+from isiw.models.particles import ParticleModel, ParticlePosterior
+from isiw.models.protocol import Observation, ProposesIsi, Tensor
+from isiw.settings import ACQUISITIONS
+from isiw.subjects import cohort
+from isiw.testing import check_acquisition, check_model, check_strategy
+from isiw.testing.promises import Trials, trials_that_break_things, usual_trials
+from isiw.window import Window, WindowEstimate
+
+FEW: dict[str, Any] = {"particles": 100}
+NAMES = sorted(list_strategies())
+SCORING = sorted(name for name, make in ACQUISITIONS.items() if ProposesIsi not in make(0).needs)
+
+
+def settings_of(name: str) -> dict[str, Any]:
+    return FEW if name in {"default", "even", "random"} or name.startswith("particles") else {}
+
+
+def particles_after(trials: Trials, people: int = 1) -> ParticlePosterior:
+    model = ParticleModel(particles=100)
+    posterior = model.prior(VALVE_SPACE, 1, people)
+    for isi_ms, mep_mv in trials:
+        columns = (math.nan if isi_ms is None else isi_ms, mep_mv, 0.0, math.nan)
+        posterior = model.update(posterior, Observation(*(torch.full((people,), value) for value in columns)))
+    return posterior
+
+
+@pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
+def test_the_particle_model_conforms(space) -> None:
+    # Particles are a sample: two orders of the same trials differ by its error.
+    check_model(lambda: ParticleModel(particles=400), space, order_tolerance_ms=40.0)
+
+
+@pytest.mark.parametrize("name", SCORING)
+@pytest.mark.parametrize("people", [1, 2])
+def test_every_acquisition_function_conforms_on_particles(name: str, people: int) -> None:
+    check_acquisition(ACQUISITIONS[name](3), particles_after(usual_trials(VALVE_SPACE)[:6], people), VALVE_SPACE)
+
+
+@pytest.mark.parametrize("name", SCORING)
+def test_every_acquisition_function_scores_what_breaks_things(name: str) -> None:
+    for trials in trials_that_break_things(VALVE_SPACE).values():
+        check_acquisition(ACQUISITIONS[name](3), particles_after(trials), VALVE_SPACE)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_named_strategy_conforms(name: str) -> None:
+    check_strategy(lambda: make_strategy(name, seed=1, **settings_of(name)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_every_named_strategy_conforms_over_forty_trials(name: str) -> None:
+    check_strategy(lambda: make_strategy(name, seed=1), trials=40)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("people", ["recruitment", "nonresponder"])
+def test_every_named_strategy_finishes_a_session_of_forty_trials(name: str, people: str) -> None:
+    strategy = make_strategy(name, seed=1, **settings_of(name))
+    responder = cohort(people, 1, 3)[0].begin(3)
+    for _ in range(40):
+        response = responder.respond(strategy.ask(), VALVE_SPACE.reference)
+        strategy.tell(response.isi_ms, response.mep_mv)
+    assert isinstance(strategy.estimate(), WindowEstimate)
+    assert strategy.decision().reason
+
+
+def test_an_acquisition_function_that_cannot_work_with_the_model_is_refused_with_the_reason() -> None:
+    with pytest.raises(StrategyError, match=r"OwnProposal cannot work with ParticleModel.*ProposesIsi"):
+        make_strategy(acquisition="own")
+
+
+@dataclass(frozen=True)
+class Broken:
+    """The particle model with one promise broken."""
+
+    fault: str
+    model: ParticleModel = field(default_factory=lambda: ParticleModel(particles=50))
+
+    def prior(self, space, seed, people=1):
+        return self.model.prior(space, seed, people)
+
+    def update(self, posterior, observation):
+        after = self.model.update(posterior, observation)
+        match self.fault:
+            case "counts twice":
+                return self.model.update(after, observation)
+            case "depends on chance":
+                return replace(after, log_weights=after.log_weights + 20 * torch.rand(()) * after.log_likelihood)
+            case "forgets the first":
+                return after if after.trials > 1 else posterior
+        return self.model.update(posterior, replace(observation, mep_mv=observation.mep_mv * after.trials**2))
+
+
+@pytest.mark.parametrize(
+    ("fault", "promise"),
+    [
+        ("counts twice", "one trial more"),
+        ("depends on chance", "same seed and trials"),
+        ("forgets the first", "one trial more"),
+        ("weighs by the order", "order"),
+    ],
+)
+def test_the_suite_finds_a_broken_model(fault: str, promise: str) -> None:
+    with pytest.raises(AssertionError, match=f"broken promise: .*{promise}"):
+        check_model(lambda: Broken(fault), VALVE_SPACE, order_tolerance_ms=20.0)
+
+
+def flat(_posterior: object, isi_ms: Tensor) -> Tensor:
+    return torch.zeros(len(isi_ms))
+
+
+def undecided(_posterior: object, isi_ms: Tensor) -> Tensor:
+    return torch.full((1, len(isi_ms)), math.nan)
+
+
+def moody(_posterior: object, isi_ms: Tensor) -> Tensor:
+    return torch.rand(1, len(isi_ms))
+
+
+@dataclass(frozen=True)
+class Scoring:
+    """An acquisition function of a plain function."""
+
+    score: Any
+    needs: tuple[type, ...] = ()
+
+    def __call__(self, posterior: object, isi_ms: Tensor) -> Tensor:
+        return self.score(posterior, isi_ms)
+
+
+@pytest.mark.parametrize(
+    ("acquisition", "promise"),
+    [
+        (Scoring(flat), "shape"),
+        (Scoring(undecided), "finite"),
+        (Scoring(moody), "same scores"),
+        (Scoring(flat, needs=(ProposesIsi,)), "not ProposesIsi"),
+        (flat, "says what it needs"),
+    ],
+)
+def test_the_suite_finds_a_broken_acquisition_function(acquisition: AcquisitionFunction, promise: str) -> None:
+    with pytest.raises(AssertionError, match=promise):
+        check_acquisition(acquisition, particles_after(()), VALVE_SPACE)
+
+
+class Forgetful(Strategy):
+    """Asks something else each time."""
+
+    def ask(self, deadline_s: float | None = None) -> float:
+        self._next_isi_ms = None
+        self._told += 1
+        return super().ask(deadline_s)
+
+
+class Gullible(Strategy):
+    """Accepts whatever it is told."""
+
+    def tell(self, isi_ms, mep_mv=None, **others) -> None:
+        if mep_mv is not None and mep_mv >= 0:
+            super().tell(isi_ms, mep_mv, **others)
+
+
+class Adventurous(Strategy):
+    """Reports a window that nobody could have asked about."""
+
+    def estimate(self) -> WindowEstimate:
+        return replace(super().estimate(), probability=0.9, window=Window(-100.0, 50.0))
+
+
+@pytest.mark.parametrize(
+    ("kind", "promise"), [(Forgetful, "until the next tell"), (Gullible, "refuses"), (Adventurous, "lies in the space")]
+)
+def test_the_suite_finds_a_broken_strategy(kind: type[Strategy], promise: str) -> None:
+    usual = make_strategy("even", **FEW)
+    with pytest.raises(AssertionError, match=promise):
+        check_strategy(lambda: kind(usual.space, usual.model, usual.acquisition, usual.stopping))
+
+
+def test_a_model_and_an_acquisition_function_from_outside_plug_in_as_objects() -> None:
+    usual = make_strategy("default", **FEW)
+
+    def make() -> Strategy:
+        return Strategy(VALVE_SPACE, usual.model, MutualInformation(), usual.stopping, initial_ms=(100.0, 250.0))
+
+    check_strategy(make)
