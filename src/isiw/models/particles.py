@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 import torch
@@ -26,7 +27,10 @@ from isiw.models.shapes import Shape
 from isiw.models.windows import profile_grid, sampled_estimate
 from isiw.window import WindowEstimate
 
-__all__ = ["ParticleModel", "ParticlePosterior", "step_generator", "systematic"]
+__all__ = ["SIMULATED", "ParticleModel", "ParticlePosterior", "step_generator", "systematic"]
+
+SIMULATED: Final = 2**31
+"""The step whose stream simulated people are drawn from: no posterior gets there."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,9 @@ class ParticleModel:
 
     def reweighted(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The same particles, weighted by one more trial as well."""
-        trial = observed(observation, self.detection_limit_mv, self.response_threshold_mv).to(self.device, torch.float32)
+        trial = observed(observation, self.detection_limit_mv, self.response_threshold_mv).to(
+            self.device, torch.float32
+        )
         gain = total_log_likelihood(posterior.person, trial)
         return replace(
             posterior,
