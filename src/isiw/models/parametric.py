@@ -17,7 +17,7 @@ import torch
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.evidence import History, observed
-from isiw.models.parametric_inference import Effort
+from isiw.models.importance import Effort
 from isiw.models.parametric_law import draw_log_mep, levels, log_likelihood
 from isiw.models.parametric_prior import Likelihood, Unknowns, WindowPrior
 from isiw.models.parametric_program import WindowProgram

@@ -10,7 +10,7 @@ from typing import Final, Literal
 import torch
 
 from isiw.models.evidence import History
-from isiw.models.parametric_inference import Effort, WeightedDraws, importance_sample, worth
+from isiw.models.importance import Effort, Mixture, WeightedDraws, importance_sample, worth
 from isiw.models.parametric_program import WindowProgram, nuts_sample
 from isiw.models.particles import systematic
 from isiw.models.protocol import Tensor
@@ -63,10 +63,10 @@ def sample_person(
     def log_density(latents: Tensor, present: bool) -> Tensor:  # noqa: FBT001 - the one thing the two models differ in
         return program.log_density(latents, trials, present=present)
 
-    without = importance_sample(partial(log_density, present=False), program.latents, generator, WITHOUT_WINDOW)
-    with_ = importance_sample(
-        partial(log_density, present=True), program.latents, generator, effort, simpler=without.modes
-    )
+    everywhere = Mixture.prior(program.latents)
+    without = importance_sample(partial(log_density, present=False), everywhere, generator, WITHOUT_WINDOW)
+    # Without a window its place and size are as in the prior, and the floor is already known: good scouts.
+    with_ = importance_sample(partial(log_density, present=True), without.modes, generator, effort)
     models = (with_, without)
     prior = torch.tensor([program.prior.p_window, 1.0 - program.prior.p_window], dtype=torch.double)
     log_joint = torch.tensor([model.log_evidence for model in models], dtype=torch.double) + prior.log()

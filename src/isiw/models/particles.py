@@ -17,15 +17,16 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.evidence import History, observed, total_log_likelihood
+from isiw.models.evidence import History, levels, observed, total_log_likelihood
 from isiw.models.moves import Mover
 from isiw.models.prior import Latents, Person, Prior
-from isiw.models.protocol import Observation, Tensor
-from isiw.models.response import Response
+from isiw.models.protocol import Observation, SimulatedPerson, Tensor
+from isiw.models.response import Response, draw_log_mep
 from isiw.models.sample import PersonSample
 from isiw.models.shapes import Shape
 from isiw.models.windows import profile_grid, sampled_estimate
-from isiw.window import WindowEstimate
+from isiw.types import ArrayLike
+from isiw.window import Window, WindowEstimate
 
 __all__ = ["SIMULATED", "ParticleModel", "ParticlePosterior", "step_generator", "systematic"]
 
@@ -101,6 +102,17 @@ class ParticleModel:
         for _ in range(self._sweeps(after.trials)):
             latents, log_likelihood = mover.sweep(latents, log_likelihood)
         return replace(after, latents=latents, log_likelihood=log_likelihood)
+
+    def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
+        """Draw one person from the prior, and a MEP at each ISI; see `SimulatesPeople`."""
+        generator = step_generator(self.device, seed, SIMULATED)
+        person = self.beliefs.person(self.beliefs.sample(1, 1, generator), space)
+        isis_ms = torch.as_tensor(isi_ms, dtype=torch.float32, device=self.device).unsqueeze(0)
+        log_mep = draw_log_mep(person.response, levels(person, isis_ms), generator)
+        grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=torch.float32, device=self.device)
+        mask = PersonSample(person).window_masks(grid_ms)[0, 0]
+        window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
+        return SimulatedPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
 
     def reweighted(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The same particles, weighted by one more trial as well."""
