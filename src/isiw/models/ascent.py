@@ -66,7 +66,7 @@ def _distinct(tops: Tensor, precisions: Tensor, evidence: Tensor) -> Tensor:
         if kept and float(evidence[kept[0]] - evidence[k]) > NEGLIGIBLE_NATS:
             break
         off = tops[k] - tops[kept]
-        apart = torch.einsum("ki,kij,kj->k", off, precisions[kept], off)
+        apart: Tensor = torch.einsum("ki,kij,kj->k", off, precisions[kept], off)
         if not kept or float(apart.min()) > SAME_MODE**2:
             kept.append(k)
     return torch.tensor(kept)
@@ -87,9 +87,8 @@ def _curvatures(log_density: LogDensity, points: Tensor, step: float = 1e-4) -> 
     values, slopes = _gradient(log_density, around.flatten(0, 1))
     up, down = slopes.view(k, 2, d, d).unbind(1)
     hessian = (down - up) / (2.0 * step)
-    hessian = torch.where(
-        hessian.isfinite().flatten(1).all(-1)[:, None, None], hessian, torch.eye(d, dtype=points.dtype)
-    )
+    known = hessian.isfinite().flatten(1).all(-1)[:, None, None]
+    hessian = torch.where(known, hessian, torch.eye(d, dtype=points.dtype))
     # At a top the values around it are as good as its own.
     return values.view(k, -1).mean(-1), 0.5 * (hessian + hessian.mT)
 
@@ -118,7 +117,8 @@ def _climb(log_density: LogDensity, starts: Tensor, steps: int) -> Tensor:
 
 def _shortened(direction: Tensor) -> Tensor:
     """Steps of at most two of the prior's SDs."""
-    return direction / (0.5 * direction.norm(dim=-1, keepdim=True)).clamp_min(1.0)
+    shortened: Tensor = direction / (0.5 * direction.norm(dim=-1, keepdim=True)).clamp_min(1.0)
+    return shortened
 
 
 def _updated(inverse: Tensor, step: Tensor, bend: Tensor) -> Tensor:

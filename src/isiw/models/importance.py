@@ -1,10 +1,9 @@
-"""Samples of a posterior with several modes: modes by quasi-Newton ascent, then adaptive importance sampling.
+"""Draws of a posterior with several modes, by adaptive importance sampling.
 
-The prior is a standard normal of the latents. Some draws of it show where to climb from; at each distinct mode a
-Student t with the curvature's covariance begins a mixture, and the prior itself stays in it (Hesterberg, Technometrics
-37, 1995). Draws are weighted by the exact density over the mixture of all proposals so far, and the mixture is fitted
-to the weighted draws, until they are worth enough (population Monte Carlo: Cappé et al., Stat. Comput. 18, 2008;
-Cornuet et al., Scand. J. Stat. 39, 2012). So the modes need only be near: what they miss, the weights correct.
+The prior is a standard normal of the latents. A mixture begins with a Student t at each mode, of the curvature there,
+and with the prior, which stays in it (Hesterberg, Technometrics 37, 1995). Where its draws are worth too little, it is
+fitted to them by their weights (population Monte Carlo: Cappé et al., Stat. Comput. 18, 2008), and draws anew. So the
+modes need only be near: what they miss, the weights correct.
 """
 
 from __future__ import annotations
@@ -18,9 +17,11 @@ import torch
 from isiw.models.ascent import LogDensity, Modes, find_modes
 from isiw.models.protocol import Tensor
 
-__all__ = ["Effort", "Mixture", "WeightedDraws", "importance_sample", "standard_normal", "worth"]
+__all__ = ["Effort", "Mixture", "WeightedDraws", "importance_sample", "worth"]
 
 T_DEGREES: Final = 6.0
+"""Degrees of freedom of the components: tails heavier than a normal's."""
+
 PRIOR_SHARE: Final = 0.1
 """Least share of the prior in the mixture."""
 
@@ -32,16 +33,6 @@ GOOD_SHARE: Final = 0.25
 
 TOO_HEAVY: Final = 0.1
 """A draw that weighs more is looked into."""
-
-SAME_MODE: Final = 1.0
-"""Modes closer than this many SDs are one."""
-
-NEGLIGIBLE_NATS: Final = 9.0
-"""A mode is left out where its evidence is smaller than the best one's by more."""
-
-
-STEP_LENGTHS: Final = torch.tensor([[1.0], [0.3], [0.05]], dtype=torch.double)
-SMALL_GAIN_NATS: Final = 0.1
 
 
 @dataclass(frozen=True)
@@ -73,7 +64,7 @@ class WeightedDraws:
         points: latents, shape (m, d).
         log_weights: normalised, shape (m,).
         log_evidence: log of the density's integral [nat].
-        modes: the mixture to begin with, its components at the distinct modes.
+        modes: the prior, and a component at each distinct mode, best first.
     """
 
     points: Tensor
@@ -108,11 +99,9 @@ class Mixture:
 
     @classmethod
     def prior(cls, latents: int) -> Mixture:
-        """The prior, in both parts."""
-        one = torch.ones(1, dtype=torch.double)
-        return cls(
-            one.expand(2) / 2.0, torch.zeros((1, latents), dtype=torch.double), torch.diag_embed(one.expand(1, latents))
-        )
+        """The prior, half of it with the heavier tails of the components."""
+        half, centre = torch.full((2,), 0.5, dtype=torch.double), torch.zeros((1, latents), dtype=torch.double)
+        return cls(half, centre, torch.diag_embed(1.0 + centre))
 
     def log_parts(self, points: Tensor) -> Tensor:
         """Log density of each part times its share, shape (k + 1, m)."""
@@ -120,11 +109,11 @@ class Mixture:
         off = torch.linalg.solve_triangular(self.factors, (points - self.means.unsqueeze(1)).mT, upper=False)
         squared = off.square().sum(1)
         log_det = self.factors.diagonal(dim1=-2, dim2=-1).log().sum(-1, keepdim=True)
-        constant = (
-            math.lgamma(0.5 * (T_DEGREES + d)) - math.lgamma(0.5 * T_DEGREES) - 0.5 * d * math.log(T_DEGREES * math.pi)
-        )
+        gammas = math.lgamma(0.5 * (T_DEGREES + d)) - math.lgamma(0.5 * T_DEGREES)
+        constant = gammas - 0.5 * d * math.log(T_DEGREES * math.pi)
         student = constant - log_det - 0.5 * (T_DEGREES + d) * torch.log1p(squared / T_DEGREES)
-        return torch.cat((standard_normal(points).unsqueeze(0), student)) + self.shares.log().unsqueeze(-1)
+        prior = -0.5 * points.square().sum(-1) - 0.5 * d * math.log(2.0 * math.pi)
+        return torch.cat((prior.unsqueeze(0), student)) + self.shares.log().unsqueeze(-1)
 
     def joined(self, other: Mixture, share: float) -> Mixture:
         """This mixture and the components of another one.
@@ -155,8 +144,8 @@ class Mixture:
         belongs = torch.softmax(self.log_parts(points), dim=0) * log_weights.exp()
         shares = belongs.sum(-1)
         own = belongs[1:] / shares[1:].clamp_min(1e-12).unsqueeze(-1)
-        worth = own.square().sum(-1).clamp_min(1e-12).reciprocal()
-        trust = (worth / (worth + 2.0 * d))[:, None, None]
+        draws = own.square().sum(-1).clamp_min(1e-12).reciprocal()
+        trust = (draws / (draws + 2.0 * d))[:, None, None]
         means = self.means + trust[..., 0] * (own @ points - self.means)
         off = points - means.unsqueeze(1)
         scatter = torch.einsum("km,kmi,kmj->kij", own, off, off)
@@ -180,11 +169,6 @@ def worth(log_weights: Tensor) -> float:
         log_weights: normalised, shape (m,).
     """
     return float(torch.exp(-torch.logsumexp(2.0 * log_weights, dim=0)))
-
-
-def standard_normal(points: Tensor) -> Tensor:
-    """Log density of the standard normal, shape (...) for points (..., d)."""
-    return -0.5 * points.square().sum(-1) - 0.5 * points.shape[-1] * math.log(2.0 * math.pi)
 
 
 def _defensive(shares: Tensor) -> Tensor:
@@ -241,7 +225,7 @@ def _improved(log_density: LogDensity, mixture: Mixture, rounds: list[_Round], e
 
 def _drawn(log_density: LogDensity, proposal: Mixture, size: int, generator: torch.Generator) -> _Round:
     points = proposal.draw(size, generator)
-    return _Round(points, log_density(points), proposal)
+    return _Round(points, log_density(points).nan_to_num(nan=-torch.inf), proposal)
 
 
 def _best_of_each_part(scouts: _Round, parts: int) -> Tensor:
