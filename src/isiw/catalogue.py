@@ -9,7 +9,7 @@ from typing import Any, Final
 from isiw.asktell import Recipe, Strategy
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
-from isiw.settings import ParticleSettings, Settings
+from isiw.settings import ParametricSettings, ParticleSettings, Settings
 
 __all__ = ["list_strategies", "make_strategy", "settings_of"]
 
@@ -42,6 +42,16 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
     ),
     "random": _Entry(
         "Particle posterior; random ISIs, whatever the responses.", ParticleSettings, {"acquisition": "random"}
+    ),
+    "parametric-mi": _Entry(
+        "Gaussian window in Pyro; asks for the largest mutual information with all unknowns.",
+        ParametricSettings,
+        {"acquisition": "mutual-information"},
+    ),
+    "parametric-window": _Entry(
+        "Gaussian window in Pyro; asks where the window's membership will be learnt best.",
+        ParametricSettings,
+        {"acquisition": "window-gain"},
     ),
 }
 

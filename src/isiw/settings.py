@@ -14,12 +14,21 @@ from isiw.acquisition.sweeps import EvenSpacing, IncrementalSweep, OwnProposal, 
 from isiw.acquisition.variance import EdgeVariance, IntegratedVariance, ProfileVariance
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.models.parametric import ParametricModel
+from isiw.models.parametric_prior import Likelihood, WindowPrior
 from isiw.models.particles import ParticleModel
 from isiw.models.prior import Prior
 from isiw.models.protocol import ResponseModel
 from isiw.stopping import AnyOf, Budget, CredibleWidth, NoWindow, StoppingRule
 
-__all__ = ["ACQUISITIONS", "ParticleSettings", "Settings", "acquisition_named", "known_well_enough"]
+__all__ = [
+    "ACQUISITIONS",
+    "ParametricSettings",
+    "ParticleSettings",
+    "Settings",
+    "acquisition_named",
+    "known_well_enough",
+]
 
 ACQUISITIONS: Final[Mapping[str, Callable[[int], AcquisitionFunction]]] = {
     "alternating": lambda _seed: Alternating(),
@@ -116,6 +125,63 @@ class ParticleSettings:
         return ParticleModel(
             beliefs=Prior.from_settings(self.prior),
             particles=self.particles,
+            detection_limit_mv=self.detection_limit_mv,
+            response_threshold_mv=self.response_threshold_mv,
+        )
+
+    def acquisition_function(self, seed: int) -> AcquisitionFunction:
+        """The acquisition function."""
+        return acquisition_named(self.acquisition, seed)
+
+    def stopping(self) -> StoppingRule:
+        """Known well enough, no window, or the budget used up."""
+        return known_well_enough(self.max_trials, self.stop_width_ms, self.stop_no_window)
+
+    def initial_ms(self, space: DesignSpace) -> tuple[float, ...]:  # noqa: ARG002 - others depend on the space
+        """None: the prior knows where to begin."""
+        return ()
+
+
+@dataclass(frozen=True)
+class ParametricSettings:
+    """Strategies on the parametric window model.
+
+    Args:
+        acquisition: what chooses the next ISI, one of `ACQUISITIONS`.
+        max_trials: stop after this many stimuli; mistrials count.
+        stop_width_ms: stop when the 90 % credible intervals of both edges are at most this wide [ms].
+        stop_no_window: stop when "there is no window" is at least this probable.
+        likelihood: how MEPs scatter: "gamma", "log-normal" or "input-noise".
+        samples: how many equally weighted samples the posterior has.
+        prior: settings of `isiw.models.parametric_prior.WindowPrior` that differ from its defaults.
+        detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
+        response_threshold_mv: what a told response is known to be above [mV].
+
+    Raises:
+        InvalidValueError: a value that cannot be, or a setting that the prior does not have.
+    """
+
+    acquisition: str = "alternating"
+    max_trials: int = 80
+    stop_width_ms: float = 30.0
+    stop_no_window: float = 0.9
+    likelihood: Likelihood = "input-noise"
+    samples: int = 512
+    prior: Mapping[str, Any] = field(default_factory=dict)
+    detection_limit_mv: float = 0.005
+    response_threshold_mv: float = 0.02
+
+    def __post_init__(self) -> None:
+        self.model()
+        self.acquisition_function(0)
+        self.stopping()
+
+    def model(self) -> ParametricModel:
+        """The parametric model."""
+        return ParametricModel(
+            beliefs=WindowPrior.from_settings(self.prior),
+            likelihood=self.likelihood,
+            samples=self.samples,
             detection_limit_mv=self.detection_limit_mv,
             response_threshold_mv=self.response_threshold_mv,
         )
