@@ -8,6 +8,7 @@ import sys
 import pytest
 from typer.testing import CliRunner
 
+from isiw.catalogue import list_strategies
 from isiw.cli import app
 from isiw.config import true_window
 from isiw.log.reader import read_session
@@ -61,6 +62,18 @@ def test_run_with_recorded_emg_logs_the_raw_sweeps(isiw, short, recordings_folde
     record = read_session("r.mcap")
     assert [len(record.sweep(trial)["emg"].values) for trial in range(3)] == [451] * 3
     assert len(record.table.told) == 3
+
+
+def test_strategies_are_listed_and_can_be_named(isiw, short):
+    listed = isiw("strategies").output
+    for name, summary in list_strategies().items():
+        assert name in listed
+        assert summary in listed
+    result = isiw("run", short, "--strategy", "particles-mi", "--log", "n.mcap")
+    assert result.exit_code == 0, result.output
+    assert read_session("n.mcap").header.strategy.name == "particles-mi"
+    settings = read_session("n.mcap").header.strategy.settings
+    assert (settings["acquisition"], settings["max_trials"]) == ("mutual-information", 3)
 
 
 def test_run_never_overwrites_a_log(isiw, short, log):

@@ -44,12 +44,14 @@ def run(
         typer.Option(help="simulated, or recorded: a simulated person's MEPs in recorded EMG.", **_NO_DEFAULT),
     ] = None,
     data: Data = None,
+    strategy: Annotated[str | None, typer.Option(help="A strategy of isiw strategies.", **_NO_DEFAULT)] = None,
     seed: Seed = None,
     log: Annotated[Path | None, typer.Option(help="Where to log; by default a new file in isiw-sessions.")] = None,
 ) -> None:
     """Run a session with a simulated person, and say what was found."""
     with _errors_reported():
-        settings = isiw.config.load_config(config).with_overrides(seed=seed, log=log, subject=subject, data=data)
+        given = {"seed": seed, "log": log, "subject": subject, "data": data, "strategy": strategy}
+        settings = isiw.config.load_config(config).with_overrides(**given)
         _run_to_the_end(isiw.config.session_for(settings, on_trial=_show_progress))
 
 
@@ -102,6 +104,13 @@ def exclude(
     with _errors_reported():
         isiw.exclude(log, trial, reason)
         _print(f"Trial {trial} is excluded: {reason}")
+
+
+@app.command()
+def strategies() -> None:
+    """List the named strategies, and what each does."""
+    for name, summary in isiw.list_strategies().items():
+        _print(f"{name:18}{summary}")
 
 
 @app.command()

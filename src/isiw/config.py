@@ -158,12 +158,17 @@ class RunConfig(_Section):
         log: Path | None = None,
         subject: str | None = None,
         data: Path | None = None,
+        strategy: str | None = None,
     ) -> RunConfig:
-        """The same, with what was given on the command line."""
+        """The same, with what was given on the command line; another strategy keeps the settings that were given."""
         values = self.model_dump()
         values |= {key: value for key, value in {"seed": seed, "log": log}.items() if value is not None}
         about = {"kind": subject, "data": data}
         values["subject"] |= {key: value for key, value in about.items() if value is not None}
+        if strategy not in {None, self.strategy.name}:
+            usual = asdict(StrategyConfig(name=self.strategy.name).settings)
+            given = {key: value for key, value in values["strategy"]["settings"].items() if value != usual[key]}
+            values["strategy"] = {"name": strategy, "settings": given}
         return _validated(values, "the command line")
 
 

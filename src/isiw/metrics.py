@@ -10,7 +10,7 @@ from isiw.design import DesignSpace
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Interval, Window, WindowEstimate
 
-__all__ = ["covers", "edge_error_ms", "f1", "f1_of_masks", "trials_to_lasting"]
+__all__ = ["covers", "edge_error_ms", "edge_ranks", "f1", "f1_of_masks", "trials_to_lasting", "true_edges_ms"]
 
 
 def f1_of_masks(estimated: ArrayLike, true: ArrayLike) -> FloatArray:
@@ -66,6 +66,27 @@ def covers(estimate: WindowEstimate, truth: Window, space: DesignSpace, level: f
         for (low, high), edge in zip(intervals, true_edges_ms(truth, space), strict=True)
     )
     return start, end
+
+
+def edge_ranks(
+    estimate: WindowEstimate, truth: Window, space: DesignSpace, rng: np.random.Generator
+) -> tuple[float, float]:
+    """Where the true start and end rank among the samples of the posterior, in 0–1.
+
+    Over people of the model's own prior the ranks of an honest posterior are uniform (simulation-based calibration:
+    Talts et al., arXiv:1804.06788). Samples equal to the truth, as on a grid, are ranked at random.
+
+    Args:
+        estimate: the estimate; without samples of the edges a rank is uniformly random.
+        truth: the true window.
+        space: the design space; an edge at its border counts as beyond the range.
+        rng: breaks ties.
+    """
+    samples = np.empty((0, 2)) if estimate.edge_samples_ms is None else estimate.edge_samples_ms
+    edges = np.array(true_edges_ms(truth, space))
+    below, equal = (samples < edges).sum(axis=0), (samples == edges).sum(axis=0)
+    start, end = (below + rng.random(2) * (equal + 1)) / (len(samples) + 1)
+    return float(start), float(end)
 
 
 def edge_error_ms(estimate: WindowEstimate | Window | None, truth: Window | None) -> tuple[float, float] | None:

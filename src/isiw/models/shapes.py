@@ -53,19 +53,23 @@ def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:
     Returns:
         Facilitation, shape (..., p, t).
     """
-    kind, form = shape.kind.unsqueeze(-1), shape.form.unsqueeze(-1)
     share = (isi_ms - shape.start_ms.unsqueeze(-1)) / shape.width_ms.unsqueeze(-1)
-    peak_at = torch.where(kind == ShapeKind.SKEWED, 0.5 + 0.33 * form, 0.5)
-    exponent = torch.where(kind == ShapeKind.PLATEAU, 2.0 * torch.exp(0.75 * (form + 1.0)), 2.0)
+    peak_at = torch.where(shape.kind == ShapeKind.SKEWED, 0.5 + 0.33 * shape.form, 0.5).unsqueeze(-1)
     offset = share - peak_at
-    flank = torch.where(offset < 0, peak_at, 1.0 - peak_at)
-    one = torch.exp(-2.0 * (offset.abs() / flank).clamp(1e-6, 1e3).pow(exponent))
-    if not bool((kind == ShapeKind.TWO_PEAK).any()):
-        return one
+    square = (offset / torch.where(offset < 0, peak_at, 1.0 - peak_at)).square_().clamp_(1e-12, 1e6)
+    # Powers and second peaks are dear, and few particles have them.
+    flat, double = shape.kind == ShapeKind.PLATEAU, shape.kind == ShapeKind.TWO_PEAK
+    square[flat] = square[flat].pow(torch.exp(0.75 * (shape.form[flat] + 1.0)).unsqueeze(-1))
+    level = square.mul_(-2.0).exp_()
+    level[double] = _two_peaks(shape.form[double].unsqueeze(-1), share[double])
+    return level
+
+
+def _two_peaks(form: Tensor, share: Tensor) -> Tensor:
     lower = 1.0 - 0.7 * form.abs()
-    first, second = torch.where(form < 0, lower, 1.0), torch.where(form < 0, 1.0, lower)
-    two = sum(
+    heights = torch.where(form < 0, lower, 1.0), torch.where(form < 0, 1.0, lower)
+    first, second = (
         height * torch.exp(-0.5 * ((share - at) / PEAK_SD).square())
-        for height, at in zip((first, second), PEAKS_AT, strict=True)
+        for height, at in zip(heights, PEAKS_AT, strict=True)
     )
-    return torch.where(kind == ShapeKind.TWO_PEAK, two, one)
+    return first + second
