@@ -9,7 +9,7 @@ from typing import Any, Final
 from isiw.asktell import Recipe, Strategy
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
-from isiw.settings import ParticleSettings, Settings
+from isiw.settings import GPSettings, ParticleSettings, Settings
 
 __all__ = ["list_strategies", "make_strategy", "settings_of"]
 
@@ -42,6 +42,15 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
     ),
     "random": _Entry(
         "Particle posterior; random ISIs, whatever the responses.", ParticleSettings, {"acquisition": "random"}
+    ),
+    "gp-straddle": _Entry("Gaussian process; asks where it is least clear on which side of an edge it is.", GPSettings),
+    "gp-variance": _Entry(
+        "Gaussian process; asks for the largest reduction of the profile's variance.",
+        GPSettings,
+        {"acquisition": "integrated-variance"},
+    ),
+    "gp-ei": _Entry(
+        "Gaussian process; seeks the best ISI only, by expected improvement.", GPSettings, {"acquisition": "log-ei"}
     ),
 }
 

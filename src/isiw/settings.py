@@ -14,12 +14,14 @@ from isiw.acquisition.sweeps import EvenSpacing, IncrementalSweep, OwnProposal, 
 from isiw.acquisition.variance import EdgeVariance, IntegratedVariance, ProfileVariance
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.models.gp import GaussianProcess
+from isiw.models.gp_prior import HyperparameterPrior
 from isiw.models.particles import ParticleModel
 from isiw.models.prior import Prior
 from isiw.models.protocol import ResponseModel
 from isiw.stopping import AnyOf, Budget, CredibleWidth, NoWindow, StoppingRule
 
-__all__ = ["ACQUISITIONS", "ParticleSettings", "Settings", "acquisition_named", "known_well_enough"]
+__all__ = ["ACQUISITIONS", "GPSettings", "ParticleSettings", "Settings", "acquisition_named", "known_well_enough"]
 
 ACQUISITIONS: Final[Mapping[str, Callable[[int], AcquisitionFunction]]] = {
     "alternating": lambda _seed: Alternating(),
@@ -131,3 +133,69 @@ class ParticleSettings:
     def initial_ms(self, space: DesignSpace) -> tuple[float, ...]:  # noqa: ARG002 - others depend on the space
         """None: the prior knows where to begin."""
         return ()
+
+
+@dataclass(frozen=True)
+class GPSettings:
+    """Strategies on a Gaussian process.
+
+    Args:
+        acquisition: what chooses the next ISI, one of `ACQUISITIONS`.
+        max_trials: stop after this many stimuli; mistrials count.
+        stop_width_ms: stop when the 90 % credible intervals of both edges are at most this wide [ms].
+        stop_no_window: stop when "there is no window" is at least this probable.
+        initial_trials: how many evenly spaced ISIs to ask for first.
+        kernel: `"rbf"` or `"matern"`.
+        noise: `"equal"` at all ISIs, or `"by-isi"`.
+        transform: of the MEP: `"log"`, `"sqrt"` or `"none"`.
+        hyperparameters: `"marginalised"`, or the most likely ones, `"map"`.
+        floor: what the 0.135 rule is applied above: `"subtracted"`, `"zeroed"` or `"raw"`.
+        samples: how many paths represent the posterior.
+        prior: settings of `isiw.models.gp_prior.HyperparameterPrior` that differ from its defaults.
+        detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
+        zero_below_mv: threshold of the floor `"zeroed"` [mV].
+
+    Raises:
+        InvalidValueError: a value that cannot be, or a setting that the prior does not have.
+    """
+
+    acquisition: str = "straddle"
+    max_trials: int = 80
+    stop_width_ms: float = 30.0
+    stop_no_window: float = 0.9
+    initial_trials: int = 5
+    kernel: str = "matern"
+    noise: str = "equal"
+    transform: str = "log"
+    hyperparameters: str = "marginalised"
+    floor: str = "subtracted"
+    samples: int = 256
+    prior: Mapping[str, Any] = field(default_factory=dict)
+    detection_limit_mv: float = 0.005
+    zero_below_mv: float = 0.025
+
+    def __post_init__(self) -> None:
+        self.model()
+        self.acquisition_function(0)
+        self.stopping()
+        if isinstance(self.initial_trials, bool) or not isinstance(self.initial_trials, int) or self.initial_trials < 0:
+            raise InvalidValueError("initial_trials must be a whole number from 0 up", got=self.initial_trials)
+
+    def model(self) -> GaussianProcess:
+        """The Gaussian process."""
+        names = ("kernel", "noise", "transform", "hyperparameters", "floor", "samples")
+        chosen = {name: getattr(self, name) for name in (*names, "detection_limit_mv", "zero_below_mv")}
+        return GaussianProcess(beliefs=HyperparameterPrior.from_settings(self.prior), **chosen)
+
+    def acquisition_function(self, seed: int) -> AcquisitionFunction:
+        """The acquisition function."""
+        return acquisition_named(self.acquisition, seed)
+
+    def stopping(self) -> StoppingRule:
+        """Known well enough, no window, or the budget used up."""
+        return known_well_enough(self.max_trials, self.stop_width_ms, self.stop_no_window)
+
+    def initial_ms(self, space: DesignSpace) -> tuple[float, ...]:
+        """The middles of equal parts of the range [ms]."""
+        part_ms = (space.high_ms - space.low_ms) / max(1, self.initial_trials)
+        return tuple(space.low_ms + (part + 0.5) * part_ms for part in range(self.initial_trials))

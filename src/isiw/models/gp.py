@@ -13,11 +13,12 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 import torch
-from botorch.models import SingleTaskGP
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.gp_fit import Fit, FixedProcess, HyperparameterPrior, KernelName, fit, fixed_fit
+from isiw.models.gp_fit import Fit, fit, fixed_fit
+from isiw.models.gp_prior import FixedProcess, HyperparameterPrior
+from isiw.models.gp_process import KernelName, SingleTaskGP
 from isiw.models.gp_samples import FloorKind, Paths, ProfileSample, draw_paths
 from isiw.models.gp_scale import Scale, Transform, scale_of
 from isiw.models.protocol import Observation, Tensor
@@ -150,10 +151,15 @@ class GaussianProcessPosterior:
         """How many trials of each person it has been told."""
         return self.told.trials
 
+    @property
+    def people(self) -> int:
+        """How many people there are."""
+        return self.told.people
+
     @cached_property
     def fits(self) -> tuple[Fit, ...]:
         """The processes of each person, and how believable they are."""
-        told = [self.told.person(person) for person in range(self.told.people)]
+        told = [self.told.person(person) for person in range(self.people)]
         if self.held is not None:
             return tuple(f.conditioned(self.model.seen(t)) for f, t in zip(self.held, told, strict=True))
         return tuple(map(self.model.fit, told))

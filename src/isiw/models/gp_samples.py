@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import torch
@@ -22,10 +22,9 @@ FloorKind: TypeAlias = Literal["subtracted", "zeroed", "raw"]
 FLOOR_SHARE = 0.15
 """A path's lowest values are up to this quantile; of a range of 320 ms, at least 28 % lie outside the widest window."""
 
-RISE = 1 / 3
-"""What does not rise to this share of a path's height is not distinguished from its wandering about the floor: it makes
-no segment of a window, and its median is the floor where TMS alone was not told. Where there are two peaks, the lower
-has at least 0.4 of the higher one's height in all that isiw simulates."""
+RISE = 0.4
+"""What does not rise to this share of a path's height is not told from its wandering about the floor: it makes no
+segment of a window, and its median is the floor where TMS alone was not told. A second peak as low as this is lost."""
 
 PATH_JITTER = 1e-5
 """Share of a process's variance that is added to the diagonal before paths are drawn, for a stable factor."""
@@ -86,13 +85,14 @@ def _profiles(fit: Fit, picks: Tensor, isi_ms: Tensor, z: Tensor) -> Tensor:
     """Paths of processes with an amplitude, one for each pick, in standardised units, shape (s, m)."""
     if not len(picks):
         return z
-    which, member = picks.unique(return_inverse=True)
+    which, member = torch.unique(picks, return_inverse=True)
     with torch.no_grad():
-        posterior = fit.regression(which).posterior(isi_ms.unsqueeze(-1)).distribution
-        covariance = posterior.covariance_matrix
+        posterior: Any = fit.regression(which).posterior(isi_ms.unsqueeze(-1))
+        mean, covariance = posterior.mean.squeeze(-1), posterior.distribution.covariance_matrix
     jitter = PATH_JITTER * fit.processes.amplitude[which].square()[:, None, None]
     factor = torch.linalg.cholesky(covariance + jitter * torch.eye(len(isi_ms), dtype=z.dtype))
-    return posterior.mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
+    paths: Tensor = mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
+    return paths
 
 
 def _constants(fit: Fit, noise: Tensor, z: Tensor) -> Tensor:

@@ -59,7 +59,9 @@ def transformed(mep_mv: FloatArray, transform: Transform, least_mv: float) -> Fl
         least_mv: amplitudes below are taken for this [mV].
     """
     known = np.maximum(mep_mv, least_mv)
-    return {"log": np.log, "sqrt": np.sqrt, "none": np.asarray}[transform](known)
+    if transform == "none":
+        return known
+    return np.log(known) if transform == "log" else np.sqrt(known)
 
 
 def scale_of(mep_mv: FloatArray, transform: Transform, least_mv: float) -> Scale:
