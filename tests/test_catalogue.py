@@ -14,7 +14,7 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.particles import ParticleModel
 from isiw.models.protocol import ResponseModel
-from isiw.settings import ParticleSettings
+from isiw.settings.particles import ParticleSettings
 
 NAMES = sorted(list_strategies())
 FEW: dict[str, Any] = {"particles": 64}

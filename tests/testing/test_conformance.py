@@ -17,7 +17,7 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import StrategyError
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.protocol import Observation, ProposesIsi, Tensor
-from isiw.settings import ACQUISITIONS
+from isiw.settings.common import ACQUISITIONS
 from isiw.subjects import cohort
 from isiw.testing import check_acquisition, check_model, check_strategy
 from isiw.testing.promises import Trials, trials_that_break_things, usual_trials
