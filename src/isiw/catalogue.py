@@ -70,6 +70,21 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
     "gp-ei": _Entry(
         "Gaussian process; seeks the best ISI only, by expected improvement.", _GP, {"acquisition": "log-ei"}
     ),
+    "nr": _Entry("Dissertation: nonlinear regression of one Gaussian.", "dissertation:NRSettings"),
+    "nr2": _Entry(
+        "Dissertation: nonlinear regression of two Gaussians.",
+        "dissertation:NRSettings",
+        {"peaks": 2, "initial": 7, "segments": "all"},
+    ),
+    "svmr": _Entry("Dissertation: support vector regression.", "dissertation:SVMRSettings"),
+    "gpr": _Entry("Dissertation: Gaussian process regression of the amplitudes.", "dissertation:GPRSettings"),
+    "pf": _Entry(
+        "Dissertation: bootstrap particle filter over ISIs, a generation of particles at a time.",
+        "dissertation:PFSettings",
+    ),
+    "incremental": _Entry(
+        "Conventional search: twelve trials each 5 ms, until the window was passed.", "dissertation:SweepSettings"
+    ),
 }
 
 
