@@ -14,7 +14,7 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.particles import ParticleModel
 from isiw.models.protocol import ResponseModel
-from isiw.settings import ParticleSettings
+from isiw.settings.particles import ParticleSettings
 
 NAMES = sorted(list_strategies())
 PARTICLES = [name for name in NAMES if settings_of(name)[0] is ParticleSettings]

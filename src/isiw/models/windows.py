@@ -7,9 +7,12 @@ import torch
 from isiw.design import DesignSpace
 from isiw.models.protocol import Tensor
 from isiw.types import FloatArray
-from isiw.window import Window
+from isiw.window import Window, WindowEstimate
 
-__all__ = ["best_window", "edge_samples"]
+__all__ = ["PROFILE_POINTS", "best_window", "edge_samples", "profile_grid", "sampled_estimate"]
+
+PROFILE_POINTS = 101
+"""ISIs at which the expected MEP and its band are reported."""
 
 
 def best_window(masks: Tensor, grid_ms: FloatArray) -> Window | None:
@@ -41,3 +44,32 @@ def edge_samples(masks: Tensor, space: DesignSpace) -> Tensor:
     start = torch.where(first == 0, -torch.inf, grid[first])
     end = torch.where(last == masks.shape[-1] - 1, torch.inf, grid[last])
     return torch.stack((start, end), dim=-1)
+
+
+def profile_grid(space: DesignSpace) -> Tensor:
+    """The ISIs at which profiles are reported [ms], shape (t,)."""
+    return torch.tensor(space.grid_ms[:: max(1, len(space.grid_ms) // PROFILE_POINTS)], dtype=torch.float32)
+
+
+def sampled_estimate(masks: Tensor, profiles_mv: Tensor, space: DesignSpace) -> WindowEstimate:
+    """What equally weighted samples say about the window of one person.
+
+    Args:
+        masks: sampled windows on the space's grid as 0 or 1, all 0 where there is none, shape (s, t).
+        profiles_mv: sampled profiles at the ISIs of `profile_grid` [mV], shape (any, t).
+        space: the design space.
+    """
+    present = masks[masks.any(-1)]
+    probability = len(present) / len(masks)
+    edges = edge_samples(present, space)
+    start, end = edges.median(0).values.tolist() if len(present) else (None, None)
+    levels = torch.tensor([0.05, 0.5, 0.95], dtype=profiles_mv.dtype, device=profiles_mv.device)
+    return WindowEstimate(
+        probability=probability,
+        window=best_window(present, space.grid_ms) if probability >= 0.5 else None,
+        start_ms=start,
+        end_ms=end,
+        grid_ms=profile_grid(space).double().numpy(),
+        edge_samples_ms=edges.double().cpu().numpy(),
+        profile_quantiles_mv=torch.quantile(profiles_mv, levels, dim=0).double().cpu().numpy(),
+    )
