@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,13 +12,14 @@ from isiw.acquisition.sweeps import IncrementalSweep
 from isiw.catalogue import make_strategy
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.models.curves import Floor
 from isiw.models.sweep import SweepModel
 from isiw.testing import check_model
 from isiw.window import Window
 from models.told_trials import bell_mv, observation, told
 
 SPACE = DesignSpace(0.0, 100.0, reference="impact")
-BRIEF = SweepModel(step_ms=20.0, trials_per_isi=4, discarded=2)
+BRIEF = SweepModel(step_ms=20.0, trials_per_isi=4, discarded=2, neighbours=1)
 BASELINE = [(None, 0.01), (None, 0.02)]
 
 
@@ -50,7 +51,7 @@ def test_the_window_is_the_run_about_the_largest_mean_that_exceeds_the_baseline(
 
 
 def test_by_the_other_rule_it_is_what_exceeds_0_135_of_the_largest_excess() -> None:
-    share = SweepModel(step_ms=20.0, trials_per_isi=4, discarded=2, rule="share")
+    share = replace(BRIEF, rule="share")
     assert swept(share, [0.03, 0.01, 0.03, 0.1, 0.016, 0.01]).estimate().window == Window(40.0, 60.0)
 
 
@@ -58,6 +59,23 @@ def test_no_window_is_reported_where_the_largest_mean_is_not_clear_of_the_baseli
     means_mv = [0.01, 0.01, 0.02, 0.03, 0.01, 0.01]
     assert swept(BRIEF, means_mv, spread_mv=0.03).estimate().window is None
     assert swept(BRIEF, means_mv, spread_mv=0.001).estimate().window is not None
+
+
+def test_neighbouring_isis_are_averaged_before_they_are_judged() -> None:
+    means_mv = [0.01, 0.06, 0.01, 0.06, 0.061, 0.01]
+    assert swept(BRIEF, means_mv).estimate().window == Window(60.0, 80.0)
+    together = swept(replace(BRIEF, neighbours=3), means_mv).estimate()
+    assert together.window == Window(0.0, 100.0)
+    assert together.profile_quantiles_mv[1] == pytest.approx(means_mv)
+    # The mean of three has an error of 1/√3 of one's: it is clear where one is not.
+    noisy = [0.015, 0.04, 0.04, 0.04, 0.015, 0.015]
+    assert swept(BRIEF, noisy, spread_mv=0.012).estimate().window is None
+    assert swept(replace(BRIEF, neighbours=3), noisy, spread_mv=0.012).estimate().window is not None
+
+
+def test_meps_below_the_threshold_may_be_counted_as_none() -> None:
+    zeroed = replace(BRIEF, floor=Floor("zeroed", threshold_mv=0.02))
+    assert swept(zeroed, [0.015, 0.015, 0.05, 0.1, 0.015, 0.015]).estimate().window == Window(40.0, 60.0)
 
 
 def test_without_tms_alone_the_baseline_is_the_median_of_the_means() -> None:
@@ -143,8 +161,9 @@ def test_the_model_conforms(space: DesignSpace) -> None:
 
 
 @pytest.mark.parametrize(
-    "settings", [{"step_ms": 0.0}, {"discarded": 11}, {"discarded": -1}, {"rule": "eye"}, {"evidence_se": -1.0}]
+    "settings",
+    [{"step_ms": 0.0}, {"discarded": 11}, {"discarded": -1}, {"rule": "eye"}, {"evidence_se": -1.0}, {"neighbours": 2}],
 )
 def test_a_setting_that_cannot_be_is_refused(settings: dict[str, object]) -> None:
-    with pytest.raises(InvalidValueError, match=r"step_ms|discarded|rule|evidence_se"):
+    with pytest.raises(InvalidValueError, match=r"step_ms|discarded|rule|evidence_se|neighbours"):
         SweepModel(**settings)

@@ -42,8 +42,9 @@ class SweepModel:
         discarded: the first trials at each ISI, which a startle may have enlarged, are left out.
         rule: the window is the run of ISIs about the largest mean whose means exceed the `"baseline"` (the text's) or
             the 0.135 `"share"` of the largest excess (the other methods').
-        evidence_se: a window is reported where the largest mean exceeds the baseline by so many of its standard
-            errors; the text leaves that to the experimenter.
+        neighbours: means are averaged over so many ISIs (an odd number) before the rule judges them,
+        evidence_se: and a window is reported where the largest exceeds the baseline by so many of its standard errors:
+            both stand for the eye of the experimenter, who expected one distribution.
         floor: what the baseline is; without TMS alone, the median of the means.
 
     Raises:
@@ -54,7 +55,8 @@ class SweepModel:
     trials_per_isi: int = 12
     discarded: int = 2
     rule: SweepRule = "baseline"
-    evidence_se: float = 2.0
+    neighbours: int = 3
+    evidence_se: float = 3.0
     floor: Floor = field(default_factory=Floor)
 
     def __post_init__(self) -> None:
@@ -68,6 +70,8 @@ class SweepModel:
             )
         if self.rule not in {"baseline", "share"}:
             raise InvalidValueError("the rule is unknown", got=self.rule, expected="baseline or share")
+        if self.neighbours < 1 or self.neighbours % 2 == 0:
+            raise InvalidValueError("neighbours must be an odd number from 1 up", got=self.neighbours)
         if not (math.isfinite(self.evidence_se) and self.evidence_se >= 0):
             raise InvalidValueError("evidence_se must not be negative", got=self.evidence_se)
 
@@ -119,7 +123,7 @@ class SweepPosterior:
         """Means by the nearest stop of the realised ISI; the first trials of each block of the sweep are left out."""
         per_isi, discarded = self.model.trials_per_isi, self.model.discarded
         kept = np.arange(len(trials.isi_ms)) % per_isi >= discarded
-        mep_mv, last = trials.mep_mv[kept], len(self._stops_ms) - 1
+        mep_mv, last = self.model.floor.excess_mv(trials.mep_mv[kept], 0.0), len(self._stops_ms) - 1
         stop = ((trials.isi_ms[kept] - self.space.low_ms) / self.model.step_ms).round().clip(0, last).astype(np.int64)
         count = np.bincount(stop, minlength=last + 1)
         # A stop that has only a stray trial or two of its neighbours would be the largest mean too often.
@@ -137,10 +141,13 @@ class SweepPosterior:
         if not len(isi_ms):
             return WindowEstimate(probability=None, window=None)
         baseline_mv = self.model.floor.level_mv(PersonTrials(isi_ms, mep_mv, trials.baseline_mv))
-        excess_mv = mep_mv - baseline_mv
+        near = np.ones(min(self.model.neighbours, len(isi_ms)))
+        count = np.convolve(np.ones(len(isi_ms)), near, "same")
+        excess_mv = np.convolve(mep_mv - baseline_mv, near, "same") / count
+        error_mv = np.sqrt(np.convolve(sem_mv**2, near, "same")) / count
         level = EDGE_LEVEL if self.model.rule == "share" else 1e-9  # more than the baseline, and not as much
         best = int(excess_mv.argmax())
-        clear = excess_mv[best] >= self.model.evidence_se * sem_mv[best]
+        clear = excess_mv[best] >= self.model.evidence_se * error_mv[best]
         inside = curve_masks(excess_mv[None], baseline_mv, level=level)[0] & clear
         reach_mv = NormalDist().inv_cdf(0.95) * sem_mv
         return WindowEstimate(

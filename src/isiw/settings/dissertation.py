@@ -207,7 +207,8 @@ class SweepSettings:
         trials_per_isi: trials at each.
         discarded: the first so many of them are left out.
         rule: the window is where means exceed the "baseline", or the 0.135 "share" of the largest excess.
-        evidence_se: standard errors by which the largest mean exceeds the baseline where there is a window.
+        neighbours: so many ISIs (an odd number) are averaged before the rule judges them.
+        evidence_se: standard errors by which the largest of them exceeds the baseline where there is a window.
         floor: what the baseline is.
         threshold_mv: what is "zeroed" below [mV].
         quiet_ms: stop when nothing was enhanced for so long behind a window [ms]; 0 sweeps the whole budget.
@@ -221,7 +222,8 @@ class SweepSettings:
     trials_per_isi: int = 12
     discarded: int = 2
     rule: SweepRule = "baseline"
-    evidence_se: float = 2.0
+    neighbours: int = 3
+    evidence_se: float = 3.0
     floor: FloorKind = "subtracted"
     threshold_mv: float = 0.025
     quiet_ms: float = 25.0
@@ -234,7 +236,9 @@ class SweepSettings:
     def model(self) -> SweepModel:
         """The means by ISI."""
         floor = Floor(self.floor, self.threshold_mv)
-        return SweepModel(self.step_ms, self.trials_per_isi, self.discarded, self.rule, self.evidence_se, floor)
+        return SweepModel(
+            self.step_ms, self.trials_per_isi, self.discarded, self.rule, self.neighbours, self.evidence_se, floor
+        )
 
     def acquisition_function(self, seed: int) -> OwnProposal:  # noqa: ARG002 - a sweep has no choice
         """The next ISI of the sweep."""
