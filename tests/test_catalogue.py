@@ -9,7 +9,7 @@ import pytest
 
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.asktell import Recipe
-from isiw.catalogue import list_strategies, make_strategy
+from isiw.catalogue import list_strategies, make_strategy, settings_of
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.particles import ParticleModel
@@ -20,8 +20,13 @@ NAMES = sorted(list_strategies())
 FEW: dict[str, Any] = {"particles": 64}
 
 
+def few(name: str) -> dict[str, Any]:
+    """Settings that make a strategy fast."""
+    return FEW if settings_of(name)[0] is ParticleSettings else {}
+
+
 def asks(name: str, seed: int, meps_mv: tuple[float, ...] = (0.02, 0.1)) -> list[float]:
-    strategy = make_strategy(name, seed=seed, **FEW)
+    strategy = make_strategy(name, seed=seed, **few(name))
     asked = []
     for mep_mv in meps_mv:
         asked.append(strategy.ask())
@@ -37,7 +42,7 @@ def test_every_named_strategy_is_described_in_a_sentence() -> None:
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
 def test_every_named_strategy_asks_learns_and_decides(name: str, space: Any) -> None:
-    strategy = make_strategy(name, space=space, seed=1, **FEW)
+    strategy = make_strategy(name, space=space, seed=1, **few(name))
     for mep_mv in (0.02, 0.08):
         strategy.tell(strategy.ask(), mep_mv)
     assert strategy.ask() in space.grid_ms
@@ -47,7 +52,7 @@ def test_every_named_strategy_asks_learns_and_decides(name: str, space: Any) -> 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_named_strategy_is_made_again_from_its_recipe(name: str) -> None:
-    strategy = make_strategy(name, seed=5, max_trials=7, prior={"p_window": 0.6}, **FEW)
+    strategy = make_strategy(name, seed=5, max_trials=7, prior={"p_window": 0.6}, **few(name))
     recipe = strategy.recipe
     again = make_strategy(recipe.name, strategy.space, recipe.seed, **recipe.settings)
     assert again.recipe == recipe
@@ -71,7 +76,8 @@ def test_designs_that_do_not_look_at_the_responses_do_not() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_named_strategy_is_rebuilt_from_its_recipe(name: str) -> None:
-    strategy = make_strategy(name, seed=2, prior={"p_window": 0.6, "width_ms": (90.0, 0.4)}, **FEW)
+    scale = "width_ms" if settings_of(name)[0] is ParticleSettings else "length_ms"
+    strategy = make_strategy(name, seed=2, prior={"p_window": 0.6, scale: (90.0, 0.4)}, **few(name))
     assert isinstance(strategy.model, ResponseModel)
     assert isinstance(strategy.acquisition, AcquisitionFunction)
     again = make_strategy(strategy.recipe.name, seed=strategy.recipe.seed, **strategy.recipe.settings)

@@ -149,7 +149,7 @@ class GPSettings:
         noise: `"equal"` at all ISIs, or `"by-isi"`.
         transform: of the MEP: `"log"`, `"sqrt"` or `"none"`.
         hyperparameters: `"marginalised"`, or the most likely ones, `"map"`.
-        floor: what the 0.135 rule is applied above: `"subtracted"`, `"zeroed"` or `"raw"`.
+        floor: what the 0.135 rule is applied above: `"subtracted"`, `"zeroed"` or `"raw"`; as in `GaussianProcess`.
         samples: how many paths represent the posterior.
         prior: settings of `isiw.models.gp_prior.HyperparameterPrior` that differ from its defaults.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
