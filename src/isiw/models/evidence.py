@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import torch
 
 from isiw.models.prior import Person
-from isiw.models.protocol import Tensor
+from isiw.models.protocol import Observation, Tensor
 from isiw.models.response import NODES, Response, log_likelihood
 from isiw.models.shapes import facilitation
 
-__all__ = ["History", "in_pieces", "levels", "total_log_likelihood"]
+__all__ = ["ISI_NODES", "History", "in_pieces", "levels", "observed", "total_log_likelihood"]
 
 CHUNK_ELEMENTS = 1 << 18
 """On a CPU the likelihood is worked through in pieces of this many nodes, which stay in its cache."""
@@ -48,9 +48,30 @@ class History:
         """All of it, in order."""
         return self.isi_ms, self.isi_sd_ms, self.log_mep, self.log_mep_high
 
+    def to(self, device: torch.device | str, dtype: torch.dtype) -> History:
+        """The same on another device, or in another precision."""
+        return History(*(column.to(device, dtype) for column in self.columns))
+
     def appended(self, trial: History) -> History:
         """This history and one more trial."""
         return History(*(torch.cat(pair, dim=-1) for pair in zip(self.columns, trial.columns, strict=True)))
+
+
+def observed(observation: Observation, detection_limit_mv: float, response_threshold_mv: float) -> History:
+    """One trial of each person as a history.
+
+    Args:
+        observation: the trial.
+        detection_limit_mv: what an amplitude of 0 is known to be below [mV].
+        response_threshold_mv: what a response is known to be above, and no response below [mV].
+    """
+    seen, silent = observation.response == 1, observation.response == 0
+    log_mep = torch.log(observation.mep_mv)
+    limit, threshold = math.log(detection_limit_mv), math.log(response_threshold_mv)
+    low = torch.where(seen, threshold, torch.where(silent, -torch.inf, log_mep))
+    high = torch.where(seen, torch.inf, torch.where(silent, threshold, log_mep))
+    high = torch.where(observation.mep_mv == 0, limit, high)
+    return History(*(x.unsqueeze(-1) for x in (observation.isi_ms, observation.isi_sd_ms, low, high)))
 
 
 def levels(person: Person, isi_ms: Tensor) -> Tensor:

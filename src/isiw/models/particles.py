@@ -10,26 +10,28 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 import torch
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.evidence import History, total_log_likelihood
+from isiw.models.evidence import History, levels, observed, total_log_likelihood
 from isiw.models.moves import Mover
 from isiw.models.prior import Latents, Person, Prior
-from isiw.models.protocol import Observation, Tensor
-from isiw.models.response import Response
+from isiw.models.protocol import Observation, SimulatedPerson, Tensor
+from isiw.models.response import Response, draw_log_mep
 from isiw.models.sample import PersonSample
 from isiw.models.shapes import Shape
-from isiw.models.windows import best_window, edge_samples
-from isiw.window import WindowEstimate
+from isiw.models.windows import profile_grid, sampled_estimate
+from isiw.types import ArrayLike
+from isiw.window import Window, WindowEstimate
 
-__all__ = ["ParticleModel", "ParticlePosterior"]
+__all__ = ["SIMULATED", "ParticleModel", "ParticlePosterior", "step_generator", "systematic"]
 
-PROFILE_POINTS = 101
-"""ISIs at which the expected MEP and its band are reported."""
+SIMULATED: Final = 2**31
+"""The step whose stream simulated people are drawn from: no posterior gets there."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class ParticleModel:
 
     def prior(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
         """The posterior before the first trial."""
-        latents = self.beliefs.sample(people, self.particles, _generator(self.device, seed, 0))
+        latents = self.beliefs.sample(people, self.particles, step_generator(self.device, seed, 0))
         size, device = latents.present.shape, latents.present.device
         return ParticlePosterior(
             model=self,
@@ -93,7 +95,7 @@ class ParticleModel:
     def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The posterior after one more trial."""
         after = self.reweighted(posterior, observation)
-        generator = _generator(self.device, posterior.seed, after.trials)
+        generator = step_generator(self.device, posterior.seed, after.trials)
         after = self._resampled(after, generator)
         mover = Mover(self.beliefs, posterior.space, after.history, generator)
         latents, log_likelihood = after.latents, after.log_likelihood
@@ -101,9 +103,22 @@ class ParticleModel:
             latents, log_likelihood = mover.sweep(latents, log_likelihood)
         return replace(after, latents=latents, log_likelihood=log_likelihood)
 
+    def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
+        """Draw one person from the prior, and a MEP at each ISI; see `SimulatesPeople`."""
+        generator = step_generator(self.device, seed, SIMULATED)
+        person = self.beliefs.person(self.beliefs.sample(1, 1, generator), space)
+        isis_ms = torch.as_tensor(isi_ms, dtype=torch.float32, device=self.device).unsqueeze(0)
+        log_mep = draw_log_mep(person.response, levels(person, isis_ms), generator)
+        grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=torch.float32, device=self.device)
+        mask = PersonSample(person).window_masks(grid_ms)[0, 0]
+        window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
+        return SimulatedPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
+
     def reweighted(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The same particles, weighted by one more trial as well."""
-        trial = self._trial(observation)
+        trial = observed(observation, self.detection_limit_mv, self.response_threshold_mv).to(
+            self.device, torch.float32
+        )
         gain = total_log_likelihood(posterior.person, trial)
         return replace(
             posterior,
@@ -133,16 +148,6 @@ class ParticleModel:
             log_weights=torch.where(worn, -math.log(self.particles), posterior.log_weights),
             log_likelihood=_take(posterior.log_likelihood, picks),
         )
-
-    def _trial(self, observation: Observation) -> History:
-        seen, silent = observation.response == 1, observation.response == 0
-        log_mep = torch.log(observation.mep_mv)
-        limit, threshold = math.log(self.detection_limit_mv), math.log(self.response_threshold_mv)
-        low = torch.where(seen, threshold, torch.where(silent, -torch.inf, log_mep))
-        high = torch.where(seen, torch.inf, torch.where(silent, threshold, log_mep))
-        high = torch.where(observation.mep_mv == 0, limit, high)
-        columns = (observation.isi_ms, observation.isi_sd_ms, low, high)
-        return History(*(column.to(self.device, torch.float32).unsqueeze(-1) for column in columns))
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,26 +221,12 @@ class ParticlePosterior:
         picks = systematic(self.log_weights[one], self.model.particles)
         sample = PersonSample(_each(self.person, lambda x: _take(x[one], picks)))
         grid = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=picks.device)
-        masks = sample.window_masks(grid)[0]
-        masks = masks[masks.any(-1)]
-        probability = len(masks) / self.model.particles
-        profile_grid = grid[:: max(1, len(grid) // PROFILE_POINTS)]
-        profiles = PersonSample(_each(self._thinned.person, lambda x: x[one])).expected_mep_mv(profile_grid)[0]
-        levels_of = torch.tensor([0.05, 0.5, 0.95], device=picks.device)
-        edges = edge_samples(masks, self.space)
-        start, end = edges.median(0).values.tolist() if len(masks) else (None, None)
-        return WindowEstimate(
-            probability=probability,
-            window=best_window(masks, self.space.grid_ms) if probability >= 0.5 else None,
-            start_ms=start,
-            end_ms=end,
-            grid_ms=profile_grid.double().cpu().numpy(),
-            edge_samples_ms=edges.double().cpu().numpy(),
-            profile_quantiles_mv=torch.quantile(profiles, levels_of, dim=0).double().cpu().numpy(),
-        )
+        thinned = PersonSample(_each(self._thinned.person, lambda x: x[one]))
+        profiles_mv = thinned.expected_mep_mv(profile_grid(self.space).to(picks.device))
+        return sampled_estimate(sample.window_masks(grid)[0], profiles_mv[0], self.space)
 
 
-def _generator(device: str, seed: int, step: int) -> torch.Generator:
+def step_generator(device: str, seed: int, step: int) -> torch.Generator:
     """A stream of its own for each step, so that a posterior depends on its seed and its trials alone."""
     state = np.random.SeedSequence((seed, step)).generate_state(1, np.uint64)
     return torch.Generator(device=device).manual_seed(int(state[0] >> np.uint64(1)))

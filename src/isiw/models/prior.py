@@ -20,7 +20,7 @@ from isiw.models.protocol import Tensor
 from isiw.models.response import NoiseKind, Response
 from isiw.models.shapes import Shape, ShapeKind
 
-__all__ = ["LATENTS", "Latents", "Person", "Prior"]
+__all__ = ["LATENTS", "Latents", "Person", "Prior", "start_ms"]
 
 LATENTS = ("start", "width", "form", "log_floor", "floor_log_sd", "log_ratio", "spread", "output", "boost", "rest")
 """Names of the latents, in order."""
@@ -190,17 +190,35 @@ class Prior:
         return math.log(median_mv) + log_sd * z + tail * z**3
 
     def _start(self, z: Tensor, space: DesignSpace) -> Tensor:
-        """Start of the profile's span in the space [ms]: the mixture's quantile at the latent's probability."""
-        shift, blur = self.hit_delay_ms if space.reference == "valve" else (0.0, 1.0)
-        low, high = (edge + shift for edge in self.start_ms)
-        knots = torch.linspace(space.low_ms - 50.0, space.high_ms, 512, device=z.device)
-        edges = [torch.special.ndtr((knots - edge) / blur) * (knots - edge) for edge in (low, high)]
-        bumps = [torch.exp(-0.5 * ((knots - edge) / blur) ** 2) * blur / math.sqrt(2 * math.pi) for edge in (low, high)]
-        informed = (edges[0] + bumps[0] - edges[1] - bumps[1]) / (high - low)
-        informed = (informed - informed[0]) / (informed[-1] - informed[0]).clamp_min(1e-6)
-        anywhere = (knots - knots[0]) / (knots[-1] - knots[0])
-        cdf = (1 - self.p_anywhere) * informed + self.p_anywhere * anywhere
-        return _interpolate(torch.special.ndtr(z), cdf, knots)
+        return start_ms(z, space, self.start_ms, self.hit_delay_ms, self.p_anywhere)
+
+
+def start_ms(
+    z: Tensor,
+    space: DesignSpace,
+    after_impact_ms: tuple[float, float],
+    hit_delay_ms: tuple[float, float],
+    p_anywhere: float,
+) -> Tensor:
+    """Start of a window in a space [ms] from a standard normal latent: the prior's quantile at its probability.
+
+    Args:
+        z: standard normal latents, any shape.
+        space: the design space.
+        after_impact_ms: the start is uniform between these, counted from the impact [ms].
+        hit_delay_ms: mean and SD of the impact on the clock of the valve [ms].
+        p_anywhere: probability that the start lies anywhere in the range instead, or up to 50 ms before it.
+    """
+    shift, blur = hit_delay_ms if space.reference == "valve" else (0.0, 1.0)
+    low, high = (edge + shift for edge in after_impact_ms)
+    knots = torch.linspace(space.low_ms - 50.0, space.high_ms, 512, device=z.device, dtype=z.dtype)
+    edges = [torch.special.ndtr((knots - edge) / blur) * (knots - edge) for edge in (low, high)]
+    bumps = [torch.exp(-0.5 * ((knots - edge) / blur) ** 2) * blur / math.sqrt(2 * math.pi) for edge in (low, high)]
+    informed = (edges[0] + bumps[0] - edges[1] - bumps[1]) / (high - low)
+    informed = (informed - informed[0]) / (informed[-1] - informed[0]).clamp_min(1e-6)
+    anywhere = (knots - knots[0]) / (knots[-1] - knots[0])
+    cdf = (1 - p_anywhere) * informed + p_anywhere * anywhere
+    return _interpolate(torch.special.ndtr(z), cdf, knots)
 
 
 def _interpolate(x: Tensor, xs: Tensor, ys: Tensor) -> Tensor:

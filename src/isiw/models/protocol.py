@@ -11,12 +11,13 @@ the same order and equally weighted.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias, runtime_checkable
+from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import torch
 
 from isiw.design import DesignSpace
-from isiw.window import WindowEstimate
+from isiw.types import ArrayLike, FloatArray
+from isiw.window import Window, WindowEstimate
 
 __all__ = [
     "Conditions",
@@ -30,6 +31,8 @@ __all__ = [
     "ResponseModel",
     "SamplesProfiles",
     "SamplesWindows",
+    "SimulatedPerson",
+    "SimulatesPeople",
     "Tensor",
 ]
 
@@ -160,4 +163,30 @@ class ResponseModel(Protocol):
 
         Raises:
             StrategyError: an observation of a kind that the model cannot learn from.
+        """
+
+
+class SimulatedPerson(NamedTuple):
+    """A person drawn from a model's prior.
+
+    Args:
+        window: the true window; None where there is none.
+        mep_mv: MEPs at the ISIs asked for [mV], shape (n,).
+    """
+
+    window: Window | None
+    mep_mv: FloatArray
+
+
+@runtime_checkable
+class SimulatesPeople(Protocol):
+    """Capability of a model: people of its own, for whom it must be calibrated."""
+
+    def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
+        """Draw one person from the prior, and a MEP at each ISI exactly as the likelihood says.
+
+        Args:
+            space: the design space.
+            seed: of the person; it may be the seed of a posterior as well, for they share no randomness.
+            isi_ms: ISIs [ms], NaN for TMS alone, shape (n,).
         """

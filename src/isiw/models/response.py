@@ -19,7 +19,15 @@ import torch
 
 from isiw.models.protocol import Tensor
 
-__all__ = ["NoiseKind", "Response", "evoked_mean", "log_likelihood", "node_weights", "outcome_density"]
+__all__ = [
+    "NoiseKind",
+    "Response",
+    "draw_log_mep",
+    "evoked_mean",
+    "log_likelihood",
+    "node_weights",
+    "outcome_density",
+]
 
 NODES = 16
 NODE_REACH = 2.8
@@ -224,3 +232,26 @@ def outcome_density(response: Response, level: Tensor, log_mep: Tensor) -> Tenso
     evoked = (terms @ (precision.sqrt() * node_weights(level)).unsqueeze(-1)).squeeze(-1) / math.sqrt(2 * math.pi)
     flat = Response(*(field.unsqueeze(-1) for field in response))
     return _mix(flat, level.unsqueeze(-1), log_relative.unsqueeze(-2), evoked)
+
+
+def draw_log_mep(response: Response, level: Tensor, generator: torch.Generator) -> Tensor:
+    """Draw natural logs of MEPs [mV] from the distribution that `log_likelihood` is of.
+
+    Args:
+        response: response parameters, fields of shape (..., p).
+        level: facilitation of each trial, shape (..., p, n).
+        generator: source of randomness.
+
+    Returns:
+        Shape (..., p, n).
+    """
+    mean, precision = _components(response, level)
+    node = torch.multinomial(node_weights(level).expand(level.numel(), -1), 1, generator=generator)
+    mean, precision = (x.gather(-1, node.view(*level.shape, 1)).squeeze(-1) for x in (mean, precision))
+    z = torch.randn(level.shape, generator=generator, device=level.device)
+    chance, artefact, place = torch.rand((3, *level.shape), generator=generator, device=level.device)
+    responds = chance < _response_probability(response, level)
+    log_relative = torch.where(responds, mean + z / precision.sqrt(), z * response.floor_log_sd.unsqueeze(-1))
+    low, high = OUTLIER_LOG_RANGE
+    log_relative = torch.where(artefact < OUTLIER_PROBABILITY, low + place * (high - low), log_relative)
+    return log_relative + response.log_floor.unsqueeze(-1)

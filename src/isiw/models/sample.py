@@ -13,13 +13,24 @@ from isiw.models.protocol import Tensor
 from isiw.models.response import NODES, evoked_mean, outcome_density
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
 
-__all__ = ["PersonSample"]
+__all__ = ["OUTCOMES", "PersonSample", "table_levels", "table_weights"]
 
 LEVELS = 12
 """Facilitations at which responses are worked out; what lies between is interpolated."""
 
 OUTCOMES = 32
 """Values of the log MEP on which predictive distributions live."""
+
+
+def table_levels(device: torch.device) -> Tensor:
+    """Facilitations at which tables are worked out, denser where responses begin, shape (l,)."""
+    return torch.linspace(0.0, 1.0, LEVELS, device=device).square()
+
+
+def table_weights(level: Tensor) -> Tensor:
+    """Weights of the tables' levels that interpolate at each facilitation (b, s, t), shape (b, s, t, l)."""
+    position = level.clamp(0.0, 1.0).sqrt() * (LEVELS - 1)
+    return (1.0 - (position.unsqueeze(-1) - torch.arange(LEVELS, device=level.device)).abs()).clamp_min(0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,14 +41,7 @@ class PersonSample:
 
     @cached_property
     def _levels(self) -> Tensor:
-        """Facilitations of the tables, denser where responses begin, shape (1, 1, l)."""
-        device = self.person.present.device
-        return torch.linspace(0.0, 1.0, LEVELS, device=device).square()[None, None, :]
-
-    def _hats(self, level: Tensor) -> Tensor:
-        """Weights of the tables' levels that interpolate at each facilitation, shape (b, s, t, l)."""
-        position = level.clamp(0.0, 1.0).sqrt() * (LEVELS - 1)
-        return (1.0 - (position.unsqueeze(-1) - torch.arange(LEVELS, device=level.device)).abs()).clamp_min(0.0)
+        return table_levels(self.person.present.device)[None, None, :]
 
     @cached_property
     def _evoked(self) -> Tensor:
@@ -65,7 +69,7 @@ class PersonSample:
 
     def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
         """Expected MEP [mV], shape (b, s, t)."""
-        evoked = (self._hats(levels(self.person, isi_ms.unsqueeze(0))) @ self._evoked.unsqueeze(-1)).squeeze(-1)
+        evoked = (table_weights(levels(self.person, isi_ms.unsqueeze(0))) @ self._evoked.unsqueeze(-1)).squeeze(-1)
         return self._with_floor_mv(evoked)
 
     def baselines_mv(self) -> Tensor:
@@ -94,4 +98,4 @@ class PersonSample:
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
-        return self._hats(levels(self.person, isi_ms.unsqueeze(0))) @ self._outcome_table
+        return table_weights(levels(self.person, isi_ms.unsqueeze(0))) @ self._outcome_table
