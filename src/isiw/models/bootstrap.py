@@ -198,6 +198,5 @@ class BootstrapPosterior:
         expectation_ms, reach_ms = float(self.expectation_ms[person]), self.model.half_width_ms
         window = None
         if not math.isnan(expectation_ms):
-            low_ms, high_ms = self.space.low_ms, self.space.high_ms
-            window = Window(max(low_ms, expectation_ms - reach_ms), min(high_ms, expectation_ms + reach_ms))
+            window = Window(*(self.space.snap(expectation_ms + side * reach_ms) for side in (-1, 1)))
         return WindowEstimate(probability=None, window=window, spread_ms=float(self.spread_ms[person]))

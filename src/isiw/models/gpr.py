@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
+from threadpoolctl import ThreadpoolController
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
@@ -68,6 +69,13 @@ class GaussianProcessRegression:
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
     ) -> FittedCurve:
         """Fit the Gaussian process; see `RegressionMethod`."""
+        # Matrices this small gain nothing from several threads, and lose a lot where the machine is busy.
+        with _blas().limit(limits=1, user_api="blas"):
+            return self._fit(isi_ms, excess_mv, space, rng)
+
+    def _fit(
+        self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
+    ) -> FittedCurve:
         scale_mv = max(float(np.abs(excess_mv).max(initial=0.0)), LEAST_SCALE_MV)
         process, noise, trouble = self._process(isi_ms[:, None], excess_mv / scale_mv)
         grid = space.grid_ms
@@ -110,6 +118,12 @@ class GaussianProcessRegression:
         process = GaussianProcessRegressor(kernel.clone_with_theta(found.x), optimizer=None).fit(isi, scaled)
         gave_up = f"The kernel did not converge in {self.max_iterations} iterations: its best parameters stand in."
         return process, math.exp(0.5 * found.x[-1]), None if found.success else gave_up
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """Of the libraries that are loaded now; looking for them takes longer than a fit."""
+    return ThreadpoolController()
 
 
 def _cost(process: Any, theta: FloatArray) -> tuple[float, FloatArray]:

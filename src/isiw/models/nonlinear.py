@@ -17,6 +17,9 @@ from isiw.types import FloatArray
 
 __all__ = ["NonlinearRegression", "gaussians_mv", "gradient_mv"]
 
+LEAST_AMPLITUDE_MV = 1e-3
+"""The amplitude to start from where it is not known and all MEPs are at the floor."""
+
 LEAST_NOISE_MV = 1e-6
 """The noise that a fit without residuals is taken to have."""
 
@@ -78,7 +81,8 @@ class NonlinearRegression:
         width_ms: width of a window before anything is known [ms]; a Gaussian's SD is a quarter of it. Table 4.1: 108.
         min_width_ms: the narrowest window that is fitted [ms]; Table 4.1 has 60–220, and no bounds.
         max_width_ms: the widest [ms].
-        amplitude_mv: amplitude before anything is known [mV]; the text's figures have 0.03–0.3 mV.
+        amplitude_mv: amplitude before anything is known [mV]; the text's figures have 0.03–0.3 mV. 0: as much as the
+            largest MEP so far, where nothing is known.
         max_evaluations: evaluations after which the search gives up.
         samples: how many curves are drawn from the parameters' asymptotic distribution.
 
@@ -100,8 +104,8 @@ class NonlinearRegression:
         widths = (self.min_width_ms, self.width_ms, self.max_width_ms)
         if not 0 < widths[0] <= widths[1] <= widths[2] < math.inf or widths[0] == widths[2]:
             raise InvalidValueError("min_width_ms, width_ms and max_width_ms ascend from above 0", got=widths)
-        if not 0 < self.amplitude_mv < math.inf:
-            raise InvalidValueError("amplitude_mv must be positive", got=self.amplitude_mv)
+        if not 0 <= self.amplitude_mv < math.inf:
+            raise InvalidValueError("amplitude_mv must not be negative", got=self.amplitude_mv)
         if self.max_evaluations < 1 or self.samples < 2:
             raise InvalidValueError(
                 "a search needs evaluations and two samples", got=(self.max_evaluations, self.samples)
@@ -111,7 +115,7 @@ class NonlinearRegression:
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
     ) -> FittedCurve:
         """Fit the Gaussians; see `RegressionMethod`."""
-        beliefs = self._beliefs(space)
+        beliefs = self._beliefs(space, self.amplitude_mv or max(float(excess_mv.max(initial=0.0)), LEAST_AMPLITUDE_MV))
         estimate = self._least_squares(isi_ms, excess_mv, beliefs)
         values, vectors = np.linalg.eigh(estimate.covariance)
         root = vectors * np.sqrt(values.clip(0.0))
@@ -127,13 +131,13 @@ class NonlinearRegression:
             trouble=estimate.trouble,
         )
 
-    def _beliefs(self, space: DesignSpace) -> _Beliefs:
+    def _beliefs(self, space: DesignSpace, amplitude_mv: float) -> _Beliefs:
         """Start values, SDs and bounds of the parameters."""
         range_ms, middle_ms = space.high_ms - space.low_ms, 0.5 * (space.low_ms + space.high_ms)
         sd_ms = self.width_ms / 4.0
         apart_ms = 0.0 if self.peaks == 1 else self.width_ms / 4.0
-        start = [[self.amplitude_mv, middle_ms + side * apart_ms, sd_ms] for side in (-1, 1)[: self.peaks]]
-        sd = [self.amplitude_mv, range_ms / math.sqrt(12.0), 0.5 * sd_ms]
+        start = [[amplitude_mv, middle_ms + side * apart_ms, sd_ms] for side in (-1, 1)[: self.peaks]]
+        sd = [amplitude_mv, range_ms / math.sqrt(12.0), 0.5 * sd_ms]
         low = [0.0, space.low_ms, 0.25 * self.min_width_ms]
         high = [math.inf, space.high_ms, 0.25 * self.max_width_ms]
         return _Beliefs(np.ravel(start), *(np.tile(values, self.peaks) for values in (sd, low, high)))
@@ -144,7 +148,7 @@ class NonlinearRegression:
         if free < 1:
             flat = beliefs.start * np.tile([0.0, 1.0, 1.0], self.peaks)
             trouble = f"{len(isi_ms)} trials do not determine {len(flat)} parameters: a flat curve stands in."
-            return _Estimate(flat, np.diag(beliefs.sd**2), self.amplitude_mv, trouble=trouble)
+            return _Estimate(flat, np.diag(beliefs.sd**2), float(beliefs.sd[0]), trouble=trouble)
         found = least_squares(
             partial(_residuals_mv, isi_ms, excess_mv),
             beliefs.start,

@@ -138,7 +138,7 @@ class SweepPosterior:
             return WindowEstimate(probability=None, window=None)
         baseline_mv = self.model.floor.level_mv(PersonTrials(isi_ms, mep_mv, trials.baseline_mv))
         excess_mv = mep_mv - baseline_mv
-        level = EDGE_LEVEL if self.model.rule == "share" else 0.0
+        level = EDGE_LEVEL if self.model.rule == "share" else 1e-9  # more than the baseline, and not as much
         best = int(excess_mv.argmax())
         clear = excess_mv[best] >= self.model.evidence_se * sem_mv[best]
         inside = curve_masks(excess_mv[None], baseline_mv, level=level)[0] & clear

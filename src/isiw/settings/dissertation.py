@@ -92,7 +92,7 @@ class NRSettings(RegressionSettings):
         width_ms: width of a window before anything is known [ms] (mean of Table 4.1).
         min_width_ms: the narrowest window that is fitted [ms].
         max_width_ms: the widest [ms].
-        amplitude_mv: amplitude before anything is known [mV].
+        amplitude_mv: amplitude before anything is known [mV]; 0: as much as the largest MEP so far.
     """
 
     initial: int = 6
