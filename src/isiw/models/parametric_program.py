@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import pyro
 import torch
@@ -25,6 +25,8 @@ from isiw.models.parametric_prior import Likelihood, Unknowns, WindowPrior, late
 from isiw.models.protocol import Tensor
 
 __all__ = ["MepLaw", "WindowProgram", "nuts_sample"]
+
+WARMUP: Final = 150
 
 
 class MepLaw(TorchDistribution):
@@ -141,7 +143,7 @@ def nuts_sample(
         program: the model.
         trials: of one person, columns of shape (1, n).
         starts: a chain begins at each of these latents, shape (c, d).
-        draws: kept draws of each chain; as many before them are for adaptation.
+        draws: kept draws of each chain, after `WARMUP` for adaptation.
         generator: source of randomness.
 
     Returns:
@@ -153,7 +155,7 @@ def nuts_sample(
         torch.manual_seed(int(torch.randint(2**31, (1,), generator=generator)))
         for start in starts:
             kernel = NUTS(program, full_mass=True)
-            mcmc = MCMC(kernel, draws, warmup_steps=draws, initial_params={"latents": start}, disable_progbar=True)
+            mcmc = MCMC(kernel, draws, warmup_steps=WARMUP, initial_params={"latents": start}, disable_progbar=True)
             mcmc.run(trials)
             chains.append(mcmc.get_samples()["latents"])
     return torch.stack(chains)
