@@ -6,7 +6,8 @@
 The same people of the `recruitment` cohort are examined twice by the default strategy, with the same seeds: once by a
 device that reports the amplitude itself, and once by the simulated tapping robot, with waveforms. Both are judged by
 the same rules. Paired, for both trigger modes. Each session ends when the strategy says so. The robot's hit delay and
-its variation are the person's.
+its variation are the person's, and so is the EMG at rest. Every person has several sessions, which differ in trial
+noise; their mean is one value of that person, so that the interval is about people.
 """
 
 from __future__ import annotations
@@ -14,21 +15,27 @@ from __future__ import annotations
 import argparse
 import importlib.metadata
 import math
+import multiprocessing
 import os
 import platform
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import numpy as np
+import pandas as pd
 import torch
+from rich.console import Console
+from rich.progress import track
 
 import isiw
-from isiw.devices.plant import Geometry
+from isiw.devices.plant import Geometry, SensorNoise
 from isiw.devices.tapper import Trigger
 from isiw.subjects import SimulatedSubject, cohort
+
+Deliver = Callable[[isiw.Stimulus], isiw.Measurement | isiw.Sweep]
 
 SPACES: dict[str, dict[Trigger, isiw.DesignSpace]] = {
     "impact": {"open-loop": isiw.IMPACT_SPACE, "impact": isiw.DesignSpace(5, 320, reference="impact")},
@@ -36,18 +43,57 @@ SPACES: dict[str, dict[Trigger, isiw.DesignSpace]] = {
     "valve": {"open-loop": isiw.VALVE_SPACE, "impact": isiw.DesignSpace(215, 500, reference="valve")},
 }
 LARGEST_DIFFERENCE = 0.03
+REST_UV_PER_FLOOR_MV = 160.0
+"""EMG at rest [µV RMS] by the EMG floor: in 20 ms it spans 4.8 times its RMS, and is to be below nearly every trial's
+floor, of which it is a part."""
 
 
-def examine(
-    space: isiw.DesignSpace, seed: int, trials: int, deliver: Callable[[isiw.Stimulus], isiw.Measurement | isiw.Sweep]
-) -> tuple[isiw.WindowEstimate, Counter[str]]:
-    """One person's session of at most so many stimuli: the estimate, and how many were accepted or why not."""
-    strategy = isiw.make_strategy("default", space=space, seed=seed, max_trials=trials)
+@dataclass(frozen=True)
+class Pair:
+    """One session with a person, to be run both ways.
+
+    Args:
+        reference: the event that ISIs count from.
+        trigger: what triggers the robot's pulse.
+        seed: of the cohort.
+        person: which person of it, from 0.
+        session_seed: of strategy and trial noise.
+        trials: stimuli at most, mistrials included.
+    """
+
+    reference: str
+    trigger: Trigger
+    seed: int
+    person: int
+    session_seed: int
+    trials: int
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What a session came to: F1 of its window, whether it ended without one, and its stimuli by outcome."""
+
+    f1: float
+    no_window: bool
+    outcomes: Counter[str]
+
+
+def run(pair: Pair) -> tuple[Examined, Examined]:
+    """Both sessions of a pair: on amplitudes, and on waveforms."""
+    torch.set_num_threads(1)
+    subject = cohort("recruitment", pair.person + 1, pair.seed)[pair.person]
+    space = SPACES[pair.reference][pair.trigger]
+    arms = (by_amplitude, by_waveform)
+    plain, waves = (examine(subject, space, pair, arm(subject, space, pair)) for arm in arms)
+    return plain, waves
+
+
+def examine(subject: SimulatedSubject, space: isiw.DesignSpace, pair: Pair, deliver: Deliver) -> Examined:
+    """One person's session."""
+    strategy = isiw.make_strategy("default", space=space, seed=pair.session_seed, max_trials=pair.trials)
     outcomes: Counter[str] = Counter()
-    for trial in range(trials):
-        if strategy.decision().stop:
-            break
-        stimulus = isiw.Stimulus(trial, strategy.ask())
+    while not strategy.decision().stop:
+        stimulus = isiw.Stimulus(outcomes.total(), strategy.ask())
         answer = deliver(stimulus)
         judge = isiw.signals.judge if isinstance(answer, isiw.Sweep) else isiw.signals.judge_measurement
         judged = judge(answer, stimulus, space)
@@ -57,14 +103,15 @@ def examine(
         else:
             outcomes["accepted"] += 1
             strategy.tell(judged.isi_ms, judged.mep_mv, isi_sd_ms=judged.isi_sd_ms)
-    return strategy.estimate(), outcomes
+    estimate = strategy.estimate()
+    return Examined(isiw.metrics.f1(estimate, subject.window(space), space), estimate.window is None, outcomes)
 
 
-def by_amplitude(
-    subject: SimulatedSubject, space: isiw.DesignSpace, seed: int
-) -> Callable[[isiw.Stimulus], isiw.Measurement]:
+def by_amplitude(subject: SimulatedSubject, space: isiw.DesignSpace, pair: Pair) -> Deliver:
     """A device that reports the person's amplitudes."""
-    person = subject.begin(seed)
+    # Triggered by the impact, an ISI that counts from there does not vary with the hit, here as on the robot.
+    steady = space.reference == "impact" == pair.trigger
+    person = (replace(subject, hit_delay_sd_ms=0.0) if steady else subject).begin(pair.session_seed)
 
     def deliver(stimulus: isiw.Stimulus) -> isiw.Measurement:
         response = person.respond(stimulus.isi_ms, space.reference)
@@ -73,49 +120,76 @@ def by_amplitude(
     return deliver
 
 
-def by_waveform(
-    subject: SimulatedSubject, space: isiw.DesignSpace, seed: int, trigger: Trigger
-) -> Callable[[isiw.Stimulus], isiw.Sweep]:
+def by_waveform(subject: SimulatedSubject, space: isiw.DesignSpace, pair: Pair) -> Deliver:
     """The tapping robot on the same person; what varies from tap to tap is now the robot's."""
-    person = replace(subject, hit_delay_sd_ms=0.0).begin(seed)
+    person = replace(subject, hit_delay_sd_ms=0.0).begin(pair.session_seed)
     hit_ms, sd_ms = subject.hit_delay_ms, subject.hit_delay_sd_ms
-    geometry = Geometry(hit_ms - 55, sd_ms, hit_ms, sd_ms, contact_ms=15, contact_sd_ms=0.5, memg_sd_ms=1.0)
-    settings = isiw.TapperSettings(reference=space.reference, trigger=trigger)
-    robot = isiw.Tapper(lambda isi_ms: person.respond(isi_ms, "impact"), geometry, settings, seed=seed)
+    noise = SensorNoise(emg_uv=REST_UV_PER_FLOOR_MV * subject.response.floor.median_mv)
+    geometry = Geometry(
+        hit_ms - 55, sd_ms, hit_ms, sd_ms, contact_ms=15, contact_sd_ms=0.5, memg_sd_ms=1.0, noise=noise
+    )
+    settings = isiw.TapperSettings(reference=space.reference, trigger=pair.trigger)
+    robot = isiw.Tapper(lambda isi_ms: person.respond(isi_ms, "impact"), geometry, settings, seed=pair.session_seed)
     robot.stage()
     return lambda stimulus: robot.deliver(stimulus, 1.0)
 
 
+def results(pairs: list[Pair], workers: int) -> Iterator[tuple[Pair, tuple[Examined, Examined]]]:
+    """The outcome of each pair, as it comes."""
+    if workers == 1:
+        yield from ((pair, run(pair)) for pair in pairs)
+        return
+    # Forked children would inherit torch's thread pool in an undefined state.
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        running = {pool.submit(run, pair): pair for pair in pairs}
+        for future in as_completed(running):
+            yield running[future], future.result()
+
+
+def row(reference: str, trigger: Trigger, done: list[tuple[Pair, tuple[Examined, Examined]]]) -> str:
+    """The table's row for one reference and trigger."""
+    scores = pd.DataFrame([(pair.person, plain.f1, waves.f1) for pair, (plain, waves) in done])
+    of_people = scores.groupby(0).mean()
+    difference = of_people[2] - of_people[1]
+    half = 1.96 * difference.std() / math.sqrt(len(difference))
+    kept = "kept" if abs(difference.mean()) <= LARGEST_DIFFERENCE else "MISSED"
+    arms = list(zip(*(both for _, both in done), strict=True))
+    counts = [sum((one.outcomes for one in arm), Counter()) for arm in arms]
+    absent = " and ".join(str(sum(one.no_window for one in arm)) for arm in arms)
+    stimuli = " and ".join(str(count.total()) for count in counts)
+    return (
+        f"{reference:10} {trigger:11} {of_people[1].mean():13.3f} {of_people[2].mean():13.3f} "
+        f"{difference.mean():11.3f} ± {half:.3f} {kept:>10}   {absent:9}   {stimuli}   {dict(counts[1])}"
+    )
+
+
 def main() -> None:
-    """Run, and print a row for each reference and trigger."""
+    """Run, and print a row for each trigger."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--people", type=int, default=50)
+    parser.add_argument("--sessions", type=int, default=4, help="sessions with each of them, each with its trial noise")
     parser.add_argument("--reference", choices=("impact", "valve"), required=True)
-    parser.add_argument("--trials", type=int, default=80, help="stimuli a person at most, mistrials included")
+    parser.add_argument("--trials", type=int, default=80, help="stimuli a session at most, mistrials included")
     parser.add_argument("--seed", type=int, default=10_000, help="0–999 for work, reported figures from 10,000")
-    arguments = parser.parse_args()
-    torch.set_num_threads(1)
-    subjects = cohort("recruitment", arguments.people, arguments.seed)
+    parser.add_argument("--workers", type=int, default=1, help="processes")
+    chosen = parser.parse_args()
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in ("isiw", "numpy", "torch"))
     print(f"python {platform.python_version()}, {versions}")
-    print(f"recruitment cohort, {arguments.people} people, seed {arguments.seed}, {arguments.trials} stimuli at most")
-    print("reference  trigger     F1 amplitudes  F1 waveforms  difference (95 % interval)   stimuli     outcomes")
-    for trigger, space in SPACES[arguments.reference].items():
-        scores, plain_outcomes, outcomes = [], Counter(), Counter()
-        for number, subject in enumerate(subjects):
-            seed, truth = arguments.seed + number, subject.window(space)
-            plain, plain_reasons = examine(space, seed, arguments.trials, by_amplitude(subject, space, seed))
-            waves, reasons = examine(space, seed, arguments.trials, by_waveform(subject, space, seed, trigger))
-            scores.append([isiw.metrics.f1(estimate, truth, space) for estimate in (plain, waves)])
-            plain_outcomes += plain_reasons
-            outcomes += reasons
-        amplitudes, waveforms = np.array(scores).T
-        difference = waveforms - amplitudes
-        half = 1.96 * difference.std(ddof=1) / math.sqrt(len(difference))
-        counts = f"{plain_outcomes.total()} and {outcomes.total()}   {dict(outcomes)}"
-        kept = "kept" if abs(difference.mean()) <= LARGEST_DIFFERENCE else "MISSED"
-        print(f"{space.reference:10} {trigger:11} {amplitudes.mean():13.3f} {waveforms.mean():13.3f} "
-              f"{difference.mean():11.3f} ± {half:.3f} {kept:>10}   {counts}", flush=True)  # fmt: skip
+    print(f"recruitment cohort, {chosen.people} people, {chosen.sessions} sessions each, seed {chosen.seed}, "
+          f"{chosen.trials} stimuli at most")  # fmt: skip
+    print(
+        "reference  trigger     F1 amplitudes  F1 waveforms  difference (95 % interval)   no window   stimuli, outcomes"
+    )
+    for trigger in SPACES[chosen.reference]:
+        numbers = [
+            (person, chosen.people * k + person) for k in range(chosen.sessions) for person in range(chosen.people)
+        ]
+        pairs = [
+            Pair(chosen.reference, trigger, chosen.seed, person, chosen.seed + number, chosen.trials)
+            for person, number in numbers
+        ]
+        progress = track(results(pairs, chosen.workers), trigger, len(pairs), console=Console(stderr=True))
+        print(row(chosen.reference, trigger, list(progress)), flush=True)
 
 
 if __name__ == "__main__":

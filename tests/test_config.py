@@ -18,7 +18,7 @@ from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError
 from isiw.log.reader import read_session
 from isiw.session import Session
-from isiw.settings import ParticleSettings
+from isiw.settings.particles import ParticleSettings
 
 
 @pytest.fixture

@@ -311,7 +311,14 @@ def test_ctrl_c_at_any_time_leaves_an_intact_log(scripted_strategy, scripted_dev
     device = scripted_device()
     session = Session(device, scripted_strategy(100_000), log=log, limits=Limits(0, 200, 0.0, 100_000))
     timer = threading.Timer(delay_s, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
+    stage = device.stage
+
+    def stage_and_start() -> None:
+        # Not before the session runs, whatever else the machine does: outside it, Ctrl-C would end the tests.
+        stage()
+        timer.start()
+
+    device.stage = stage_and_start
     with pytest.raises(KeyboardInterrupt):
         session.run()
     timer.join()

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import torch
 
-from isiw.acquisition.batch import greedy_batch
+from isiw.acquisition.batch import greedy_batch, own_plan
 from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
 from isiw.acquisition.sweeps import golden_index
 from isiw.design import DesignSpace
@@ -145,8 +145,8 @@ class Strategy:
         if deadline_s is not None and not deadline_s >= 0:
             raise InvalidValueError("deadline_s must be a time from 0 up", got=deadline_s)
         if self._next_isi_ms is None:
-            if initial := self._initial_left():
-                self._next_isi_ms = initial[0]
+            if planned := self._planned():
+                self._next_isi_ms = planned[0]
             else:
                 self._next_isi_ms, self._fallback_reason = (
                     self._best(self._posterior) if deadline_s is None else self._best_within(deadline_s)
@@ -165,11 +165,13 @@ class Strategy:
         """
         if n < 1:
             raise InvalidValueError("a batch has at least one ISI", got=n)
-        chosen = (self._initial_left() or [self.ask()])[:n]
+        chosen = (self._planned() or [self.ask()])[:n]
         return greedy_batch(self._posterior, self.acquisition, chosen, n, lambda posterior: self._best(posterior)[0])
 
-    def _initial_left(self) -> list[float]:
-        return list(self.initial_ms[self._told - self._told_alone :])
+    def _planned(self) -> list[float]:
+        """What is left of the initial ISIs, and the plan of a method that has its own [ms]."""
+        own = own_plan(self._posterior, self.acquisition)
+        return [*self.initial_ms[self._told - self._told_alone :], *map(self.space.snap, own)]
 
     @property
     def fallback_reason(self) -> str | None:

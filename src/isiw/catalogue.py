@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Final
@@ -9,49 +10,80 @@ from typing import Any, Final
 from isiw.asktell import Recipe, Strategy
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
-from isiw.settings import ParametricSettings, ParticleSettings, Settings
+from isiw.settings.common import Settings
 
 __all__ = ["list_strategies", "make_strategy", "settings_of"]
 
 
 @dataclass(frozen=True)
 class _Entry:
-    """A named strategy: what it does, its family's settings, and those that the name stands for."""
+    """A named strategy.
+
+    Args:
+        summary: what it does, in a sentence.
+        family: where in `isiw.settings` the class of its settings is; loaded, with the libraries that its model needs,
+            only when the strategy is made.
+        meant: the settings that the name stands for.
+    """
 
     summary: str
-    family: type[Settings]
+    family: str
     meant: Mapping[str, Any] = field(default_factory=dict)
 
 
+_PARTICLES, _PARAMETRIC, _GP = "particles:ParticleSettings", "parametric:ParametricSettings", "gp:GPSettings"
+
 _CATALOGUE: Final[dict[str, _Entry]] = {
     "default": _Entry(
-        "Particle posterior with input-side noise; asks for the window and for everything in turn.", ParticleSettings
+        "Particle posterior with input-side noise; asks for the window and for everything in turn.", _PARTICLES
     ),
     "particles-window": _Entry(
         "Particle posterior; asks where the window's membership will be learnt best.",
-        ParticleSettings,
+        _PARTICLES,
         {"acquisition": "window-gain"},
     ),
     "particles-mi": _Entry(
         "Particle posterior; asks for the largest mutual information with all unknowns.",
-        ParticleSettings,
+        _PARTICLES,
         {"acquisition": "mutual-information"},
     ),
     "even": _Entry(
-        "Particle posterior; evenly spaced ISIs, whatever the responses.", ParticleSettings, {"acquisition": "even"}
+        "Particle posterior; evenly spaced ISIs, whatever the responses.", _PARTICLES, {"acquisition": "even"}
     ),
-    "random": _Entry(
-        "Particle posterior; random ISIs, whatever the responses.", ParticleSettings, {"acquisition": "random"}
-    ),
+    "random": _Entry("Particle posterior; random ISIs, whatever the responses.", _PARTICLES, {"acquisition": "random"}),
     "parametric-mi": _Entry(
         "Gaussian window in Pyro; asks for the largest mutual information with all unknowns.",
-        ParametricSettings,
+        _PARAMETRIC,
         {"acquisition": "mutual-information"},
     ),
     "parametric-window": _Entry(
         "Gaussian window in Pyro; asks where the window's membership will be learnt best.",
-        ParametricSettings,
+        _PARAMETRIC,
         {"acquisition": "window-gain"},
+    ),
+    "gp-straddle": _Entry("Gaussian process; asks where it is least clear on which side of an edge it is.", _GP),
+    "gp-variance": _Entry(
+        "Gaussian process; asks for the largest reduction of the profile's variance.",
+        _GP,
+        {"acquisition": "integrated-variance"},
+    ),
+    "gp-ei": _Entry(
+        "Gaussian process; seeks the best ISI only, by expected improvement.", _GP, {"acquisition": "log-ei"}
+    ),
+    "nr": _Entry("Dissertation: nonlinear regression of one Gaussian.", "dissertation:NRSettings"),
+    "nr2": _Entry(
+        "Dissertation: nonlinear regression of two Gaussians.",
+        "dissertation:NRSettings",
+        {"peaks": 2, "initial": 7, "segments": "all"},
+    ),
+    "svmr": _Entry("Dissertation: support vector regression.", "dissertation:SVMRSettings"),
+    "gpr": _Entry("Dissertation: Gaussian process regression of the amplitudes.", "dissertation:GPRSettings"),
+    "pf": _Entry(
+        "Dissertation: bootstrap particle filter over ISIs, a generation of particles at a time.",
+        "dissertation:PFSettings",
+    ),
+    "incremental": _Entry(
+        "Conventional search: twelve trials each 5 ms, until the window was passed.", "dissertation:SweepSettings"
     ),
 }
 
@@ -69,7 +101,8 @@ def settings_of(name: str) -> tuple[type[Settings], Mapping[str, Any]]:
     """
     if name not in _CATALOGUE:
         raise StrategyError("unknown strategy", got=name, expected=", ".join(_CATALOGUE))
-    return _CATALOGUE[name].family, _CATALOGUE[name].meant
+    entry = _CATALOGUE[name]
+    return pkgutil.resolve_name(f"isiw.settings.{entry.family}"), entry.meant
 
 
 def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed: int = 0, **settings: Any) -> Strategy:

@@ -19,9 +19,11 @@ __all__ = [
     "CredibleWidth",
     "EdgeVariance",
     "NoWindow",
+    "ParticleSpread",
     "Progress",
     "StopDecision",
     "StoppingRule",
+    "SweptPast",
     "looks_back",
     "stimuli_left",
 ]
@@ -157,14 +159,17 @@ class EdgeVariance:
         variance_ms2: the variance [ms²] of an edge's last values below which it has settled.
         last: how many values.
         edges: whether both edges must have settled, as the text says, or either, as its pseudo-code does.
+        initial: trials of the initial design; the first value is the one after the last of them.
 
     Raises:
-        InvalidValueError: a variance that is not positive, fewer than two values, or another word for the edges.
+        InvalidValueError: a variance that is not positive, fewer than two values, another word for the edges, or a
+            negative number of initial trials.
     """
 
     variance_ms2: float = 50.0
     last: int = 5
     edges: Literal["both", "either"] = "both"
+    initial: int = 0
 
     def __post_init__(self) -> None:
         if not self.variance_ms2 > 0 or self.last < 2:
@@ -173,10 +178,14 @@ class EdgeVariance:
             )
         if self.edges not in {"both", "either"}:
             raise InvalidValueError("edges settle both or either", got=self.edges, expected="both or either")
+        if self.initial < 0:
+            raise InvalidValueError("initial is a number of trials", got=self.initial, expected="0 or more")
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
-        windows = [estimate.window for estimate in progress.past[-self.last :]]
+        since_initial = max(0, progress.told - max(1, self.initial) + 1)
+        values = progress.past[-min(self.last, since_initial) :] if since_initial else ()
+        windows = [estimate.window for estimate in values]
         edges = [(window.start_ms, window.end_ms) for window in windows if window is not None]
         if len(edges) < self.last:
             return StopDecision(stop=False, reason=f"There are not {self.last} windows in a row yet.")
@@ -186,6 +195,64 @@ class EdgeVariance:
         if settled:
             return StopDecision(stop=True, reason=f"The window has settled: {spread}.")
         return StopDecision(stop=False, reason=f"The window has not settled: {spread}.")
+
+
+@dataclass(frozen=True)
+class ParticleSpread:
+    """Stop when a particle search has narrowed itself down: the dissertation's rule for its PF (4.6).
+
+    Args:
+        sd_ms: the largest acceptable SD of the particles [ms].
+
+    Raises:
+        InvalidValueError: an SD that is not positive.
+    """
+
+    sd_ms: float = 25.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.sd_ms) and self.sd_ms > 0):
+            raise InvalidValueError("sd_ms must be positive", got=self.sd_ms)
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        spread_ms = progress.estimate.spread_ms
+        if spread_ms is None or progress.estimate.window is None:
+            return StopDecision(stop=False, reason="No generation of particles has been measured yet.")
+        spread = f"they have an SD of {spread_ms:.0f} ms"
+        if spread_ms <= self.sd_ms:
+            return StopDecision(stop=True, reason=f"The particles have converged: {spread}.")
+        return StopDecision(stop=False, reason=f"The particles have not converged: {spread}.")
+
+
+@dataclass(frozen=True)
+class SweptPast:
+    """Stop a sweep that has left the window behind: the dissertation's manual termination (4.2.1).
+
+    Only an estimate whose `grid_ms` is what was swept so far can be judged by it.
+
+    Args:
+        quiet_ms: how far behind the window's end nothing was enhanced [ms].
+
+    Raises:
+        InvalidValueError: a distance that is not positive.
+    """
+
+    quiet_ms: float = 25.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.quiet_ms) and self.quiet_ms > 0):
+            raise InvalidValueError("quiet_ms must be positive", got=self.quiet_ms)
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        window, swept_ms = progress.estimate.window, progress.estimate.grid_ms
+        if window is None or swept_ms is None:
+            return StopDecision(stop=False, reason="The sweep has met no window yet.")
+        behind = f"it has come {swept_ms[-1] - window.end_ms:.0f} ms behind the window's end"
+        if swept_ms[-1] - window.end_ms >= self.quiet_ms:
+            return StopDecision(stop=True, reason=f"The sweep has passed the window: {behind}.")
+        return StopDecision(stop=False, reason=f"The sweep has not passed the window: {behind}.")
 
 
 @dataclass(frozen=True)

@@ -133,6 +133,7 @@ class WindowEstimate:
         grid_ms: the ISIs of `profile_quantiles_mv`, shape (t,).
         edge_samples_ms: posterior samples of (start, end) given a window, ±inf beyond the range, shape (s, 2).
         profile_quantiles_mv: the 0.05, 0.5 and 0.95 quantiles of the expected MEP by ISI [mV], shape (3, t).
+        spread_ms: SD of the ISIs that a particle search has narrowed itself down to [ms].
 
     Raises:
         InvalidValueError: a probability outside 0–1, or a window reported against it.
@@ -145,6 +146,7 @@ class WindowEstimate:
     grid_ms: FloatArray | None = field(default=None, repr=False)
     edge_samples_ms: FloatArray | None = field(default=None, repr=False)
     profile_quantiles_mv: FloatArray | None = field(default=None, repr=False)
+    spread_ms: float | None = None
 
     def __post_init__(self) -> None:
         if self.probability is None:

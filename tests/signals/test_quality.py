@@ -7,7 +7,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.devices.presets import preset
-from isiw.devices.tapper import Tapper
+from isiw.devices.tapper import Tapper, TapperSettings
 from isiw.errors import InvalidValueError
 from isiw.signals import SignalLimits, is_saturated, judge, judge_measurement
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
@@ -165,12 +165,12 @@ class Evoked:
         self.mep_mv = mep_mv
 
 
-def told_mv(isi_ms, evoked_mv, artefact_mv, name="subject1"):
+def told_mv(isi_ms, evoked_mv, artefact_mv, name="subject1", space=IMPACT, trials=8):
     geometry = replace(preset(name), artefact_mv=artefact_mv)
-    robot = Tapper(lambda _: Evoked(evoked_mv), geometry, seed=3)
+    robot = Tapper(lambda _: Evoked(evoked_mv), geometry, TapperSettings(reference=space.reference), seed=3)
     robot.stage()
-    stimuli = [Stimulus(trial, float(isi_ms)) for trial in range(8)]
-    judged = [judge(robot.deliver(stimulus, 1.0), stimulus, IMPACT) for stimulus in stimuli]
+    stimuli = [Stimulus(trial, float(isi_ms)) for trial in range(trials)]
+    judged = [judge(robot.deliver(stimulus, 1.0), stimulus, space) for stimulus in stimuli]
     return np.array([one.mep_mv for one in judged if one.reason is None])
 
 
@@ -194,6 +194,13 @@ def test_where_tap_and_mep_coincide_at_least_half_of_the_mep_is_told(isi_ms, nam
 @pytest.mark.parametrize("isi_ms", [0, 3, 6, 9, 12, 15])
 def test_the_tap_of_a_silent_trial_is_never_told_as_a_mep(isi_ms, name):
     assert told_mv(isi_ms, 0.0, 0.1, name).max() < 0.01
+
+
+@pytest.mark.parametrize("evoked_mv", [0.0, 0.012, 0.025])
+@pytest.mark.parametrize("name", ["subject1", "subject2"])
+def test_the_tap_that_follows_the_pulse_makes_no_small_mep_large(name, evoked_mv):
+    told = [told_mv(preset(name).hit_ms + isi_ms, evoked_mv, 0.1, name, VALVE, trials=4) for isi_ms in range(-30, 0, 2)]
+    assert np.mean(np.concatenate(told) > 1.1 * max(evoked_mv, 0.008)) < 0.03
 
 
 def test_a_short_sweep_that_begins_after_the_valve_command_is_judged_by_what_there_is():

@@ -17,7 +17,7 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import StrategyError
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.protocol import Observation, ProposesIsi, Tensor
-from isiw.settings import ACQUISITIONS
+from isiw.settings.common import ACQUISITIONS
 from isiw.subjects import cohort
 from isiw.testing import check_acquisition, check_model, check_strategy
 from isiw.testing.promises import Trials, trials_that_break_things, usual_trials
@@ -164,10 +164,11 @@ def test_the_suite_finds_a_broken_acquisition_function(acquisition: AcquisitionF
 class Forgetful(Strategy):
     """Asks something else each time."""
 
+    asked = 0
+
     def ask(self, deadline_s: float | None = None) -> float:
-        self._next_isi_ms = None
-        self._told += 1
-        return super().ask(deadline_s)
+        self.asked += 1
+        return self.space.snap(super().ask(deadline_s) + 10.0 * (self.asked % 2))
 
 
 class Gullible(Strategy):

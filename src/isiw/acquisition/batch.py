@@ -10,7 +10,14 @@ from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.errors import StrategyError
 from isiw.models.protocol import Conditions, Posterior, ProposesIsi, SamplesProfiles
 
-__all__ = ["greedy_batch"]
+__all__ = ["greedy_batch", "own_plan"]
+
+
+def own_plan(posterior: Posterior, acquisition: AcquisitionFunction) -> list[float]:
+    """The ISIs [ms] that the method itself wants next for one person; empty where it is not asked for them."""
+    if ProposesIsi in acquisition.needs and isinstance(posterior, ProposesIsi):
+        return [float(isi_ms) for isi_ms in posterior.proposed_isis_ms()[0]]
+    return []
 
 
 def greedy_batch(
@@ -22,28 +29,23 @@ def greedy_batch(
 ) -> list[float]:
     """ISIs [ms] for the next n trials of one person.
 
-    A method with a plan of its own is asked for it. For all others the posterior is conditioned on the median MEP that
-    it expects at each ISI chosen so far (the kriging believer: Ginsbourger et al., 2010, chapter 6 of Computational
+    A method with a plan of its own keeps to it. For all others the posterior is conditioned on the median MEP that it
+    expects at each ISI chosen so far (the kriging believer: Ginsbourger et al., 2010, chapter 6 of Computational
     Intelligence in Expensive Optimization Problems).
 
     Args:
         posterior: what is believed before the batch.
         acquisition: the acquisition function.
-        chosen_ms: the ISIs [ms] that are chosen already; they come first.
+        chosen_ms: the ISIs [ms] that are chosen already, such as all of a method's own plan; they come first.
         n: how many ISIs in all.
         choose: from a posterior to the next ISI [ms].
 
     Raises:
         StrategyError: the posterior can imagine no trials, or the method's own plan is shorter.
     """
-    if ProposesIsi in acquisition.needs and isinstance(posterior, ProposesIsi):
-        plan = posterior.proposed_isis_ms()[0].tolist()
-        if len(plan) < n - len(chosen_ms):
-            raise StrategyError(
-                "the method plans no further ahead", got=n, expected=f"at most {len(plan) + len(chosen_ms)} ISIs"
-            )
-        return [*chosen_ms, *plan[: n - len(chosen_ms)]]
     batch = chosen_ms[:n]
+    if len(batch) < n and own_plan(posterior, acquisition):
+        raise StrategyError("the method plans no further ahead", got=n, expected=f"at most {len(batch)} ISIs")
     imagined = 0
     while len(batch) < n:
         for isi_ms in batch[imagined:]:

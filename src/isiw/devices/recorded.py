@@ -15,18 +15,18 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import brentq
 
 from isiw.devices.protocol import DeviceInfo, require_staged
+from isiw.devices.rendering import scale_of_mep
 from isiw.devices.simulated import Respond, SimulatedPerson
 from isiw.errors import DeviceError, InvalidValueError
+from isiw.signals.mep import MEP_WINDOW_MS
 from isiw.trials import Channel, Stimulus, Sweep
 from isiw.types import BoolArray, FloatArray, Reference
 
 __all__ = ["RecordedDevice", "Recordings", "load_recordings"]
 
 PATTERN = "uef_*_ECR_epochs_uV_3kHz.csv.gz"
-MEP_WINDOW_MS = (15.0, 35.0)
 QUIET_MV = 0.02  # recorded floors reach 20 µV peak-to-peak; the smallest recorded MEP here has 80 µV
 CLEAR_MV = 0.2  # a scaled-down MEP brings its own noise along, so only large ones are templates
 BACKGROUND_UNTIL_MS = -2.0  # the artefact begins here
@@ -80,15 +80,7 @@ class Recordings:
         quiet = self.quiet_mv[rng.integers(len(self.quiet_mv))]
         template = self.mep_mv[rng.integers(len(self.mep_mv))]
         floor, unit = quiet[self.in_mep_window], template[self.in_mep_window]
-
-        def missing_mv(scale: float) -> float:
-            return float(np.ptp(floor + scale * unit)) - mep_mv
-
-        if missing_mv(0.0) >= 0:
-            return np.asarray(quiet)
-        # The sum's amplitude is at least scale * ptp(unit) - ptp(floor), so this scale is enough.
-        enough = (mep_mv + np.ptp(floor)) / np.ptp(unit)
-        return np.asarray(quiet + brentq(missing_mv, 0.0, enough) * template, dtype=np.float64)
+        return np.asarray(quiet + scale_of_mep(floor, unit, mep_mv) * template, dtype=np.float64)
 
 
 def load_recordings(folder: str | os.PathLike[str]) -> Recordings:

@@ -10,9 +10,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.signal import butter, sosfilt
 
 from isiw.devices.plant import SEPARATION_RAD, Taps, drive, pressure_kpa, rebound, restitution
+from isiw.signals.mep import MEP_WINDOW_MS
 from isiw.types import ArrayLike, FloatArray
 
 __all__ = [
@@ -27,6 +29,7 @@ __all__ = [
     "record_emg",
     "record_robot",
     "sample_times_ms",
+    "scale_of_mep",
     "tap_artefact_mv",
     "tms_artefact_mv",
     "valve_v",
@@ -97,16 +100,42 @@ def record_emg(
         taps: what the robot does.
         rng: source of the noise, of the pulse's artefact, and of the MEP's latency and length.
         pulse_ms: the magnetic pulse [ms after the valve command], NaN for none, shape (n,).
-        evoked_mv: peak-to-peak amplitude of the MEP [mV], shape (n,).
+        evoked_mv: peak-to-peak amplitude 15–35 ms after the pulse, EMG at rest included [mV], shape (n,).
     """
     n = len(taps.hit_ms)
-    emg = emg_noise_uv(n, len(since_valve_ms), rate_hz, taps.geometry.noise.emg_uv, rng) / 1000
-    emg += tap_artefact_mv(since_valve_ms - taps.memg_ms[:, None], taps.geometry.artefact_mv)
+    resting = emg_noise_uv(n, len(since_valve_ms), rate_hz, taps.geometry.noise.emg_uv, rng) / 1000
+    artefacts = tap_artefact_mv(since_valve_ms - taps.memg_ms[:, None], taps.geometry.artefact_mv)
     since_pulse = since_valve_ms - pulse_ms[:, None]
     sign, size = rng.choice((-1.0, 1.0), n), rng.uniform(*PULSE_ARTEFACT_MV, n)
-    emg += tms_artefact_mv(since_pulse, sign * size)
+    artefacts = artefacts + tms_artefact_mv(since_pulse, sign * size)
     shift, stretch = LATENCY_SD_MS * rng.standard_normal(n), 1 + STRETCH_SD * rng.standard_normal(n)
-    return emg + mep_mv(since_pulse, evoked_mv, shift, stretch)
+    meps = mep_mv(since_pulse, np.ones(n), shift, stretch)
+    in_window = (since_pulse >= MEP_WINDOW_MS[0]) & (since_pulse <= MEP_WINDOW_MS[1])
+    for sweep in np.flatnonzero(in_window.any(axis=-1)):
+        inside = in_window[sweep]
+        meps[sweep] *= scale_of_mep(resting[sweep, inside], meps[sweep, inside], float(evoked_mv[sweep]))
+    return resting + artefacts + meps
+
+
+def scale_of_mep(resting_mv: FloatArray, mep_mv: FloatArray, amplitude_mv: float) -> float:
+    """The factor on a MEP with which its sum with EMG at rest has a peak-to-peak amplitude.
+
+    A person's amplitudes include the EMG floor, which would otherwise count twice. Where the EMG at rest alone has the
+    amplitude, there is no MEP.
+
+    Args:
+        resting_mv: EMG at rest in the MEP window [mV], shape (w,).
+        mep_mv: the MEP there [mV], shape (w,).
+        amplitude_mv: peak-to-peak amplitude of the sum [mV].
+    """
+
+    def missing_mv(scale: float) -> float:
+        return amplitude_mv - float(np.ptp(resting_mv + scale * mep_mv))
+
+    if missing_mv(0.0) <= 0:
+        return 0.0
+    # The sum's amplitude is at least scale * ptp(mep) - ptp(rest), so this scale is enough.
+    return float(brentq(missing_mv, 0.0, (amplitude_mv + np.ptp(resting_mv)) / np.ptp(mep_mv)))
 
 
 def valve_v(since_valve_ms: FloatArray, late_ms: FloatArray) -> FloatArray:

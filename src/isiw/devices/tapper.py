@@ -33,7 +33,7 @@ class Evoked(Protocol):
 
     @property
     def mep_mv(self) -> float:
-        """Peak-to-peak amplitude of the MEP [mV]."""
+        """Peak-to-peak amplitude in the MEP window, EMG at rest included [mV]."""
 
 
 @dataclass(frozen=True)

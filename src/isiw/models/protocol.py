@@ -21,6 +21,7 @@ from isiw.window import Window, WindowEstimate
 
 __all__ = [
     "Conditions",
+    "HasBotorchModel",
     "HasEvidence",
     "Observation",
     "Posterior",
@@ -119,6 +120,18 @@ class HasEvidence(Protocol):
 
     def log_evidence(self) -> Tensor:
         """Log marginal likelihood of the trials told so far [nat], shape (b,)."""
+
+
+@runtime_checkable
+class HasBotorchModel(Protocol):
+    """Capability: a model of BoTorch's, for its acquisition functions."""
+
+    @property
+    def people(self) -> int:
+        """How many people there are."""
+
+    def botorch_model(self, person: int = 0) -> Any:
+        """The BoTorch model of one person: from ISIs [ms] to MEPs on a scale of its own, in double precision."""
 
 
 @runtime_checkable

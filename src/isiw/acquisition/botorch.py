@@ -1,0 +1,35 @@
+"""BoTorch's acquisition functions, on models that can be asked for a BoTorch model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import torch
+
+from isiw.models.protocol import HasBotorchModel, Tensor
+
+__all__ = ["BotorchAcquisition"]
+
+
+@dataclass(frozen=True)
+class BotorchAcquisition:
+    """An acquisition function of BoTorch's, made anew for each posterior.
+
+        BotorchAcquisition(lambda model: qNegIntegratedPosteriorVariance(model, mc_points=grid_ms))
+
+    Args:
+        make: from a BoTorch model to a BoTorch acquisition function. The model's input is the ISI [ms], so `grid_ms`
+            above is a double tensor of ISIs [ms] of shape (N, 1); its outcome is on the scale of the model.
+    """
+
+    make: Callable[[Any], Callable[[Tensor], Tensor]]
+    needs: ClassVar[tuple[type, ...]] = (HasBotorchModel,)
+
+    def __call__(self, posterior: HasBotorchModel, isi_ms: Tensor) -> Tensor:
+        """Score the candidate ISIs, one at a time, shape (b, t)."""
+        inputs = isi_ms.double()[:, None, None]
+        with torch.no_grad():
+            scores = [self.make(posterior.botorch_model(person))(inputs) for person in range(posterior.people)]
+        return torch.stack(scores)

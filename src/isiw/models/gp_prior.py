@@ -1,0 +1,149 @@
+"""Hyperparameters of the Gaussian process: what is believed about them, and a grid on which they are weighed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple, Self
+
+import torch
+
+from isiw.errors import InvalidValueError
+from isiw.models.protocol import Tensor
+
+__all__ = ["FixedProcess", "HyperparameterPrior", "Hyperparameters"]
+
+GRID_SD = 2.25
+GRID_POINTS = (7, 5, 7)
+"""Of length, amplitude and noise, from -GRID_SD to GRID_SD prior SDs."""
+
+LEAST_NOISE = 0.01
+"""Noise SDs are at least this share of the unit, so that covariances have a stable Cholesky factor."""
+
+
+class Hyperparameters(NamedTuple):
+    """Of q processes, amplitudes and noise in standardised units, shape (q,).
+
+    Args:
+        length_ms: over which the profile varies [ms].
+        amplitude: SD of the profile; 0 where a tap changes nothing.
+        noise: SD of a trial about the profile, where the relative noise variance is 1.
+    """
+
+    length_ms: Tensor
+    amplitude: Tensor
+    noise: Tensor
+
+    def picked(self, picks: Tensor) -> Hyperparameters:
+        """Some of them."""
+        return Hyperparameters(*(field[picks] for field in self))
+
+
+@dataclass(frozen=True)
+class HyperparameterPrior:
+    """Log-normal priors, each a median and a log SD, and the probability of a profile.
+
+    Args:
+        length_ms: over which the transformed profile varies [ms]. Windows are 40 to 230 ms wide, which Gaussian
+            profiles with SDs of a quarter of that are; their logarithm varies faster at the flanks.
+        amplitude: SD of the profile, as a share of the SD of all trials.
+        noise: SD of a trial about the profile, as a share of the SD of all trials.
+        p_window: probability that the tap changes anything.
+    """
+
+    length_ms: tuple[float, float] = (40.0, 0.5)
+    amplitude: tuple[float, float] = (1.2, 0.3)
+    noise: tuple[float, float] = (0.6, 0.5)
+    p_window: float = 0.75
+
+    def __post_init__(self) -> None:
+        for name in ("length_ms", "amplitude", "noise"):
+            pair = getattr(self, name)
+            if len(pair) != 2 or not all(math.isfinite(x) and x > 0 for x in pair):
+                raise InvalidValueError(f"{name} is a median and a log SD, both positive", got=pair)
+            object.__setattr__(self, name, (float(pair[0]), float(pair[1])))
+        if not 0.0 < self.p_window <= 1.0:
+            raise InvalidValueError("p_window is a probability above 0", got=self.p_window)
+        least = self.noise[0] * math.exp(-GRID_SD * self.noise[1])
+        if least < LEAST_NOISE:
+            raise InvalidValueError(
+                "the prior allows so little noise that covariances become singular",
+                got=least,
+                expected=f"a median {GRID_SD:g} log SDs above {LEAST_NOISE:g}",
+            )
+
+    @classmethod
+    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
+        """The prior that has these settings; what is not among them is as by default.
+
+        Raises:
+            InvalidValueError: a setting that the prior does not have.
+        """
+        known = [f.name for f in fields(cls)]
+        unknown = sorted(set(settings) - set(known))
+        if unknown:
+            raise InvalidValueError("the prior has no such setting", got=unknown, expected=", ".join(known))
+        return cls(**settings)
+
+    @property
+    def log_hypotheses(self) -> Tensor:
+        """Log probability that the tap changes something, and nothing, shape (2,)."""
+        return torch.tensor([self.p_window, 1.0 - self.p_window], dtype=torch.float64).log()
+
+    def at(self, z: Tensor) -> Hyperparameters:
+        """Hyperparameters some prior SDs from their medians, shape (q, 3)."""
+        return Hyperparameters(*(self._medians_and_sds[0] * torch.exp(self._medians_and_sds[1] * z)).unbind(-1))
+
+    def z(self, hyperparameters: Hyperparameters) -> Tensor:
+        """How many prior SDs from their medians hyperparameters are, shape (q, 3)."""
+        medians, sds = self._medians_and_sds
+        z: Tensor = (torch.stack(hyperparameters, dim=-1) / medians).log() / sds
+        return z
+
+    def grid(self) -> tuple[Hyperparameters, Tensor]:
+        """Processes on a grid of equal steps in prior SDs, then those without an amplitude; and their log prior."""
+        axes = [torch.linspace(-GRID_SD, GRID_SD, points, dtype=torch.float64) for points in GRID_POINTS]
+        present = torch.cartesian_prod(*axes)
+        absent = torch.nn.functional.pad(axes[2].unsqueeze(-1), (2, 0))
+        shares = [torch.log_softmax(-0.5 * z.square().sum(-1), 0) for z in (present, absent)]
+        log_prior = torch.cat([share + log for share, log in zip(shares, self.log_hypotheses, strict=True)])
+        processes = self.at(torch.cat((present, absent)))
+        has_amplitude = torch.arange(len(log_prior)) < len(present)
+        return processes._replace(amplitude=processes.amplitude * has_amplitude), log_prior
+
+    @property
+    def _medians_and_sds(self) -> Tensor:
+        rows = torch.tensor([self.length_ms, self.amplitude, self.noise], dtype=torch.float64)
+        return rows.T
+
+
+@dataclass(frozen=True)
+class FixedProcess:
+    """Hyperparameters and a scale that are not learnt.
+
+    Args:
+        length_ms: over which the transformed profile varies [ms].
+        amplitude: SD of the profile, in units of the scale.
+        noise: SD of a trial about it, in units of the scale.
+        centre: transformed MEP that is 0 on the scale; the constant is this give or take one unit.
+        unit: difference of transformed MEPs that is 1 on the scale.
+
+    Raises:
+        InvalidValueError: a number that is not finite or not positive, or too little noise.
+    """
+
+    length_ms: float
+    amplitude: float
+    noise: float
+    centre: float
+    unit: float = 1.0
+
+    def __post_init__(self) -> None:
+        positive = (self.length_ms, self.amplitude, self.noise, self.unit)
+        if not all(math.isfinite(x) and x > 0 for x in positive) or not math.isfinite(self.centre):
+            raise InvalidValueError("length, amplitude, noise and unit are positive, the centre finite", got=self)
+        if self.noise < LEAST_NOISE * self.amplitude:
+            raise InvalidValueError(
+                "so little noise makes covariances singular", got=self.noise, expected=f"{LEAST_NOISE:g} amplitudes"
+            )

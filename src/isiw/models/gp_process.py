@@ -1,0 +1,102 @@
+"""Gaussian processes as BoTorch models, with kernels from GPyTorch."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Literal, NamedTuple, TypeAlias
+
+from isiw.models.protocol import Tensor
+
+with warnings.catch_warnings():
+    # GPyTorch's stack compiles functions with torch.jit.script as it is imported, which torch has deprecated; whoever
+    # imports isiw can do nothing about it.
+    for category in (FutureWarning, DeprecationWarning):
+        warnings.filterwarnings("ignore", message=r".*torch\.jit\.script.*", category=category)
+    from botorch.models import SingleTaskGP
+    from gpytorch.constraints import Positive
+    from gpytorch.kernels import ConstantKernel, Kernel, MaternKernel, RBFKernel, ScaleKernel
+    from gpytorch.likelihoods import GaussianLikelihood
+    from gpytorch.means import ConstantMean
+
+__all__ = ["KernelName", "Process", "SingleTaskGP", "correlations", "regression"]
+
+KernelName: TypeAlias = Literal["rbf", "matern"]
+
+
+class Process(NamedTuple):
+    """Processes about an uncertain constant, fields of shape (...).
+
+    Args:
+        length_ms: over which the profile varies [ms].
+        amplitude: SD of the profile.
+        level: mean of the constant.
+        level_variance: its variance.
+        noise_variance: variance of a trial about the profile, where the relative variance is 1.
+    """
+
+    length_ms: Tensor
+    amplitude: Tensor
+    level: Tensor
+    level_variance: Tensor
+    noise_variance: Tensor
+
+
+def correlations(kernel: KernelName, length_ms: Tensor, isi_ms: Tensor) -> Tensor:
+    """Correlation of a profile's values at some ISIs.
+
+    Args:
+        kernel: the kernel's name.
+        length_ms: over which the profile varies [ms], shape (l,).
+        isi_ms: the ISIs [ms], shape (n,).
+
+    Returns:
+        Shape (l, n, n).
+    """
+    matrices: Tensor = _kernel(kernel, length_ms)(isi_ms.unsqueeze(-1)).to_dense().detach()
+    return matrices
+
+
+def regression(
+    kernel: KernelName, process: Process, isi_ms: Tensor, values: Tensor, relative_variance: Tensor
+) -> SingleTaskGP:
+    """Processes given some trials, as a BoTorch model whose batch shape is theirs.
+
+    Args:
+        kernel: the kernel's name.
+        process: the processes, fields of shape (...).
+        isi_ms: ISIs of the trials [ms], shape (n,).
+        values: what was seen there, shape (n,).
+        relative_variance: of the noise there, shape (n,).
+    """
+    inputs = isi_ms.unsqueeze(-1).expand(*process.length_ms.shape, -1, 1)
+    variance = process.noise_variance[..., None, None] * relative_variance.unsqueeze(-1)
+    return SingleTaskGP(
+        inputs,
+        values.unsqueeze(-1).expand_as(inputs),
+        variance if len(values) else None,
+        # Without a trial, BoTorch cannot take the next one's noise from theirs.
+        likelihood=None if len(values) else _likelihood(process.noise_variance),
+        mean_module=ConstantMean(batch_shape=process.level.shape).double().initialize(constant=process.level),
+        covar_module=_covariance(kernel, process),
+        outcome_transform=None,
+    )
+
+
+def _kernel(name: KernelName, length_ms: Tensor) -> Kernel:
+    shape = length_ms.shape
+    kernel = MaternKernel(nu=2.5, batch_shape=shape) if name == "matern" else RBFKernel(batch_shape=shape)
+    return kernel.double().initialize(lengthscale=length_ms[..., None, None])
+
+
+def _covariance(kernel: KernelName, process: Process) -> Kernel:
+    shape = process.amplitude.shape
+    profile = ScaleKernel(_kernel(kernel, process.length_ms), batch_shape=shape).double()
+    constant = ConstantKernel(batch_shape=shape).double()
+    return profile.initialize(outputscale=process.amplitude.square()) + constant.initialize(
+        constant=process.level_variance
+    )
+
+
+def _likelihood(noise_variance: Tensor) -> GaussianLikelihood:
+    likelihood = GaussianLikelihood(batch_shape=noise_variance.shape, noise_constraint=Positive()).double()
+    return likelihood.initialize(noise=noise_variance.unsqueeze(-1))
