@@ -202,7 +202,10 @@ class GaussianProcessPosterior:
         return replace(self, told=self.told.appended(imagined), held=self.fits)
 
     def log_evidence(self) -> Tensor:
-        """Log marginal likelihood of the trials, as a density of log amplitudes [nat]; see `HasEvidence`."""
+        """Log marginal likelihood of the trials, as a density of log amplitudes [nat]; see `HasEvidence`.
+
+        It is that of equal noise also where the noise depends on the ISI.
+        """
         return torch.tensor([f.log_evidence for f in self.fits])
 
     @property
