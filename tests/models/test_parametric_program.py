@@ -38,7 +38,7 @@ def latents(of: WindowProgram, n: int = 4) -> torch.Tensor:
 
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 @pytest.mark.parametrize("present", [True, False])
-def test_the_fast_density_is_what_the_trace_of_the_program_sums_to(likelihood: Likelihood, present: bool) -> None:
+def test_the_fast_density_is_what_the_trace_of_the_program_sums_to(likelihood: Likelihood, *, present: bool) -> None:
     model = program(likelihood)
     some = latents(model)
     fast = model.log_density(some, TRIALS, present=present)

@@ -84,7 +84,8 @@ def sample_person(
     log_weights = torch.cat([model.log_weights + share for model, share in zip(kept, log_shares, strict=True)])
     picks = systematic(log_weights.unsqueeze(0), samples)[0]
     latents, present = torch.cat([model.points for model in kept])[picks], picks < len(kept[0].points)
-    if method == "nuts" and bool(present.any()):
+    # Without trials there is nothing to climb, and Pyro knows no empty plate.
+    if method == "nuts" and bool(present.any()) and trials.isi_ms.numel():
         latents[present], disagree = _by_nuts(program, trials, with_.modes, int(present.sum()), generator)
         troubles = (*troubles, disagree)
     trouble = " ".join(sentence for sentence in troubles if sentence)
