@@ -19,7 +19,7 @@ import os
 import platform
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,7 +36,8 @@ from rich.progress import track
 
 import isiw
 from isiw.metrics import covers, edge_ranks
-from isiw.models.protocol import Observation
+from isiw.models.parametric import ParametricModel
+from isiw.models.protocol import Observation, Posterior, ResponseModel, SimulatedPerson
 from isiw.studies import paired_sessions, run_study
 
 SPACE = isiw.VALVE_SPACE
@@ -62,16 +63,26 @@ def replicate(batch: Batch) -> list[dict[str, float]]:
     seeds = range(batch.first_seed, batch.first_seed + batch.people)
     isis_ms = np.stack([np.random.default_rng([seed, 1]).choice(SPACE.grid_ms, batch.trials) for seed in seeds])
     people = [model.simulate(SPACE, seed, isi_ms) for seed, isi_ms in zip(seeds, isis_ms, strict=True)]
-    posterior = model.prior(SPACE, batch.first_seed, batch.people)
     meps_mv = np.stack([person.mep_mv for person in people])
-    for isi_ms, mep_mv in zip(isis_ms.T, meps_mv.T, strict=True):
-        known = (torch.tensor(x, dtype=torch.float32) for x in (isi_ms, mep_mv))
-        zero, unknown = torch.zeros(batch.people), torch.full((batch.people,), math.nan)
-        posterior = model.update(posterior, Observation(*known, isi_sd_ms=zero, response=unknown))
-    return list(_judged(posterior, people, seeds))
+    told = [_observation(*trial) for trial in zip(isis_ms.T, meps_mv.T, strict=True)]
+    return list(_judged(_after(model, model.prior(SPACE, batch.first_seed, batch.people), told), people, seeds))
 
 
-def _judged(posterior, people, seeds) -> Iterator[dict[str, float]]:
+def _observation(isi_ms: np.ndarray, mep_mv: np.ndarray) -> Observation:
+    known = (torch.tensor(x, dtype=torch.float32) for x in (isi_ms, mep_mv))
+    return Observation(*known, torch.zeros(len(isi_ms)), torch.full((len(isi_ms),), math.nan))
+
+
+def _after(model: ResponseModel, posterior: Posterior, told: Sequence[Observation]) -> Posterior:
+    """What is believed after all trials; a model that fits anew each time is fitted once."""
+    if isinstance(model, ParametricModel):
+        return model.update_by_all(posterior, told)
+    return functools.reduce(model.update, told, posterior)
+
+
+def _judged(
+    posterior: Posterior, people: Sequence[SimulatedPerson], seeds: Sequence[int]
+) -> Iterator[dict[str, float]]:
     for number, (person, seed) in enumerate(zip(people, seeds, strict=True)):
         if person.window is None:
             continue
@@ -115,7 +126,7 @@ def figure(tables: dict[str, pd.DataFrame]) -> matplotlib.figure.Figure:
 
 def smooth_people(strategy: str, cohorts: tuple[str, ...], people: int, seed: int, workers: int) -> pd.DataFrame:
     """Coverage of a strategy's intervals on people of some cohorts, by trial."""
-    sessions = paired_sessions([strategy], cohorts, people, seed=seed, trials=40, marks=(20, 30, 40))
+    sessions = paired_sessions([strategy], cohorts, people, seed=seed, trials=30, marks=(20, 30))
     with Console(stderr=True).status(f"{strategy} on {', '.join(cohorts)}"):
         rows = run_study(sessions, workers=workers)
     groups = rows[rows["true_window"]].groupby(["strategy", "cohort", "trial"])
@@ -135,7 +146,7 @@ def main() -> None:
     parser.add_argument("--models", default=",".join(MODELS), help="comma-separated")
     parser.add_argument("--replications", type=int, default=1000)
     parser.add_argument("--trials", type=int, default=20)
-    parser.add_argument("--people", type=int, default=50, help="people a cohort for the Gaussian process; 0 skips it")
+    parser.add_argument("--people", type=int, default=25, help="people a cohort for the Gaussian process; 0 skips it")
     parser.add_argument("--seed", type=int, default=10_000)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("calibration"), help="path of the results, without suffix")

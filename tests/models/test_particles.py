@@ -11,7 +11,14 @@ from isiw.models.evidence import History, levels, total_log_likelihood
 from isiw.models.moves import Mover
 from isiw.models.particles import ParticleModel, ParticlePosterior, systematic
 from isiw.models.prior import Person, Prior
-from isiw.models.protocol import Observation, Posterior, PredictsOutcomes, ResponseModel, SamplesWindows
+from isiw.models.protocol import (
+    Observation,
+    Posterior,
+    PredictsOutcomes,
+    ResponseModel,
+    SamplesWindows,
+    SimulatesPeople,
+)
 from isiw.models.response import log_likelihood
 from isiw.models.sample import PersonSample
 from isiw.subjects import SimulatedSubject, cohort
@@ -53,6 +60,7 @@ def test_model_and_posterior_keep_their_protocols() -> None:
     model = ParticleModel(particles=20)
     posterior = model.prior(VALVE_SPACE, 0)
     assert isinstance(model, ResponseModel)
+    assert isinstance(model, SimulatesPeople)
     for protocol in (Posterior, PredictsOutcomes, SamplesWindows):
         assert isinstance(posterior, protocol)
 
@@ -219,6 +227,20 @@ def test_systematic_picks_are_as_frequent_as_their_weights() -> None:
     weights = torch.tensor([[0.1, 0.6, 0.3]])
     picks = systematic(weights.log(), 1000)
     torch.testing.assert_close(torch.bincount(picks[0]) / 1000, weights[0], rtol=0, atol=1e-3)
+
+
+def test_people_of_its_own_have_windows_as_often_as_believed_and_meps_of_their_own() -> None:
+    # A small excess does not count as a window, so that a few less have one than believed.
+    model = ParticleModel()
+    isis_ms = np.array([math.nan, 250.0])
+    people = [model.simulate(VALVE_SPACE, seed, isis_ms) for seed in range(300)]
+    assert 0.66 < np.mean([person.window is not None for person in people]) < 0.82
+    np.testing.assert_array_equal(people[3].mep_mv, model.simulate(VALVE_SPACE, 3, isis_ms).mep_mv)
+    inside, outside = (
+        np.median([p.mep_mv[1] for p in people if p.window is not None and bool(p.window.mask([250.0])[0]) is there])
+        for there in (True, False)
+    )
+    assert inside > 2 * outside
 
 
 @pytest.mark.slow

@@ -3,11 +3,13 @@ import math
 import numpy as np
 import pytest
 import torch
+from scipy.stats import kstest
 
 from isiw.models.response import (
     OUTLIER_PROBABILITY,
     NoiseKind,
     Response,
+    draw_log_mep,
     evoked_mean,
     log_likelihood,
     outcome_density,
@@ -89,3 +91,12 @@ def test_seen_and_not_seen_are_all_that_can_happen(believed: Response) -> None:
     not_seen = log_likelihood(believed, LEVELS, never, threshold).exp()
     torch.testing.assert_close(seen + not_seen, torch.ones_like(seen), rtol=0, atol=1e-5)
     assert bool((seen[..., 1:] > seen[..., :-1]).all())
+
+
+@pytest.mark.parametrize(("response", "curve"), PAIRS)
+def test_draws_have_the_distribution_that_the_likelihood_is_of(response: Response, curve: ResponseCurve) -> None:
+    del curve
+    level = torch.linspace(0.0, 1.0, 3000).view(1, 1, -1)
+    log_mep = draw_log_mep(response, level, torch.Generator().manual_seed(1))
+    below = log_likelihood(response, level, torch.full_like(log_mep, -torch.inf), log_mep).exp()
+    assert kstest(below.flatten().numpy(), "uniform").pvalue > 0.01

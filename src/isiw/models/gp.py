@@ -32,7 +32,7 @@ __all__ = ["GaussianProcess", "GaussianProcessPosterior", "NoiseKind"]
 NoiseKind: TypeAlias = Literal["equal", "by-isi"]
 
 PATH_STEP_MS = 4.0
-"""Paths are drawn at ISIs this far apart at most, and are straight in between; length scales are 13 ms and more."""
+"""Paths are drawn at ISIs this far apart at most, and are straight in between; length scales are 10 ms and more."""
 
 _CHOICES = {
     "kernel": ("rbf", "matern"),
@@ -52,14 +52,14 @@ class GaussianProcess:
 
     Args:
         kernel: `"rbf"`, the squared exponential, or `"matern"` with smoothness 5/2.
-        noise: `"equal"` at all ISIs, or `"by-isi"`.
+        noise: `"equal"` at all ISIs, or `"by-isi"`. Whether there is a profile at all is judged under equal noise.
         transform: `"log"`, `"sqrt"` or `"none"`: of which the MEP the process is.
         hyperparameters: `"marginalised"` over a grid, or `"map"`, the most likely ones.
         floor: what the 0.135 rule is applied above. `"subtracted"`: the expected MEP of TMS alone where that was told,
-            else a low quantile of each path. `"zeroed"`: 0, MEPs below `zero_below_mv` being 0. `"raw"`: 0, MEPs as
-            they are; where the floor exceeds 0.135 of the peak, such a window has no edges.
+            else the median of what lies low on each path. `"zeroed"`: 0, MEPs below `zero_below_mv` being 0. `"raw"`:
+            0, MEPs as they are; where the floor exceeds 0.135 of the peak, such a window has no edges.
         beliefs: prior of the hyperparameters.
-        fixed: hyperparameters and scale that are not learnt.
+        fixed: hyperparameters and scale that are not learnt, for equal noise.
         samples: how many paths represent the posterior.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         zero_below_mv: threshold of the floor `"zeroed"` [mV].
@@ -83,6 +83,8 @@ class GaussianProcess:
         for name, choices in _CHOICES.items():
             if getattr(self, name) not in choices:
                 raise InvalidValueError(f"{name} is unknown", got=getattr(self, name), expected=" or ".join(choices))
+        if self.fixed is not None and self.noise != "equal":
+            raise InvalidValueError("fixed hyperparameters are of equal noise", got=self.noise, expected="equal")
         if isinstance(self.samples, bool) or not isinstance(self.samples, int) or self.samples < 2:
             raise InvalidValueError("samples must be a whole number", got=self.samples, expected="2 or more")
         if not all(math.isfinite(x) and x > 0 for x in (self.detection_limit_mv, self.zero_below_mv)):
@@ -200,7 +202,10 @@ class GaussianProcessPosterior:
         return replace(self, told=self.told.appended(imagined), held=self.fits)
 
     def log_evidence(self) -> Tensor:
-        """Log marginal likelihood of the trials, as a density of log amplitudes [nat]; see `HasEvidence`."""
+        """Log marginal likelihood of the trials, as a density of log amplitudes [nat]; see `HasEvidence`.
+
+        It is that of equal noise also where the noise depends on the ISI.
+        """
         return torch.tensor([f.log_evidence for f in self.fits])
 
     @property

@@ -30,6 +30,9 @@ __all__ = ["Fit", "Trials", "fit", "fixed_fit"]
 
 MAX_EVALUATIONS = 150
 
+LEAST_PIVOT = 1e-6
+"""A covariance in standardised units whose Cholesky factor has smaller pivots is singular but for rounding."""
+
 LEVEL_SD = 1.0
 """Prior SD of the constant about the mean of all trials, in standardised units."""
 
@@ -103,10 +106,12 @@ class Fit:
         """
         values = torch.cat((self.trials.values, self.trials.alone))
         factor, failed = torch.linalg.cholesky_ex(self._covariance(processes, log_variance))
+        pivots = factor.diagonal(dim1=-2, dim2=-1)
+        sound = (failed == 0) & (pivots > LEAST_PIVOT).all(-1)
         white = torch.linalg.solve_triangular(factor, values.unsqueeze(-1), upper=False).squeeze(-1)
-        log_density = -0.5 * white.square().sum(-1) - factor.diagonal(dim1=-2, dim2=-1).log().sum(-1)
+        log_density = -0.5 * white.square().sum(-1) - pivots.log().sum(-1)
         constant = 0.5 * len(values) * math.log(2 * math.pi)
-        return torch.where(failed == 0, log_density - constant, -torch.inf).nan_to_num(-torch.inf)
+        return torch.where(sound, log_density - constant, -torch.inf)
 
     def _covariance(self, processes: Hyperparameters, log_variance: Tensor) -> Tensor:
         """Of all values, those of TMS alone behind the others, shape (q, n + m, n + m)."""

@@ -2,7 +2,7 @@
 
 A second Gaussian process describes the log variance (Kersting et al., Most likely heteroscedastic Gaussian process
 regression, ICML 2007). It is fitted to squared leave-one-out residuals by Newton's method on their Gaussian
-likelihood, which is concave in the log variance; so there are no logarithms of residuals near 0 to be tamed.
+likelihood, which is concave in the log variance.
 """
 
 from __future__ import annotations
@@ -28,8 +28,13 @@ MEAN_SD = 3.0
 MAX_LOG_VARIANCE = 4.0
 """The relative log variance stays within this, so that no trial is ignored and none is believed without a doubt."""
 
+LEAST_SQUARE = 1e-3
+"""Squared residuals below this share of their mean are taken for it."""
+
 NEWTON_STEPS = 12
+MAX_STEP = 2.0
 ROUNDS = 3
+TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,12 +99,17 @@ def noise_profile(isi_ms: Tensor, surprise_at: Callable[[Tensor], Tensor]) -> No
 
 def _most_likely_pull(covariance: Tensor, squares: Tensor) -> Tensor:
     """Where likelihood and prior of the log variance balance, as covariance times this, shape (n,)."""
-    log_variance = pull = torch.zeros_like(squares)
+    pull = torch.zeros_like(squares)
     identity = torch.eye(len(squares), dtype=squares.dtype)
+    # Only ratios are learnt, and no residual is so small that its logarithm would matter more than all others.
+    relative = (squares / squares.mean().clamp_min(TINY)).clamp_min(LEAST_SQUARE)
     for _ in range(NEWTON_STEPS):
-        curvature = 0.5 * squares * torch.exp(-log_variance)
-        pull = torch.linalg.solve(
+        log_variance = covariance @ pull
+        curvature = 0.5 * relative * torch.exp(-log_variance)
+        target = torch.linalg.solve(
             identity + curvature.unsqueeze(-1) * covariance, curvature * (1.0 + log_variance) - 0.5
         )
-        log_variance = covariance @ pull
+        change = target - pull
+        # Far from the balance a full step would overshoot.
+        pull = pull + change * (MAX_STEP / (covariance @ change).abs().amax().clamp_min(TINY)).clamp_max(1.0)
     return pull

@@ -46,13 +46,13 @@ class HyperparameterPrior:
 
     Args:
         length_ms: over which the transformed profile varies [ms]. Windows are 40 to 230 ms wide, which Gaussian
-            profiles with SDs of a quarter of that are; their logarithm varies faster at the flanks.
+            profiles with SDs of a quarter of that are; logarithms rise and fall within less.
         amplitude: SD of the profile, as a share of the SD of all trials.
         noise: SD of a trial about the profile, as a share of the SD of all trials.
         p_window: probability that the tap changes anything.
     """
 
-    length_ms: tuple[float, float] = (40.0, 0.5)
+    length_ms: tuple[float, float] = (30.0, 0.5)
     amplitude: tuple[float, float] = (1.2, 0.3)
     noise: tuple[float, float] = (0.6, 0.5)
     p_window: float = 0.75

@@ -20,11 +20,16 @@ __all__ = ["FloorKind", "Paths", "ProfileSample", "draw_paths"]
 FloorKind: TypeAlias = Literal["subtracted", "zeroed", "raw"]
 
 FLOOR_SHARE = 0.15
-"""A path's lowest values are up to this quantile; of a range of 320 ms, at least 28 % lie outside the widest window."""
+"""A path is lowest up to this quantile; of a range of 320 ms, at least 28 % lie outside the widest window."""
 
-RISE = 0.4
-"""What does not rise to this share of a path's height is not told from its wandering about the floor: it makes no
-segment of a window, and its median is the floor where TMS alone was not told. A second peak as low as this is lost."""
+FLOOR_RISE = 0.25
+"""Where TMS alone was not told, the floor is the median of what rises from a path's lowest values by no more than this
+share of its height: less would leave out the floor's upper half where paths wander, more would take in the tails of a
+window that is wide for its range."""
+
+SEGMENT_RISE = 0.4
+"""What is inside by the rule but nowhere rises to this share of a path's height is taken for the path's wandering, and
+makes no segment of a window. So a lower second peak is lost."""
 
 PATH_JITTER = 1e-5
 """Share of a process's variance that is added to the diagonal before paths are drawn, for a stable factor."""
@@ -132,7 +137,7 @@ class ProfileSample:
         told = expected_mep_mv(self.paths.alone, self.paths.alone_sd, self.transform)
         expected = self._expected_mv
         low = expected.quantile(FLOOR_SHARE, dim=-1, keepdim=True)
-        lying = expected <= low + RISE * (expected.amax(-1, keepdim=True) - low)
+        lying = expected <= low + FLOOR_RISE * (expected.amax(-1, keepdim=True) - low)
         guessed = torch.where(lying, expected, torch.nan).nanmedian(dim=-1).values
         return torch.where(told.isnan(), guessed, told)
 
@@ -151,7 +156,7 @@ class ProfileSample:
         inside = expected >= self._edge_level_mv
         run = torch.nn.functional.pad(inside[..., 1:] & ~inside[..., :-1], (1, 0)).cumsum(-1)
         tops = torch.zeros_like(expected).scatter_reduce(-1, run, torch.where(inside, expected, 0.0), "amax")
-        wanders = tops.gather(-1, run) < floor_mv + RISE * (expected.amax(-1, keepdim=True) - floor_mv)
+        wanders = tops.gather(-1, run) < floor_mv + SEGMENT_RISE * (expected.amax(-1, keepdim=True) - floor_mv)
         return torch.where(inside & wanders, floor_mv, expected)
 
     def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
