@@ -225,6 +225,7 @@ def test_a_sweep_without_a_window_goes_on() -> None:
     [
         (EdgeVariance, {"variance_ms2": 0.0}),
         (EdgeVariance, {"last": 1}),
+        (EdgeVariance, {"last": 5.5}),
         (EdgeVariance, {"edges": "none"}),
         (ParticleSpread, {"sd_ms": 0.0}),
         (SweptPast, {"quiet_ms": math.nan}),

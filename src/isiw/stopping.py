@@ -170,7 +170,7 @@ class EdgeVariance:
     edges: Literal["both", "either"] = "both"
 
     def __post_init__(self) -> None:
-        if not self.variance_ms2 > 0 or self.last < 2:
+        if not self.variance_ms2 > 0 or not isinstance(self.last, int) or self.last < 2:
             raise InvalidValueError(
                 "a variance is positive and taken of two values or more", got=(self.variance_ms2, self.last)
             )

@@ -146,6 +146,7 @@ def test_where_no_amplitude_is_known_beforehand_it_starts_from_the_largest_mep(s
     "settings",
     [
         {"peaks": 3},
+        {"peaks": 1.0},
         {"width_ms": 30.0},
         {"min_width_ms": 0.0},
         {"max_width_ms": math.inf},

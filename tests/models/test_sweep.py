@@ -162,8 +162,16 @@ def test_the_model_conforms(space: DesignSpace) -> None:
 
 @pytest.mark.parametrize(
     "settings",
-    [{"step_ms": 0.0}, {"discarded": 11}, {"discarded": -1}, {"rule": "eye"}, {"evidence_se": -1.0}, {"neighbours": 2}],
+    [
+        {"step_ms": 0.0},
+        {"discarded": 11},
+        {"trials_per_isi": 4.5},
+        {"discarded": -1},
+        {"rule": "eye"},
+        {"evidence_se": -1.0},
+        {"neighbours": 2},
+    ],
 )
 def test_a_setting_that_cannot_be_is_refused(settings: dict[str, object]) -> None:
-    with pytest.raises(InvalidValueError, match=r"step_ms|discarded|rule|evidence_se|neighbours"):
+    with pytest.raises(InvalidValueError, match=r"step_ms|not discarded|rule|evidence_se|neighbours"):
         SweepModel(**settings)

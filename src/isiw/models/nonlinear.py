@@ -99,7 +99,7 @@ class NonlinearRegression:
     samples: int = 64
 
     def __post_init__(self) -> None:
-        if self.peaks not in {1, 2}:
+        if not isinstance(self.peaks, int) or self.peaks not in {1, 2}:
             raise InvalidValueError("a nonlinear regression has 1 or 2 peaks", got=self.peaks)
         widths = (self.min_width_ms, self.width_ms, self.max_width_ms)
         if not 0 < widths[0] <= widths[1] <= widths[2] < math.inf or widths[0] == widths[2]:

@@ -48,7 +48,7 @@ class SupportVectorRegression:
                 raise InvalidValueError(f"{name} must be positive", got=value)
         if not (math.isfinite(self.epsilon) and self.epsilon >= 0):
             raise InvalidValueError("epsilon must not be negative", got=self.epsilon)
-        if self.committee < 2:
+        if not isinstance(self.committee, int) or self.committee < 2:
             raise InvalidValueError("a committee has at least two members", got=self.committee)
 
     def fit(

@@ -62,7 +62,8 @@ class SweepModel:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.step_ms) and self.step_ms > 0):
             raise InvalidValueError("step_ms must be positive", got=self.step_ms)
-        if not 0 <= self.discarded <= self.trials_per_isi - 2:
+        whole = isinstance(self.trials_per_isi, int) and isinstance(self.discarded, int)
+        if not (whole and 0 <= self.discarded <= self.trials_per_isi - 2):
             raise InvalidValueError(
                 "a mean and its error need two trials that are not discarded",
                 got=(self.trials_per_isi, self.discarded),
@@ -70,7 +71,7 @@ class SweepModel:
             )
         if self.rule not in {"baseline", "share"}:
             raise InvalidValueError("the rule is unknown", got=self.rule, expected="baseline or share")
-        if self.neighbours < 1 or self.neighbours % 2 == 0:
+        if not isinstance(self.neighbours, int) or self.neighbours < 1 or self.neighbours % 2 == 0:
             raise InvalidValueError("neighbours must be an odd number from 1 up", got=self.neighbours)
         if not (math.isfinite(self.evidence_se) and self.evidence_se >= 0):
             raise InvalidValueError("evidence_se must not be negative", got=self.evidence_se)
