@@ -16,7 +16,7 @@ from isiw.catalogue import make_strategy
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, OutOfSpaceError, StrategyError
 from isiw.models.protocol import Posterior, Tensor
-from isiw.stopping import Budget
+from isiw.stopping import Budget, EdgeVariance
 
 MakeStrategy = Callable[..., Strategy]
 MEPS_MV = [0.02, 0.0, 0.11, 0.05]
@@ -232,6 +232,34 @@ def test_the_initial_isis_come_first_and_a_mistrial_repeats_one(scripted_strateg
     strategy.tell(None, 0.02)
     assert strategy.ask() == 120.0
     assert strategy.restarted().ask() == 0.0
+
+
+def settled_after(strategy: Strategy, trials: int) -> bool:
+    """Whether the edges have settled after so many more pairs, each of which moves them by 1 ms."""
+    for _ in range(trials):
+        strategy.tell(strategy.ask(), 0.02)
+    return strategy.decision().stop
+
+
+def test_only_windows_after_the_initial_isis_tell_whether_the_edges_have_settled(
+    scripted_strategy: MakeStrategy,
+) -> None:
+    usual = scripted_strategy()
+    for initial_ms in ((), (0.0,), (0.0, 100.0, 200.0)):
+        strategy = Strategy(usual.space, usual.model, usual.acquisition, EdgeVariance(), initial_ms=initial_ms)
+        # The value after the last initial trial is the first.
+        assert not settled_after(strategy, max(1, len(initial_ms)) + 3)
+        assert settled_after(strategy, 1)
+
+
+def test_tms_alone_does_not_settle_the_edges(scripted_strategy: MakeStrategy) -> None:
+    usual = scripted_strategy()
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, EdgeVariance())
+    settled_after(strategy, 4)
+    for _ in range(5):
+        strategy.tell(None, 0.02)
+        assert not strategy.decision().stop
+    assert settled_after(strategy, 1)
 
 
 def test_a_cost_is_taken_off_the_scores(scripted_strategy: MakeStrategy) -> None:

@@ -10,7 +10,7 @@ import pytest
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.asktell import Recipe
 from isiw.catalogue import list_strategies, make_strategy, settings_of
-from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.particles import ParticleModel
 from isiw.models.protocol import ResponseModel
@@ -148,3 +148,47 @@ def test_the_fewest_particles_allowed_do_learn() -> None:
     for _ in range(3):
         strategy.tell(strategy.ask(), 0.05)
     assert 0 <= strategy.estimate().probability <= 1
+
+
+@pytest.mark.parametrize(("name", "initial"), [("nr", 6), ("nr2", 7), ("svmr", 7), ("gpr", 7)])
+def test_the_dissertations_regressions_begin_with_evenly_spaced_isis_at_both_ends(name: str, initial: int) -> None:
+    strategy = make_strategy(name, DesignSpace(0, 420))
+    assert strategy.ask_batch(initial) == [420.0 * k / (initial - 1) for k in range(initial)]
+
+
+@pytest.mark.parametrize("name", ["nr", "svmr", "gpr"])
+def test_a_regression_takes_five_values_after_its_initial_trials_at_least(name: str) -> None:
+    strategy = make_strategy(name, initial=4)
+    for trial in range(1, 9):
+        assert not strategy.decision().stop
+        strategy.tell(250.0 if trial % 2 else 50.0 * trial, 0.1 if trial % 2 else 0.01)
+
+
+@pytest.mark.parametrize("name", ["nr", "svmr", "gpr"])
+def test_a_regression_gives_up_after_99_iterations(name: str) -> None:
+    strategy = make_strategy(name)
+    for _ in range(strategy.recipe.settings["initial"] + 99):
+        assert not strategy.decision().stop
+        strategy.count_mistrial()
+    assert "budget" in strategy.decision().reason
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "what"),
+    [
+        ("nr", {"initial": 1}, "both ends"),
+        ("nr", {"initial": 6.0}, "both ends"),
+        ("svmr", {"acquisition": "best"}, "acquisition"),
+        ("gpr", {"floor": "cut"}, "floor"),
+        ("gpr", {"stop_edges": "none"}, "edges"),
+        ("pf", {"particles": 1}, "particles"),
+        ("pf", {"stop_sd_ms": 0.0}, "sd_ms"),
+        ("incremental", {"rule": "eye"}, "rule"),
+        ("incremental", {"quiet_ms": -1.0}, "quiet_ms"),
+    ],
+)
+def test_a_setting_of_the_dissertations_that_cannot_be_is_refused(
+    name: str, settings: dict[str, Any], what: str
+) -> None:
+    with pytest.raises(InvalidValueError, match=what):
+        make_strategy(name, **settings)

@@ -22,6 +22,7 @@ _HOME = {
     "Session": "session",
     "SimulatedDevice": "devices.simulated",
     "StopDecision": "stopping",
+    "Strategy": "asktell",
     "VALVE_SPACE": "design",
     "Window": "window",
     "VirtualClock": "devices.clock",
@@ -41,10 +42,12 @@ _HOME = {
     "resume": "resumption",
 }
 _MODULES = {
+    "acquisition",
     "config",
     "counts",
     "errors",
     "metrics",
+    "models",
     "plots",
     "plots_timing",
     "report",

@@ -248,7 +248,7 @@ class Strategy:
         self._told += 1
         self._told_alone += isi_ms is None
         self._next_isi_ms = self._estimate = self._fallback_reason = None
-        if self._past.maxlen:
+        if self._past.maxlen and isi_ms is not None and self._told - self._told_alone >= len(self.initial_ms):
             self._past.append(self.estimate())
 
     def count_mistrial(self) -> None:

@@ -45,7 +45,8 @@ class Progress:
         delivered: stimuli delivered so far; mistrials count.
         told: trials told so far.
         estimate: what is believed about the window now.
-        past: the estimates after the last few trials told, the present one last; as many as `looks_back(rule)`.
+        past: the estimates after each of the last few pairs told, as many as `looks_back(rule)`; the first is the one
+            after the last of the initial ISIs.
     """
 
     delivered: int
@@ -159,17 +160,14 @@ class EdgeVariance:
         variance_ms2: the variance [ms²] of an edge's last values below which it has settled.
         last: how many values.
         edges: whether both edges must have settled, as the text says, or either, as its pseudo-code does.
-        initial: trials of the initial design; the first value is the one after the last of them.
 
     Raises:
-        InvalidValueError: a variance that is not positive, fewer than two values, another word for the edges, or a
-            negative number of initial trials.
+        InvalidValueError: a variance that is not positive, fewer than two values, or another word for the edges.
     """
 
     variance_ms2: float = 50.0
     last: int = 5
     edges: Literal["both", "either"] = "both"
-    initial: int = 0
 
     def __post_init__(self) -> None:
         if not self.variance_ms2 > 0 or self.last < 2:
@@ -178,14 +176,10 @@ class EdgeVariance:
             )
         if self.edges not in {"both", "either"}:
             raise InvalidValueError("edges settle both or either", got=self.edges, expected="both or either")
-        if self.initial < 0:
-            raise InvalidValueError("initial is a number of trials", got=self.initial, expected="0 or more")
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
-        since_initial = max(0, progress.told - max(1, self.initial) + 1)
-        values = progress.past[-min(self.last, since_initial) :] if since_initial else ()
-        windows = [estimate.window for estimate in values]
+        windows = [estimate.window for estimate in progress.past[-self.last :]]
         edges = [(window.start_ms, window.end_ms) for window in windows if window is not None]
         if len(edges) < self.last:
             return StopDecision(stop=False, reason=f"There are not {self.last} windows in a row yet.")

@@ -1,1 +1,33 @@
-"""Models of a person's responses, behind the protocol of `isiw.models.protocol`."""
+"""Models of a person's responses, each in a module of its own, behind the protocols that are gathered here."""
+
+from __future__ import annotations
+
+from isiw.models.protocol import (
+    Conditions,
+    HasBotorchModel,
+    HasEvidence,
+    Observation,
+    Posterior,
+    PredictsOutcomes,
+    ProposesIsi,
+    ReportsTrouble,
+    ResponseModel,
+    SamplesProfiles,
+    SamplesWindows,
+    SimulatesPeople,
+)
+
+__all__ = [
+    "Conditions",
+    "HasBotorchModel",
+    "HasEvidence",
+    "Observation",
+    "Posterior",
+    "PredictsOutcomes",
+    "ProposesIsi",
+    "ReportsTrouble",
+    "ResponseModel",
+    "SamplesProfiles",
+    "SamplesWindows",
+    "SimulatesPeople",
+]

@@ -198,5 +198,5 @@ class BootstrapPosterior:
         expectation_ms, reach_ms = float(self.expectation_ms[person]), self.model.half_width_ms
         window = None
         if not math.isnan(expectation_ms):
-            window = Window(*(self.space.snap(expectation_ms + side * reach_ms) for side in (-1, 1)))
+            window = Window(self.space.snap(expectation_ms - reach_ms), self.space.snap(expectation_ms + reach_ms))
         return WindowEstimate(probability=None, window=window, spread_ms=float(self.spread_ms[person]))

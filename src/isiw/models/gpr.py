@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from threadpoolctl import ThreadpoolController
 
 from isiw.design import DesignSpace
@@ -95,10 +97,6 @@ class GaussianProcessRegression:
 
     def _process(self, isi: FloatArray, scaled: FloatArray) -> tuple[Any, float, str | None]:
         """The process at its best hyperparameters, its noise SD, and what went wrong."""
-        # It takes half a second to import, which other strategies need not wait for.
-        from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
-        from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
-
         signal = ConstantKernel(1.0, (0.01, 10.0))
         kernel = signal * RBF(self.length_ms, (self.min_length_ms, self.max_length_ms)) + WhiteKernel(
             self.noise**2, (1e-4, 1.0)

@@ -64,13 +64,13 @@ class WeightedDraws:
         points: latents, shape (m, d).
         log_weights: normalised, shape (m,).
         log_evidence: log of the density's integral [nat].
-        modes: the prior, and a component at each distinct mode, best first.
+        modes: the distinct modes, best first.
     """
 
     points: Tensor
     log_weights: Tensor
     log_evidence: float
-    modes: Mixture
+    modes: Modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,8 +190,8 @@ def importance_sample(
         effort: how much work it is worth.
     """
     scouts = _drawn(log_density, scouting, effort.scouts, generator)
-    modes = Mixture.at(find_modes(log_density, _best_of_each_part(scouts, effort.starts), effort.steps))
-    mixture = modes.joined(scouting, SCOUTED_SHARE)
+    modes = find_modes(log_density, _best_of_each_part(scouts, effort.starts), effort.steps)
+    mixture = Mixture.at(modes).joined(scouting, SCOUTED_SHARE)
     earlier = [scouts]
     for _ in range(effort.fits):
         rounds = _rounds(log_density, mixture, generator, effort)

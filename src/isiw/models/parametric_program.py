@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import pyro
 import torch
@@ -25,6 +25,10 @@ from isiw.models.parametric_prior import Likelihood, Unknowns, WindowPrior, late
 from isiw.models.protocol import Tensor
 
 __all__ = ["MepLaw", "WindowProgram", "nuts_sample"]
+
+WARMUP: Final = 150
+TREE_DEPTH: Final = 6
+"""Latents are of the order of one: 63 leaps reach far enough, and a chain between two modes does not take for ever."""
 
 
 class MepLaw(TorchDistribution):
@@ -67,7 +71,7 @@ class MepLaw(TorchDistribution):
 
     def sample(self, sample_shape: Sequence[int] = ()) -> Tensor:
         """Log MEPs as points, shape (..., m, n, 2)."""
-        unknowns = Unknowns(*(x.expand(*sample_shape, *x.shape) for x in self.unknowns))
+        unknowns = Unknowns(*(x.expand((*sample_shape, *x.shape)) for x in self.unknowns))
         level = levels(unknowns, self.isi_ms + self.isi_sd_ms * torch.randn_like(self.isi_sd_ms))
         log_mep = draw_log_mep(unknowns, level if self.present else torch.zeros_like(level), self.likelihood)
         return torch.stack((log_mep, log_mep), dim=-1)
@@ -141,7 +145,7 @@ def nuts_sample(
         program: the model.
         trials: of one person, columns of shape (1, n).
         starts: a chain begins at each of these latents, shape (c, d).
-        draws: kept draws of each chain; as many before them are for adaptation.
+        draws: kept draws of each chain, after `WARMUP` for adaptation.
         generator: source of randomness.
 
     Returns:
@@ -152,8 +156,8 @@ def nuts_sample(
         # Pyro draws from torch's global stream.
         torch.manual_seed(int(torch.randint(2**31, (1,), generator=generator)))
         for start in starts:
-            kernel = NUTS(program, full_mass=True)
-            mcmc = MCMC(kernel, draws, warmup_steps=draws, initial_params={"latents": start}, disable_progbar=True)
+            kernel = NUTS(program, full_mass=True, max_tree_depth=TREE_DEPTH)
+            mcmc = MCMC(kernel, draws, warmup_steps=WARMUP, initial_params={"latents": start}, disable_progbar=True)
             mcmc.run(trials)
             chains.append(mcmc.get_samples()["latents"])
     return torch.stack(chains)

@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 import torch
 
+from isiw.models.ascent import Modes
 from isiw.models.evidence import History
 from isiw.models.importance import Effort, Mixture, WeightedDraws, importance_sample, worth
 from isiw.models.parametric_program import WindowProgram, nuts_sample
@@ -24,6 +25,12 @@ WITHOUT_WINDOW: Final = Effort(scouts=256, starts=2, steps=15, draws=300, enough
 
 LEAST_WORTH: Final = 50.0
 """Draws that are worth fewer independent ones than this are trouble."""
+
+LEAST_SHARE: Final = 0.05
+"""Modes with a smaller share of the evidence get no chain."""
+
+MIN_DRAWS: Final = 50
+"""A chain is at least this long."""
 
 MAX_R_HAT: Final = 1.1
 """Chains that disagree by more (Gelman and Rubin, Stat. Sci. 7, 1992) are trouble."""
@@ -66,7 +73,7 @@ def sample_person(
     everywhere = Mixture.prior(program.latents)
     without = importance_sample(partial(log_density, present=False), everywhere, generator, WITHOUT_WINDOW)
     # Without a window its place and size are as in the prior, and the floor is already known: good scouts.
-    with_ = importance_sample(partial(log_density, present=True), without.modes, generator, effort)
+    with_ = importance_sample(partial(log_density, present=True), Mixture.at(without.modes), generator, effort)
     models = (with_, without)
     prior = torch.tensor([program.prior.p_window, 1.0 - program.prior.p_window], dtype=torch.double)
     log_joint = torch.tensor([model.log_evidence for model in models], dtype=torch.double) + prior.log()
@@ -78,8 +85,7 @@ def sample_person(
     picks = systematic(log_weights.unsqueeze(0), samples)[0]
     latents, present = torch.cat([model.points for model in kept])[picks], picks < len(kept[0].points)
     if method == "nuts" and bool(present.any()):
-        chains = nuts_sample(program, trials, kept[0].modes.means, int(present.sum()), generator)
-        latents[present], disagree = _pooled(chains, int(present.sum()))
+        latents[present], disagree = _by_nuts(program, trials, with_.modes, int(present.sum()), generator)
         troubles = (*troubles, disagree)
     trouble = " ".join(sentence for sentence in troubles if sentence)
     return PersonDraws(latents, present, float(torch.logsumexp(log_joint, dim=0)), trouble or None)
@@ -101,15 +107,23 @@ def _flattened(drawn: WeightedDraws, log_share: float) -> tuple[WeightedDraws, s
     )
 
 
-def _pooled(chains: Tensor, size: int) -> tuple[Tensor, str | None]:
-    """Evenly spaced draws of all chains (c, draws, d), and whether the chains disagree about the window."""
-    pooled = chains.transpose(0, 1).flatten(0, 1)
-    picks = torch.linspace(0, len(pooled) - 1, size).round().long()
+def _by_nuts(
+    program: WindowProgram, trials: History, modes: Modes, size: int, generator: torch.Generator
+) -> tuple[Tensor, str | None]:
+    """Draws of a chain of NUTS from each mode that matters, and a sentence if they disagree about the window.
+
+    Chains that do not mix say nothing about the modes' shares, so each counts by its mode's evidence.
+    """
+    shares = torch.softmax(modes.log_evidence, dim=0)
+    shares = shares[shares >= LEAST_SHARE]
+    chains = nuts_sample(program, trials, modes.points[: len(shares)], max(MIN_DRAWS, size // len(shares)), generator)
+    log_weights = (shares / shares.sum() / chains.shape[1]).log().repeat_interleave(chains.shape[1])
+    picks = systematic(log_weights.unsqueeze(0), size)[0]
     r_hat = _r_hat(chains[..., :2])
     disagree = None
     if r_hat > MAX_R_HAT:
-        disagree = f"The chains of NUTS disagree (R-hat {r_hat:.2f}); they were pooled nevertheless."
-    return pooled[picks], disagree
+        disagree = f"The chains of NUTS disagree (R-hat {r_hat:.2f}); each counts by the evidence of its mode."
+    return chains.flatten(0, 1)[picks], disagree
 
 
 def _r_hat(chains: Tensor) -> float:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from sklearn.svm import SVR
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
@@ -54,8 +55,6 @@ class SupportVectorRegression:
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
     ) -> FittedCurve:
         """Fit the regression and its committee; see `RegressionMethod`."""
-        from sklearn.svm import SVR  # noqa: PLC0415 - it takes half a second, which other strategies need not wait for
-
         grid = space.grid_ms
         if not len(isi_ms):
             flat = np.zeros(len(grid))

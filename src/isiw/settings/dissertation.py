@@ -75,7 +75,7 @@ class RegressionSettings(ABC):
 
     def stopping(self) -> StoppingRule:
         """The edges have settled, or the iterations are used up."""
-        settled = EdgeVariance(self.stop_variance_ms2, self.stop_last, self.stop_edges, self.initial)
+        settled = EdgeVariance(self.stop_variance_ms2, self.stop_last, self.stop_edges)
         return AnyOf((settled, Budget(self.initial + self.max_iterations)))
 
     def initial_ms(self, space: DesignSpace) -> tuple[float, ...]:
