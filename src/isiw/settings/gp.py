@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from isiw.models.gp import GaussianProcess
-from isiw.models.gp_prior import HyperparameterPrior
+from isiw.models.gp.prior import HyperparameterPrior
 from isiw.settings.common import PosteriorSettings
 
 __all__ = ["GPSettings"]
@@ -24,7 +24,7 @@ class GPSettings(PosteriorSettings):
         hyperparameters: `"marginalised"`, or the most likely ones, `"map"`.
         floor: what the 0.135 rule is applied above: `"subtracted"`, `"zeroed"` or `"raw"`.
         samples: how many paths represent the posterior.
-        prior: settings of `isiw.models.gp_prior.HyperparameterPrior` that differ from its defaults.
+        prior: settings of `isiw.models.gp.prior.HyperparameterPrior` that differ from its defaults.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         zero_below_mv: threshold of the floor `"zeroed"` [mV].
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from isiw.models.parametric import ParametricModel
-from isiw.models.parametric_prior import Likelihood, WindowPrior
+from isiw.models.parametric.prior import Likelihood, WindowPrior
 from isiw.settings.common import PosteriorSettings
 
 __all__ = ["ParametricSettings"]
@@ -20,7 +20,7 @@ class ParametricSettings(PosteriorSettings):
     Args:
         likelihood: how MEPs scatter: "gamma", "log-normal" or "input-noise".
         samples: how many equally weighted samples the posterior has.
-        prior: settings of `isiw.models.parametric_prior.WindowPrior` that differ from its defaults.
+        prior: settings of `isiw.models.parametric.prior.WindowPrior` that differ from its defaults.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a told response is known to be above [mV].
 

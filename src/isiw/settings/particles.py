@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from isiw.models.particles import ParticleModel
-from isiw.models.prior import Prior
+from isiw.models.particles.prior import Prior
 from isiw.settings.common import PosteriorSettings
 
 __all__ = ["ParticleSettings"]
@@ -19,7 +19,7 @@ class ParticleSettings(PosteriorSettings):
 
     Args:
         particles: how many particles the posterior has.
-        prior: settings of `isiw.models.prior.Prior` that differ from its defaults.
+        prior: settings of `isiw.models.particles.prior.Prior` that differ from its defaults.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a told response is known to be above [mV].
 

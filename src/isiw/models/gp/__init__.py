@@ -1,0 +1,7 @@
+"""The Gaussian process on the transformed MEP."""
+
+from __future__ import annotations
+
+from isiw.models.gp.model import GaussianProcess, GaussianProcessPosterior
+
+__all__ = ["GaussianProcess", "GaussianProcessPosterior"]

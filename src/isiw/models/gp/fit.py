@@ -1,0 +1,244 @@
+"""Hyperparameters of the Gaussian process, and how well each of a few of them explains the trials.
+
+The transformed MEP is a constant, a Gaussian process of the ISI, and Gaussian noise; trials of TMS alone are constant
+and noise. Two hypotheses share that prior: the process has an amplitude, or it has none and the tap changes nothing.
+Their hyperparameters lie on a grid of equal steps in prior SDs, weighted by prior times marginal likelihood (Rasmussen
+and Williams, Gaussian Processes for Machine Learning, 2006, equation 2.30). So the probability that there is a profile
+at all is a ratio of marginal likelihoods, in which a process that could explain anything pays for it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from scipy.optimize import minimize
+
+from isiw.models.gp.noise import EQUAL_NOISE, NoiseProfile, leave_one_out, noise_profile
+from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, Hyperparameters
+from isiw.models.gp.process import KernelName, Process, SingleTaskGP, correlations, regression
+from isiw.models.gp.scale import Scale
+from isiw.models.protocol import Tensor
+from isiw.models.told import PersonTrials
+from isiw.types import FloatArray
+
+__all__ = ["Fit", "Trials", "fit", "fixed_fit"]
+
+MAX_EVALUATIONS = 150
+
+LEAST_PIVOT = 1e-6
+"""A covariance in standardised units whose Cholesky factor has smaller pivots is singular but for rounding."""
+
+LEVEL_SD = 1.0
+"""Prior SD of the constant about the mean of all trials, in standardised units."""
+
+
+class Trials(NamedTuple):
+    """Trials of one person on a scale: ISIs [ms], standardised MEPs, those of TMS alone; shapes (n,), (n,), (m,)."""
+
+    isi_ms: Tensor
+    values: Tensor
+    alone: Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A few processes, and how believable each is.
+
+    Args:
+        prior: of the hyperparameters.
+        kernel: the kernel's name.
+        scale: the scale of amplitudes.
+        told: the trials as told.
+        processes: the hyperparameters, shape (q,).
+        log_prior: what each one's log marginal likelihood is added to, shape (q,).
+        noise: how the noise depends on the ISI.
+        trouble: what went wrong, and what stands in for it.
+    """
+
+    prior: HyperparameterPrior
+    kernel: KernelName
+    scale: Scale
+    told: PersonTrials
+    processes: Hyperparameters
+    log_prior: Tensor
+    noise: NoiseProfile = EQUAL_NOISE
+    trouble: str | None = None
+
+    @cached_property
+    def trials(self) -> Trials:
+        """The trials on the scale of the process."""
+        told, scaled = self.told, self.scale.standardised
+        return Trials(torch.as_tensor(told.isi_ms), scaled(told.mep_mv), scaled(told.baseline_mv))
+
+    @cached_property
+    def log_joint(self) -> Tensor:
+        """Log prior and log marginal likelihood of each process, shape (q,)."""
+        return self.log_prior + self.log_marginal(self.processes, self.noise.log_variance(self.trials.isi_ms))
+
+    @property
+    def log_evidence(self) -> float:
+        """Log marginal likelihood of the trials, as a density of log amplitudes [nat]."""
+        told = np.concatenate((self.told.mep_mv, self.told.baseline_mv))
+        return float(self.log_joint.logsumexp(0)) + self.scale.log_jacobian(told)
+
+    @property
+    def log_totals(self) -> Tensor:
+        """Log joint probability of the trials and of "the tap changes something", and "nothing", shape (2,)."""
+        present = self.processes.amplitude > 0
+        return torch.stack([self.log_joint[which].logsumexp(0) for which in (present, ~present)])
+
+    @property
+    def best(self) -> int:
+        """The most believable process that has an amplitude."""
+        return int(torch.where(self.processes.amplitude > 0, self.log_joint, -torch.inf).argmax())
+
+    def log_marginal(self, processes: Hyperparameters, log_variance: Tensor) -> Tensor:
+        """Log marginal likelihood of the standardised trials, shape (q,); -inf where their covariance is singular.
+
+        Args:
+            processes: hyperparameters, shape (q,).
+            log_variance: relative log variance of the noise at the trials, shape (n,).
+        """
+        values = torch.cat((self.trials.values, self.trials.alone))
+        factor, failed = torch.linalg.cholesky_ex(self._covariance(processes, log_variance))
+        pivots = factor.diagonal(dim1=-2, dim2=-1)
+        sound = (failed == 0) & (pivots > LEAST_PIVOT).all(-1)
+        white = torch.linalg.solve_triangular(factor, values.unsqueeze(-1), upper=False).squeeze(-1)
+        log_density = -0.5 * white.square().sum(-1) - pivots.log().sum(-1)
+        constant = 0.5 * len(values) * math.log(2 * math.pi)
+        return torch.where(sound, log_density - constant, -torch.inf)
+
+    def _covariance(self, processes: Hyperparameters, log_variance: Tensor) -> Tensor:
+        """Of all values, those of TMS alone behind the others, shape (q, n + m, n + m)."""
+        trials = self.trials
+        lengths, which = torch.unique(processes.length_ms, return_inverse=True)
+        correlation = correlations(self.kernel, lengths, trials.isi_ms)
+        padded = torch.nn.functional.pad(correlation[which], (0, len(trials.alone)) * 2)
+        shared = LEVEL_SD**2 + processes.amplitude.square()[:, None, None] * padded
+        # Where a tap changes nothing, it does not change the noise either.
+        changed = log_variance * (processes.amplitude > 0).unsqueeze(-1)
+        log_relative = torch.nn.functional.pad(changed, (0, len(trials.alone)))
+        return shared + torch.diag_embed(processes.noise.square().unsqueeze(-1) * log_relative.exp())
+
+    def surprise(self, log_variance: Tensor) -> Tensor:
+        """Leave-one-out residuals of the trials with a tap under the best process [SD], shape (n,)."""
+        best = self.processes.picked(torch.tensor([self.best]))
+        values = torch.cat((self.trials.values, self.trials.alone))
+        return leave_one_out(self._covariance(best, log_variance)[0], values)[: len(log_variance)]
+
+    def level(self, noise: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean and variance of the constant given the trials of TMS alone, of the shape of their noise SD."""
+        alone = self.trials.alone
+        variance = 1.0 / (LEVEL_SD**-2 + len(alone) / noise.square())
+        return variance * alone.sum() / noise.square(), variance
+
+    def conditioned(self, told: PersonTrials) -> Fit:
+        """The same processes on other trials; their hyperparameters, scale and noise profile stay."""
+        return _sound(replace(self, told=told))
+
+    def regression(self, picks: Tensor) -> SingleTaskGP:
+        """Some of the processes as BoTorch models, from ISIs [ms] to standardised MEPs.
+
+        Args:
+            picks: which, each with an amplitude; of the models' batch shape.
+        """
+        chosen, trials = self.processes.picked(picks), self.trials
+        level, level_variance = self.level(chosen.noise)
+        process = Process(chosen.length_ms, chosen.amplitude, level, level_variance, chosen.noise.square())
+        relative_variance = self.noise.log_variance(trials.isi_ms).exp()
+        return regression(self.kernel, process, trials.isi_ms, trials.values, relative_variance)
+
+
+def fit(
+    prior: HyperparameterPrior,
+    kernel: KernelName,
+    scale: Scale,
+    told: PersonTrials,
+    *,
+    marginalised: bool = True,
+    noise_by_isi: bool = False,
+) -> Fit:
+    """Weigh processes by one person's trials.
+
+    Args:
+        prior: of the hyperparameters.
+        kernel: the kernel's name.
+        scale: the scale of amplitudes.
+        told: the trials.
+        marginalised: all of the grid; else the most likely process stands for all that have an amplitude.
+        noise_by_isi: whether the noise depends on the ISI.
+    """
+    found = _sound(Fit(prior, kernel, scale, told, *prior.grid()))
+    if found.trouble:
+        return found
+    if noise_by_isi and len(told.isi_ms):
+        profile = noise_profile(found.trials.isi_ms, found.surprise)
+        found = _with_same_totals(found, replace(found, noise=profile))
+    return found if marginalised else _most_likely(found)
+
+
+def fixed_fit(
+    prior: HyperparameterPrior, kernel: KernelName, scale: Scale, told: PersonTrials, fixed: FixedProcess
+) -> Fit:
+    """One process of given hyperparameters, and the same without an amplitude."""
+    present = torch.tensor([[fixed.length_ms, fixed.amplitude, fixed.noise]], dtype=torch.float64)
+    both = torch.cat((present, present * torch.tensor([1.0, 0.0, 1.0])))
+    return _sound(Fit(prior, kernel, scale, told, Hyperparameters(*both.unbind(-1)), prior.log_hypotheses))
+
+
+def _sound(found: Fit) -> Fit:
+    """The fit, or the prior's medians where none of its processes has a likelihood."""
+    if bool(found.log_joint.isfinite().any()):
+        return found
+    medians = found.prior.at(torch.zeros((2, 3), dtype=torch.float64))
+    return replace(
+        found,
+        processes=medians._replace(amplitude=medians.amplitude * torch.tensor([1.0, 0.0])),
+        log_prior=found.prior.log_hypotheses,
+        noise=EQUAL_NOISE,
+        trouble="The covariance of the trials is singular under all hyperparameters. "
+        "The medians of their priors, with the same noise at all ISIs, stand in for them.",
+    )
+
+
+def _most_likely(found: Fit) -> Fit:
+    """The most likely process in place of all that have an amplitude, and as believable as they are together."""
+    log_variance = found.noise.log_variance(found.trials.isi_ms)
+
+    def loss(z: FloatArray) -> float:
+        point = torch.as_tensor(z).unsqueeze(0)
+        return float(0.5 * point.square().sum() - found.log_marginal(found.prior.at(point), log_variance)[0])
+
+    start = found.prior.z(found.processes.picked(torch.tensor([found.best])))[0]
+    simplex = start + torch.nn.functional.pad(0.5 * torch.eye(3), (0, 0, 1, 0))
+    options: dict[str, object] = {
+        "initial_simplex": simplex.numpy(),
+        "xatol": 0.05,
+        "fatol": 0.02,
+        "maxfev": MAX_EVALUATIONS,
+    }
+    result = minimize(loss, start.numpy(), method="Nelder-Mead", options=options)  # type: ignore[call-overload]
+    trouble = None
+    if not result.success:
+        trouble = (
+            f"The search for the most likely hyperparameters has not ended after {MAX_EVALUATIONS} evaluations. "
+            "The best ones that it met stand in for them."
+        )
+    flat = torch.where(found.processes.amplitude == 0, found.log_joint, -torch.inf).argmax()
+    chosen = (found.prior.at(torch.as_tensor(result.x).unsqueeze(0)), found.processes.picked(flat.unsqueeze(0)))
+    processes = Hyperparameters(*(torch.cat(pair) for pair in zip(*chosen, strict=True)))
+    after = replace(found, processes=processes, log_prior=found.prior.log_hypotheses, trouble=trouble)
+    return _with_same_totals(found, after)
+
+
+def _with_same_totals(before: Fit, after: Fit) -> Fit:
+    """Another fit, in which "the tap changes something" and "nothing" are as believable together as they were."""
+    # Where "nothing" is impossible, it stays so.
+    something, nothing = (before.log_totals - after.log_totals).nan_to_num(0.0)
+    gains = torch.where(after.processes.amplitude > 0, something, nothing)
+    return _sound(replace(after, log_prior=after.log_prior + gains))

@@ -1,0 +1,229 @@
+"""A Gaussian process on the transformed MEP, fitted anew after each trial, and windows from its sample paths.
+
+Whatever the profile's form, it needs to be smooth only. The price is trials: the process does not know that there is
+one window with flat ends.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import numpy as np
+import torch
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.models.gp.fit import Fit, fit, fixed_fit
+from isiw.models.gp.prior import FixedProcess, HyperparameterPrior
+from isiw.models.gp.process import KernelName, SingleTaskGP
+from isiw.models.gp.samples import FloorKind, Paths, ProfileSample, draw_paths
+from isiw.models.gp.scale import Scale, Transform, scale_of
+from isiw.models.protocol import Observation, Tensor
+from isiw.models.told import PersonTrials, Told
+from isiw.models.windows import profile_grid, sampled_estimate
+from isiw.types import FloatArray
+from isiw.window import WindowEstimate
+
+__all__ = ["GaussianProcess", "GaussianProcessPosterior", "NoiseKind"]
+
+NoiseKind: TypeAlias = Literal["equal", "by-isi"]
+
+PATH_STEP_MS = 4.0
+"""Paths are drawn at ISIs this far apart at most, and are straight in between; length scales are 10 ms and more."""
+
+_CHOICES = {
+    "kernel": ("rbf", "matern"),
+    "noise": ("equal", "by-isi"),
+    "transform": ("log", "sqrt", "none"),
+    "hyperparameters": ("marginalised", "map"),
+    "floor": ("subtracted", "zeroed", "raw"),
+}
+
+
+@dataclass(frozen=True)
+class GaussianProcess:
+    """A Gaussian process on the transformed MEP.
+
+    It learns from amplitudes only, takes an ISI for what it was told as whatever its SD, and an amplitude below the
+    detection limit for that limit.
+
+    Args:
+        kernel: `"rbf"`, the squared exponential, or `"matern"` with smoothness 5/2.
+        noise: `"equal"` at all ISIs, or `"by-isi"`. Whether there is a profile at all is judged under equal noise.
+        transform: `"log"`, `"sqrt"` or `"none"`: of which the MEP the process is.
+        hyperparameters: `"marginalised"` over a grid, or `"map"`, the most likely ones.
+        floor: what the 0.135 rule is applied above. `"subtracted"`: the expected MEP of TMS alone where that was told,
+            else the median of what lies low on each path. `"zeroed"`: 0, MEPs below `zero_below_mv` being 0. `"raw"`:
+            0, MEPs as they are; where the floor exceeds 0.135 of the peak, such a window has no edges.
+        beliefs: prior of the hyperparameters.
+        fixed: hyperparameters and scale that are not learnt, for equal noise.
+        samples: how many paths represent the posterior.
+        detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
+        zero_below_mv: threshold of the floor `"zeroed"` [mV].
+
+    Raises:
+        InvalidValueError: another choice, or a number that cannot be.
+    """
+
+    kernel: KernelName = "matern"
+    noise: NoiseKind = "equal"
+    transform: Transform = "log"
+    hyperparameters: Literal["marginalised", "map"] = "marginalised"
+    floor: FloorKind = "subtracted"
+    beliefs: HyperparameterPrior = field(default_factory=HyperparameterPrior)
+    fixed: FixedProcess | None = None
+    samples: int = 256
+    detection_limit_mv: float = 0.005
+    zero_below_mv: float = 0.025
+
+    def __post_init__(self) -> None:
+        for name, choices in _CHOICES.items():
+            if getattr(self, name) not in choices:
+                raise InvalidValueError(f"{name} is unknown", got=getattr(self, name), expected=" or ".join(choices))
+        if self.fixed is not None and self.noise != "equal":
+            raise InvalidValueError("fixed hyperparameters are of equal noise", got=self.noise, expected="equal")
+        if isinstance(self.samples, bool) or not isinstance(self.samples, int) or self.samples < 2:
+            raise InvalidValueError("samples must be a whole number", got=self.samples, expected="2 or more")
+        if not all(math.isfinite(x) and x > 0 for x in (self.detection_limit_mv, self.zero_below_mv)):
+            raise InvalidValueError(
+                "detection_limit_mv and zero_below_mv are positive", got=(self.detection_limit_mv, self.zero_below_mv)
+            )
+
+    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> GaussianProcessPosterior:
+        """The posterior before the first trial."""
+        return GaussianProcessPosterior(self, space, seed, Told.nothing(people))
+
+    def update(self, posterior: GaussianProcessPosterior, observation: Observation) -> GaussianProcessPosterior:
+        """The posterior after one more trial.
+
+        Raises:
+            StrategyError: a response without an amplitude.
+        """
+        return replace(posterior, told=posterior.told.appended(observation), held=None)
+
+    def fit(self, told: PersonTrials) -> Fit:
+        """Fit one person's trials."""
+        told = self.seen(told)
+        if self.fixed is not None:
+            scale = Scale(self.transform, self.detection_limit_mv, self.fixed.centre, self.fixed.unit)
+            return fixed_fit(self.beliefs, self.kernel, scale, told, self.fixed)
+        return fit(
+            self.beliefs,
+            self.kernel,
+            scale_of(np.concatenate((told.mep_mv, told.baseline_mv)), self.transform, self.detection_limit_mv),
+            told,
+            marginalised=self.hyperparameters == "marginalised",
+            noise_by_isi=self.noise == "by-isi",
+        )
+
+    def seen(self, told: PersonTrials) -> PersonTrials:
+        """Trials as they are fitted: small MEPs are 0 where the floor is `"zeroed"`."""
+        if self.floor != "zeroed":
+            return told
+
+        def zeroed(mep_mv: FloatArray) -> FloatArray:
+            return np.where(mep_mv < self.zero_below_mv, 0.0, mep_mv)
+
+        return replace(told, mep_mv=zeroed(told.mep_mv), baseline_mv=zeroed(told.baseline_mv))
+
+
+@dataclass(frozen=True, eq=False)
+class GaussianProcessPosterior:
+    """What is believed about b people.
+
+    Args:
+        model: the model's settings.
+        space: the design space.
+        seed: seed of all randomness.
+        told: the trials so far.
+        held: fits whose hyperparameters stay, one a person; None to fit anew.
+    """
+
+    model: GaussianProcess
+    space: DesignSpace
+    seed: int
+    told: Told
+    held: tuple[Fit, ...] | None = None
+
+    @property
+    def trials(self) -> int:
+        """How many trials of each person it has been told."""
+        return self.told.trials
+
+    @property
+    def people(self) -> int:
+        """How many people there are."""
+        return self.told.people
+
+    @cached_property
+    def fits(self) -> tuple[Fit, ...]:
+        """The processes of each person, and how believable they are."""
+        told = [self.told.person(person) for person in range(self.people)]
+        if self.held is not None:
+            return tuple(f.conditioned(self.model.seen(t)) for f, t in zip(self.held, told, strict=True))
+        return tuple(map(self.model.fit, told))
+
+    @cached_property
+    def _sample(self) -> ProfileSample:
+        low_ms, high_ms = self.space.low_ms, self.space.high_ms
+        points = math.ceil((high_ms - low_ms) / PATH_STEP_MS) + 1
+        isi_ms = torch.linspace(low_ms, high_ms, points, dtype=torch.float64)
+        drawn = [
+            draw_paths(f, isi_ms, self.model.samples, np.random.default_rng((self.seed, self.trials, person)))
+            for person, f in enumerate(self.fits)
+        ]
+        stacked = (torch.stack(field) for field in zip(*drawn, strict=True))
+        paths = Paths(*(x if x.dtype == torch.bool else x.float() for x in stacked))
+        return ProfileSample(isi_ms.float(), paths, self.model.transform, self.model.floor)
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
+        return self._sample.outcome_mass(isi_ms)
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows; see `SamplesWindows`."""
+        return self._sample.window_masks(isi_ms)
+
+    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+        """Sampled profiles; see `SamplesProfiles`."""
+        return self._sample.expected_mep_mv(isi_ms)
+
+    def baselines_mv(self) -> Tensor:
+        """Sampled floors; see `SamplesProfiles`. They are 0 unless the floor is `"subtracted"`."""
+        return self._sample.floor_mv
+
+    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> GaussianProcessPosterior:
+        """What would be believed after one more trial, the hyperparameters staying what they are; see `Conditions`."""
+        unknown = torch.full_like(mep_mv, torch.nan)
+        imagined = Observation(isi_ms, mep_mv, isi_sd_ms=torch.zeros_like(mep_mv), response=unknown)
+        return replace(self, told=self.told.appended(imagined), held=self.fits)
+
+    def log_evidence(self) -> Tensor:
+        """Log marginal likelihood of the trials, as a density of log amplitudes [nat]; see `HasEvidence`.
+
+        It is that of equal noise also where the noise depends on the ISI.
+        """
+        return torch.tensor([f.log_evidence for f in self.fits])
+
+    @property
+    def trouble(self) -> str | None:
+        """What went wrong with the last fit, of all people; see `ReportsTrouble`."""
+        return " ".join(dict.fromkeys(f.trouble for f in self.fits if f.trouble)) or None
+
+    def botorch_model(self, person: int = 0) -> SingleTaskGP:
+        """The most believable process of one person; see `HasBotorchModel`.
+
+        Its outcomes are transformed, standardised MEPs. Where the noise depends on the ISI, fantasies of BoTorch have
+        the mean noise of the trials.
+        """
+        found = self.fits[person]
+        return found.regression(torch.tensor(found.best))
+
+    def estimate(self, person: int = 0) -> WindowEstimate:
+        """The window of one person."""
+        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32)
+        profiles_mv = self.profiles_mv(profile_grid(self.space))
+        return sampled_estimate(self.window_masks(grid)[person], profiles_mv[person], self.space)

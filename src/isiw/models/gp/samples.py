@@ -1,0 +1,185 @@
+"""Sample paths of the Gaussian process: profiles, windows by the 0.135 rule, and the next MEP."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+import torch
+
+from isiw.models.gp.fit import Fit
+from isiw.models.gp.scale import Transform, expected_mep_mv
+from isiw.models.protocol import Tensor
+from isiw.models.streams import systematic
+from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
+
+__all__ = ["FloorKind", "Paths", "ProfileSample", "draw_paths"]
+
+FloorKind: TypeAlias = Literal["subtracted", "zeroed", "raw"]
+
+FLOOR_SHARE = 0.15
+"""A path is lowest up to this quantile; of a range of 320 ms, at least 28 % lie outside the widest window."""
+
+FLOOR_RISE = 0.25
+"""Where TMS alone was not told, the floor is the median of what rises from a path's lowest values by no more than this
+share of its height: less would leave out the floor's upper half where paths wander, more would take in the tails of a
+window that is wide for its range."""
+
+SEGMENT_RISE = 0.4
+"""What is inside by the rule but nowhere rises to this share of a path's height is taken for the path's wandering, and
+makes no segment of a window. So a lower second peak is lost."""
+
+PATH_JITTER = 1e-5
+"""Share of a process's variance that is added to the diagonal before paths are drawn, for a stable factor."""
+
+OUTCOMES = 32
+"""Values of the transformed MEP on which predictive distributions live."""
+
+
+class Paths(NamedTuple):
+    """Sample paths of one person, on the scale of transformed amplitudes.
+
+    Args:
+        level: mean of the transformed MEP on the paths' grid, shape (s, m).
+        noise_sd: SD of a trial about it, shape (s, m).
+        alone: mean of the transformed MEP of TMS alone, shape (s,); NaN where it was not told.
+        alone_sd: SD of a trial about it, shape (s,).
+        present: whether the tap changes anything, shape (s,).
+    """
+
+    level: Tensor
+    noise_sd: Tensor
+    alone: Tensor
+    alone_sd: Tensor
+    present: Tensor
+
+
+def draw_paths(fit: Fit, isi_ms: Tensor, size: int, rng: np.random.Generator) -> Paths:
+    """Draw sample paths, from each process as many as it is believable.
+
+    Args:
+        fit: the processes.
+        isi_ms: ISIs of the paths' grid [ms], shape (m,).
+        size: how many paths.
+        rng: random generator.
+    """
+    picks = systematic(torch.log_softmax(fit.log_joint, 0).unsqueeze(0), size)[0]
+    chosen = fit.processes.picked(picks)
+    present = chosen.amplitude > 0
+    level = torch.empty((size, len(isi_ms)), dtype=torch.float64)
+    z = torch.as_tensor(rng.standard_normal((size, len(isi_ms) + 1)))
+    level[present] = _profiles(fit, picks[present], isi_ms, z[present, 1:])
+    level[~present] = _constants(fit, chosen.noise[~present], z[~present, 0]).unsqueeze(-1)
+    changed = fit.noise.log_variance(isi_ms) * present.unsqueeze(-1)
+    noise_sd = chosen.noise.unsqueeze(-1) * torch.exp(0.5 * changed)
+    alone_mean, alone_variance = fit.level(chosen.noise)
+    alone = torch.where(present, alone_mean + alone_variance.sqrt() * z[:, 0], level[:, 0])
+    unit, centre = fit.scale.unit, fit.scale.centre
+    return Paths(
+        level=centre + unit * level,
+        noise_sd=unit * noise_sd,
+        alone=centre + unit * alone if len(fit.trials.alone) else torch.full_like(alone, torch.nan),
+        alone_sd=unit * chosen.noise,
+        present=present,
+    )
+
+
+def _profiles(fit: Fit, picks: Tensor, isi_ms: Tensor, z: Tensor) -> Tensor:
+    """Paths of processes with an amplitude, one for each pick, in standardised units, shape (s, m)."""
+    if not len(picks):
+        return z
+    which, member = torch.unique(picks, return_inverse=True)
+    with torch.no_grad():
+        posterior: Any = fit.regression(which).posterior(isi_ms.unsqueeze(-1))
+        mean, covariance = posterior.mean.squeeze(-1), posterior.distribution.covariance_matrix
+    jitter = PATH_JITTER * fit.processes.amplitude[which].square()[:, None, None]
+    factor = torch.linalg.cholesky(covariance + jitter * torch.eye(len(isi_ms), dtype=z.dtype))
+    paths: Tensor = mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
+    return paths
+
+
+def _constants(fit: Fit, noise: Tensor, z: Tensor) -> Tensor:
+    """Draws of the constant where a tap changes nothing, in standardised units, shape (s,)."""
+    mean, variance = fit.level(noise)
+    precision = 1.0 / variance + len(fit.trials.values) / noise.square()
+    pull = mean / variance + fit.trials.values.sum() / noise.square()
+    return pull / precision + z / precision.sqrt()
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileSample:
+    """Equally weighted paths of b people, and what they say about profile, window and the next MEP.
+
+    Args:
+        isi_ms: ISIs of the paths' grid [ms], evenly spaced, shape (m,); what lies between is interpolated.
+        paths: the paths, fields of shape (b, s, ...).
+        transform: what amplitudes were transformed by.
+        floor: what the 0.135 rule is applied above.
+    """
+
+    isi_ms: Tensor
+    paths: Paths
+    transform: Transform
+    floor: FloorKind
+
+    @cached_property
+    def _expected_mv(self) -> Tensor:
+        """Expected MEP on the paths' grid [mV], shape (b, s, m)."""
+        return expected_mep_mv(self.paths.level, self.paths.noise_sd, self.transform)
+
+    @cached_property
+    def floor_mv(self) -> Tensor:
+        """What the rule is applied above [mV], shape (b, s): expected MEP of TMS alone, or 0."""
+        if self.floor != "subtracted":
+            return torch.zeros_like(self.paths.alone)
+        told = expected_mep_mv(self.paths.alone, self.paths.alone_sd, self.transform)
+        expected = self._expected_mv
+        low = expected.quantile(FLOOR_SHARE, dim=-1, keepdim=True)
+        lying = expected <= low + FLOOR_RISE * (expected.amax(-1, keepdim=True) - low)
+        guessed = torch.where(lying, expected, torch.nan).nanmedian(dim=-1).values
+        return torch.where(told.isnan(), guessed, told)
+
+    @cached_property
+    def _edge_level_mv(self) -> Tensor:
+        """Expected MEP at the window's edge [mV], shape (b, s, 1); infinite where there is no window."""
+        floor_mv = self.floor_mv
+        peak_mv = self._expected_mv.amax(-1) - floor_mv
+        enough = peak_mv >= (MIN_EXCESS_OF_BASELINE * floor_mv).clamp_min(MIN_EXCESS_MV)
+        return torch.where(enough & self.paths.present, floor_mv + EDGE_LEVEL * peak_mv, torch.inf).unsqueeze(-1)
+
+    @cached_property
+    def _cleared_mv(self) -> Tensor:
+        """Expected MEP on the paths' grid, at the floor where a path merely wanders [mV], shape (b, s, m)."""
+        expected, floor_mv = self._expected_mv, self.floor_mv.unsqueeze(-1)
+        inside = expected >= self._edge_level_mv
+        run = torch.nn.functional.pad(inside[..., 1:] & ~inside[..., :-1], (1, 0)).cumsum(-1)
+        tops = torch.zeros_like(expected).scatter_reduce(-1, run, torch.where(inside, expected, 0.0), "amax")
+        wanders = tops.gather(-1, run) < floor_mv + SEGMENT_RISE * (expected.amax(-1, keepdim=True) - floor_mv)
+        return torch.where(inside & wanders, floor_mv, expected)
+
+    def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
+        """Expected MEP [mV] at some ISIs [ms] (shape (t,)), shape (b, s, t)."""
+        return self._between(self._expected_mv, isi_ms)
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows as 0 or 1, shape (b, s, t)."""
+        return (self._between(self._cleared_mv, isi_ms) >= self._edge_level_mv).to(self.paths.level.dtype)
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next transformed MEP under each path, shape (b, s, t, y)."""
+        level, noise_sd = (self._between(x, isi_ms).unsqueeze(-1) for x in (self.paths.level, self.paths.noise_sd))
+        reach = 2.5 * noise_sd
+        low, high = (level - reach).amin((1, 2, 3)), (level + reach).amax((1, 2, 3))
+        share = torch.linspace(0.0, 1.0, OUTCOMES, dtype=level.dtype)
+        outcomes = (low.unsqueeze(-1) + share * (high - low).unsqueeze(-1))[:, None, None, :]
+        return torch.softmax(-0.5 * ((outcomes - level) / noise_sd).square(), dim=-1)
+
+    def _between(self, values: Tensor, isi_ms: Tensor) -> Tensor:
+        """Values on the paths' grid, shape (b, s, m), interpolated at ISIs [ms] of shape (t,)."""
+        step_ms = self.isi_ms[1] - self.isi_ms[0]
+        position = ((isi_ms - self.isi_ms[0]) / step_ms).clamp(0.0, len(self.isi_ms) - 1.0).to(values.dtype)
+        left = position.floor().long().clamp_max(len(self.isi_ms) - 2)
+        share = position - left
+        return values[..., left] * (1.0 - share) + values[..., left + 1] * share

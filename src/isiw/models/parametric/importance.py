@@ -1,0 +1,253 @@
+"""Draws of a posterior with several modes, by adaptive importance sampling.
+
+The prior is a standard normal of the latents. A mixture begins with a Student t at each mode, of the curvature there,
+and with the prior, which stays in it (Hesterberg, Technometrics 37, 1995). Where its draws are worth too little, it is
+fitted to them by their weights (population Monte Carlo: Cappé et al., Stat. Comput. 18, 2008), and draws anew. So the
+modes need only be near: what they miss, the weights correct.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import torch
+
+from isiw.models.parametric.ascent import LogDensity, Modes, find_modes
+from isiw.models.protocol import Tensor
+
+__all__ = ["Effort", "Mixture", "WeightedDraws", "importance_sample", "worth"]
+
+T_DEGREES: Final = 6.0
+"""Degrees of freedom of the components: tails heavier than a normal's."""
+
+PRIOR_SHARE: Final = 0.1
+"""Least share of the prior in the mixture."""
+
+SCOUTED_SHARE: Final = 0.25
+"""Share of what was scouted in the mixture to begin with."""
+
+GOOD_SHARE: Final = 0.25
+"""A mixture will do when its first draws are worth this share of their number."""
+
+TOO_HEAVY: Final = 0.1
+"""A draw that weighs more is looked into."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much work a sample is worth.
+
+    Args:
+        scouts: draws that show where to climb from.
+        starts: ascents.
+        steps: quasi-Newton steps of each.
+        draws: draws of the mixture in each round.
+        fits: the mixture is fitted at most this many times.
+        enough: further draws of the last mixture make all of them worth as many independent ones as this.
+    """
+
+    scouts: int = 512
+    starts: int = 12
+    steps: int = 12
+    draws: int = 500
+    fits: int = 10
+    enough: float = 400.0
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedDraws:
+    """Weighted draws of a posterior.
+
+    Args:
+        points: latents, shape (m, d).
+        log_weights: normalised, shape (m,).
+        log_evidence: log of the density's integral [nat].
+        modes: the distinct modes, best first.
+    """
+
+    points: Tensor
+    log_weights: Tensor
+    log_evidence: float
+    modes: Modes
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """The standard normal prior, and multivariate Student t components.
+
+    Args:
+        shares: of the prior, then of the components, shape (k + 1,).
+        means: shape (k, d).
+        factors: lower Cholesky factors of their scale matrices, shape (k, d, d).
+    """
+
+    shares: Tensor
+    means: Tensor
+    factors: Tensor
+
+    @classmethod
+    def at(cls, modes: Modes) -> Mixture:
+        """The prior, and a component at each mode.
+
+        The modes' evidence is trusted less than it says, for Laplace's method is rough.
+        """
+        prior = torch.full((1,), PRIOR_SHARE, dtype=torch.double)
+        shares = torch.cat((prior, torch.softmax(0.7 * modes.log_evidence, dim=0)))
+        return cls(_defensive(shares), modes.points, torch.linalg.cholesky(modes.covariances))
+
+    @classmethod
+    def prior(cls, latents: int) -> Mixture:
+        """The prior, half of it with the heavier tails of the components."""
+        half, centre = torch.full((2,), 0.5, dtype=torch.double), torch.zeros((1, latents), dtype=torch.double)
+        return cls(half, centre, torch.diag_embed(1.0 + centre))
+
+    def log_parts(self, points: Tensor) -> Tensor:
+        """Log density of each part times its share, shape (k + 1, m)."""
+        d = points.shape[-1]
+        off = torch.linalg.solve_triangular(self.factors, (points - self.means.unsqueeze(1)).mT, upper=False)
+        squared = off.square().sum(1)
+        log_det = self.factors.diagonal(dim1=-2, dim2=-1).log().sum(-1, keepdim=True)
+        gammas = math.lgamma(0.5 * (T_DEGREES + d)) - math.lgamma(0.5 * T_DEGREES)
+        constant = gammas - 0.5 * d * math.log(T_DEGREES * math.pi)
+        student = constant - log_det - 0.5 * (T_DEGREES + d) * torch.log1p(squared / T_DEGREES)
+        prior = -0.5 * points.square().sum(-1) - 0.5 * d * math.log(2.0 * math.pi)
+        return torch.cat((prior.unsqueeze(0), student)) + self.shares.log().unsqueeze(-1)
+
+    def joined(self, other: Mixture, share: float) -> Mixture:
+        """This mixture and the components of another one.
+
+        Args:
+            other: the other mixture; its prior is left out, for there is one already.
+            share: of the other's components in all.
+        """
+        theirs = other.shares[1:] / other.shares[1:].sum()
+        shares = torch.cat(((1.0 - share) * self.shares, share * theirs))
+        return Mixture(shares, torch.cat((self.means, other.means)), torch.cat((self.factors, other.factors)))
+
+    def draw(self, size: int, generator: torch.Generator) -> Tensor:
+        """Draws, each part in proportion to its share, shape (size, d)."""
+        d = self.means.shape[-1]
+        ends = (self.shares.cumsum(0) / self.shares.sum() * size).round().long()
+        part = torch.searchsorted(ends, torch.arange(size), right=True).clamp_max(len(self.means))
+        normal = torch.randn((size, d), generator=generator, dtype=self.means.dtype)
+        shape = torch.full((size,), 0.5 * T_DEGREES, dtype=self.means.dtype)
+        stretch = torch.sqrt(0.5 * T_DEGREES / torch._standard_gamma(shape, generator=generator))  # noqa: SLF001
+        own = (part - 1).clamp_min(0)
+        student = self.means[own] + stretch.unsqueeze(-1) * (self.factors[own] @ normal.unsqueeze(-1)).squeeze(-1)
+        return torch.where((part == 0).unsqueeze(-1), normal, student)
+
+    def fitted(self, points: Tensor, log_weights: Tensor) -> Mixture:
+        """The mixture after one step towards the weighted points, its scatter held to what they can tell."""
+        d = points.shape[-1]
+        belongs = torch.softmax(self.log_parts(points), dim=0) * log_weights.exp()
+        shares = belongs.sum(-1)
+        own = belongs[1:] / shares[1:].clamp_min(1e-12).unsqueeze(-1)
+        draws = own.square().sum(-1).clamp_min(1e-12).reciprocal()
+        trust = (draws / (draws + 2.0 * d))[:, None, None]
+        means = self.means + trust[..., 0] * (own @ points - self.means)
+        off = points - means.unsqueeze(1)
+        scatter = torch.einsum("km,kmi,kmj->kij", own, off, off)
+        scales = trust * scatter + (1.0 - trust) * (self.factors @ self.factors.mT)
+        ridge = 1e-6 * torch.eye(d, dtype=points.dtype)
+        return Mixture(_defensive(shares), means, torch.linalg.cholesky(scales + ridge))
+
+
+class _Round(NamedTuple):
+    """Points, their log densities, and what they were drawn from."""
+
+    points: Tensor
+    log_density: Tensor
+    proposal: Mixture
+
+
+def worth(log_weights: Tensor) -> float:
+    """Effective sample size: how many independent draws weighted ones are worth.
+
+    Args:
+        log_weights: normalised, shape (m,).
+    """
+    return float(torch.exp(-torch.logsumexp(2.0 * log_weights, dim=0)))
+
+
+def _defensive(shares: Tensor) -> Tensor:
+    """Shares of which the first is not below the prior's least."""
+    rest = shares[1:].clamp_min(1e-4)
+    prior = shares[0].clamp(PRIOR_SHARE, 0.9)
+    return torch.cat((prior.unsqueeze(0), (1.0 - prior) * rest / rest.sum()))
+
+
+def importance_sample(
+    log_density: LogDensity, scouting: Mixture, generator: torch.Generator, effort: Effort
+) -> WeightedDraws:
+    """Sample a posterior whose prior is a standard normal.
+
+    Args:
+        log_density: log of prior times likelihood.
+        scouting: where to look first: the prior, or the modes of a simpler model that is a part of this one.
+        generator: source of randomness.
+        effort: how much work it is worth.
+    """
+    scouts = _drawn(log_density, scouting, effort.scouts, generator)
+    modes = find_modes(log_density, _best_of_each_part(scouts, effort.starts), effort.steps)
+    mixture = Mixture.at(modes).joined(scouting, SCOUTED_SHARE)
+    earlier = [scouts]
+    for _ in range(effort.fits):
+        rounds = _rounds(log_density, mixture, generator, effort)
+        if worth(_weighted(rounds)[0]) >= 0.5 * effort.enough:
+            break
+        # Draws that the mixture was fitted to would be weighted too low: they count no more.
+        earlier += rounds
+        mixture = _improved(log_density, mixture, earlier, effort)
+    log_weights, log_evidence = _weighted(rounds)
+    return WeightedDraws(_points(rounds), log_weights, log_evidence, modes)
+
+
+def _rounds(log_density: LogDensity, mixture: Mixture, generator: torch.Generator, effort: Effort) -> list[_Round]:
+    """One round of draws, and as many more as it takes where it shows that the mixture will do."""
+    first = _drawn(log_density, mixture, effort.draws, generator)
+    of_one = worth(_weighted([first])[0])
+    more = math.ceil(effort.enough / of_one) - 1 if of_one >= GOOD_SHARE * effort.draws else 0
+    return [first, *(_drawn(log_density, mixture, effort.draws, generator) for _ in range(more))]
+
+
+def _improved(log_density: LogDensity, mixture: Mixture, rounds: list[_Round], effort: Effort) -> Mixture:
+    points, (log_weights, _) = _points(rounds), _weighted(rounds)
+    heaviest = log_weights.argmax()
+    fitted = mixture.fitted(points, log_weights)
+    if log_weights[heaviest] < math.log(TOO_HEAVY):
+        return fitted
+    # One draw that weighs so much comes from a place that the mixture misses.
+    missed = find_modes(log_density, points[heaviest].unsqueeze(0), effort.steps)
+    return fitted.joined(Mixture.at(missed), SCOUTED_SHARE)
+
+
+def _drawn(log_density: LogDensity, proposal: Mixture, size: int, generator: torch.Generator) -> _Round:
+    points = proposal.draw(size, generator)
+    return _Round(points, log_density(points).nan_to_num(nan=-torch.inf), proposal)
+
+
+def _best_of_each_part(scouts: _Round, parts: int) -> Tensor:
+    """The best scout of each part of the first latent's range, shape (parts, d)."""
+    order = scouts.points[:, 0].argsort()
+    chunks = order[: len(order) // parts * parts].view(parts, -1)
+    best = scouts.log_density[chunks].argmax(-1, keepdim=True)
+    return scouts.points[chunks.gather(1, best).squeeze(1)]
+
+
+def _points(rounds: list[_Round]) -> Tensor:
+    return torch.cat([each.points for each in rounds])
+
+
+def _weighted(rounds: list[_Round]) -> tuple[Tensor, float]:
+    """Log weights of the draws of all rounds, each as a draw of the average proposal, and the log evidence."""
+    points = _points(rounds)
+    proposals = [
+        torch.logsumexp(each.proposal.log_parts(points), dim=0) + math.log(len(each.points) / len(points))
+        for each in rounds
+    ]
+    log_density = torch.cat([each.log_density for each in rounds])
+    log_weights = log_density - torch.logsumexp(torch.stack(proposals), dim=0)
+    log_sum = torch.logsumexp(log_weights, dim=0)
+    return log_weights - log_sum, float(log_sum) - math.log(len(points))

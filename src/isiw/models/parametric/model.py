@@ -1,0 +1,269 @@
+"""The parametric window model: a Gaussian window on a floor, with noise that depends on the level, as a Pyro program.
+
+Its posterior is sampled anew after every trial, and depends on the seed and on which trials there were, not on their
+order. Whether there is a window is one more unknown: with and without are two models, weighed by their evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import get_args
+
+import numpy as np
+import torch
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.models.parametric.importance import Effort
+from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
+from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
+from isiw.models.parametric.program import WindowProgram
+from isiw.models.parametric.sampling import Method, sample_person
+from isiw.models.particles.evidence import History, observed
+from isiw.models.particles.sample import OUTCOMES, table_levels, table_weights
+from isiw.models.protocol import Observation, SimulatedPerson, Tensor
+from isiw.models.streams import SIMULATED, step_generator, systematic
+from isiw.models.windows import profile_grid, sampled_estimate
+from isiw.types import ArrayLike
+from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window, WindowEstimate
+
+__all__ = ["ParametricModel", "ParametricPosterior"]
+
+
+@dataclass(frozen=True)
+class ParametricModel:
+    """A Gaussian window on a floor, with gamma, log-normal or input-side noise and outliers.
+
+    Args:
+        beliefs: the prior over people.
+        likelihood: how MEPs scatter: "gamma", "log-normal", or "input-noise" (a noisy input of a saturating curve).
+        method: "fast" samples by importance around all modes; "nuts" takes the draws with a window from Pyro's
+            no-U-turn sampler instead, which needs minutes and is for reference.
+        samples: equally weighted samples that represent a posterior.
+        effort: how much work a sample with a window is worth.
+        detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
+        response_threshold_mv: what a told response is known to be above [mV].
+
+    Raises:
+        InvalidValueError: an unknown likelihood or method, or a number that cannot be.
+    """
+
+    beliefs: WindowPrior = field(default_factory=WindowPrior)
+    likelihood: Likelihood = "input-noise"
+    method: Method = "fast"
+    samples: int = 512
+    effort: Effort = field(default_factory=Effort)
+    detection_limit_mv: float = 0.005
+    response_threshold_mv: float = 0.02
+
+    def __post_init__(self) -> None:
+        for name, kinds in (("likelihood", get_args(Likelihood)), ("method", get_args(Method))):
+            if getattr(self, name) not in kinds:
+                raise InvalidValueError(f"unknown {name}", got=getattr(self, name), expected=" or ".join(kinds))
+        if isinstance(self.samples, bool) or not isinstance(self.samples, int) or self.samples < 2:
+            raise InvalidValueError("samples must be a whole number", got=self.samples, expected="2 or more")
+        if not (self.detection_limit_mv > 0 and self.response_threshold_mv > 0):
+            raise InvalidValueError(
+                "a detection limit and a threshold are positive",
+                got=(self.detection_limit_mv, self.response_threshold_mv),
+            )
+
+    def program(self, space: DesignSpace) -> WindowProgram:
+        """The Pyro program of one person."""
+        return WindowProgram(self.beliefs, self.likelihood, space)
+
+    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> ParametricPosterior:
+        """The posterior before the first trial."""
+        return self._after(space, seed, History.empty(people, torch.device("cpu")).to("cpu", torch.double))
+
+    def update(self, posterior: ParametricPosterior, observation: Observation) -> ParametricPosterior:
+        """The posterior after one more trial."""
+        return self.update_by_all(posterior, (observation,))
+
+    def update_by_all(self, posterior: ParametricPosterior, observations: Sequence[Observation]) -> ParametricPosterior:
+        """The posterior after several more trials: the same as after one by one, at the cost of one."""
+        history = posterior.history
+        for observation in observations:
+            history = history.appended(self.observed(observation))
+        return self._after(posterior.space, posterior.seed, history)
+
+    def observed(self, observation: Observation) -> History:
+        """One trial of each person as a history."""
+        return observed(observation, self.detection_limit_mv, self.response_threshold_mv).to("cpu", torch.double)
+
+    def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
+        """Draw one person from the prior, and a MEP at each ISI; see `SimulatesPeople`."""
+        generator = step_generator("cpu", seed, SIMULATED)
+        program = self.program(space)
+        latents = torch.randn((1, 1, program.latents), generator=generator, dtype=torch.double)
+        present = torch.rand((1, 1), generator=generator) < self.beliefs.p_window
+        person = WindowSample(program.unknowns(latents), present, self.likelihood)
+        log_mep = draw_log_mep(
+            person.unknowns, person.levels(torch.as_tensor(isi_ms, dtype=torch.double)), self.likelihood, generator
+        )
+        mask = person.window_masks(torch.tensor(space.grid_ms))[0, 0]
+        return SimulatedPerson(Window.from_mask(space.grid_ms, mask.numpy()), log_mep.exp()[0, 0].numpy())
+
+    def _after(self, space: DesignSpace, seed: int, history: History) -> ParametricPosterior:
+        people, trials = history.isi_ms.shape
+        fits = [
+            sample_person(
+                self.program(space),
+                _sorted(history, person),
+                self.method,
+                self.samples,
+                self.effort,
+                step_generator("cpu", seed, trials),
+            )
+            for person in range(people)
+        ]
+        return ParametricPosterior(
+            model=self,
+            space=space,
+            seed=seed,
+            history=history,
+            latents=torch.stack([fit.latents for fit in fits]),
+            present=torch.stack([fit.present for fit in fits]),
+            evidence=torch.tensor([fit.log_evidence for fit in fits]),
+            trouble=" ".join(fit.trouble for fit in fits if fit.trouble) or None,
+        )
+
+
+def _sorted(history: History, person: int) -> History:
+    """The trials of one person in an order of their own, so that the posterior does not depend on that of telling."""
+    columns = [column[person] for column in history.columns]
+    order = torch.from_numpy(np.lexsort([column.numpy() for column in columns]))
+    return History(*(column[order].unsqueeze(0) for column in columns))
+
+
+@dataclass(frozen=True, eq=False)
+class WindowSample:
+    """Equally weighted samples, and what they say about the next MEP and about the window.
+
+    Args:
+        unknowns: fields of shape (b, s).
+        present: whether there is any excess, shape (b, s).
+        likelihood: the likelihood.
+    """
+
+    unknowns: Unknowns
+    present: Tensor
+    likelihood: Likelihood
+
+    def levels(self, isi_ms: Tensor) -> Tensor:
+        """Share of the largest excess at some ISIs, of shape (t,) or (b, 1, t), shape (b, s, t)."""
+        return torch.where(self.present.unsqueeze(-1), levels(self.unknowns, isi_ms), 0.0)
+
+    @cached_property
+    def enhances(self) -> Tensor:
+        """Whether the excess is large enough to speak of a window, shape (b, s)."""
+        least_mv = (MIN_EXCESS_OF_BASELINE * self.unknowns.baseline_mv).clamp_min(MIN_EXCESS_MV)
+        return self.present & (self.unknowns.amplitude_mv >= least_mv)
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows as 0 or 1, shape (b, s, t)."""
+        inside = self.enhances.unsqueeze(-1) & (self.levels(isi_ms.double()) >= EDGE_LEVEL)
+        return inside.to(torch.float32)
+
+    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+        """Expected MEP [mV], shape (b, s, t)."""
+        excess_mv = self.unknowns.amplitude_mv.unsqueeze(-1) * self.levels(isi_ms.double())
+        return (self.unknowns.baseline_mv.unsqueeze(-1) + excess_mv).float()
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next MEP under each sample, shape (b, s, t, y)."""
+        return table_weights(self.levels(isi_ms.double()).float()) @ self._outcome_table
+
+    @cached_property
+    def _outcome_table(self) -> Tensor:
+        """Probability of each outcome at the tables' levels, shape (b, s, l, y)."""
+        u = Unknowns(*(field.float() for field in self.unknowns))
+        low = torch.quantile(u.floor_mv.log(), 0.05, dim=-1) - 1.0
+        high = torch.quantile((u.baseline_mv + u.amplitude_mv).log(), 0.95, dim=-1) + 1.5
+        share = torch.linspace(0.0, 1.0, OUTCOMES)
+        log_mep = (low.unsqueeze(-1) + share * (high - low).unsqueeze(-1))[:, None, None, :, None].expand(
+            -1, -1, -1, -1, 2
+        )
+        each = Unknowns(*(field.unsqueeze(-1) for field in u))
+        level = table_levels(share.device).view(-1, 1)
+        return torch.softmax(log_likelihood(each, level, log_mep, self.likelihood), dim=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class ParametricPosterior:
+    """What is believed about b people.
+
+    Args:
+        model: the model's settings.
+        space: the design space.
+        seed: seed of all randomness.
+        history: the trials so far, in the order of telling.
+        latents: equally weighted samples, shape (b, s, d).
+        present: whether there is any excess, shape (b, s).
+        evidence: log marginal likelihood of the trials [nat], shape (b,).
+        trouble: what went wrong with the last fit and what stands in for it; None where nothing did.
+    """
+
+    model: ParametricModel
+    space: DesignSpace
+    seed: int
+    history: History
+    latents: Tensor
+    present: Tensor
+    evidence: Tensor
+    trouble: str | None
+
+    @property
+    def trials(self) -> int:
+        """How many trials of each person it has been told."""
+        return self.history.isi_ms.shape[-1]
+
+    @cached_property
+    def sample(self) -> WindowSample:
+        """What the samples mean."""
+        unknowns = self.model.program(self.space).unknowns(self.latents)
+        return WindowSample(unknowns, self.present, self.model.likelihood)
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
+        return self.sample.outcome_mass(isi_ms)
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows; see `SamplesWindows`."""
+        return self.sample.window_masks(isi_ms)
+
+    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+        """Sampled profiles; see `SamplesProfiles`."""
+        return self.sample.profiles_mv(isi_ms)
+
+    def baselines_mv(self) -> Tensor:
+        """Sampled baselines; see `SamplesProfiles`."""
+        return self.sample.unknowns.baseline_mv.float()
+
+    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> ParametricPosterior:
+        """The same samples, some more often and some no more, by an imagined trial; see `Conditions`."""
+        unknown = torch.full_like(mep_mv, torch.nan)
+        trial = self.model.observed(Observation(isi_ms, mep_mv, isi_sd_ms=torch.zeros_like(mep_mv), response=unknown))
+        ends = torch.stack((trial.log_mep, trial.log_mep_high), dim=-1).unsqueeze(1)
+        level = self.sample.levels(trial.isi_ms.unsqueeze(1))
+        gain = log_likelihood(self.sample.unknowns, level, ends, self.model.likelihood).squeeze(-1)
+        log_mean = torch.logsumexp(gain, dim=-1, keepdim=True)
+        picks = systematic(gain - log_mean, gain.shape[-1])
+        return replace(
+            self,
+            history=self.history.appended(trial),
+            latents=self.latents.gather(1, picks.unsqueeze(-1).expand_as(self.latents)),
+            present=self.present.gather(1, picks),
+            evidence=self.evidence + log_mean.squeeze(-1) - np.log(gain.shape[-1]),
+        )
+
+    def log_evidence(self) -> Tensor:
+        """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
+        return self.evidence
+
+    def estimate(self, person: int = 0) -> WindowEstimate:
+        """The window of one person."""
+        masks = self.window_masks(torch.tensor(self.space.grid_ms))[person]
+        return sampled_estimate(masks, self.profiles_mv(profile_grid(self.space))[person], self.space)

@@ -1,0 +1,135 @@
+"""From one person's trials to equally weighted draws of the parametric window model, with and without a window."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final, Literal
+
+import torch
+
+from isiw.models.parametric.ascent import Modes
+from isiw.models.parametric.importance import Effort, Mixture, WeightedDraws, importance_sample, worth
+from isiw.models.parametric.program import WindowProgram, nuts_sample
+from isiw.models.particles.evidence import History
+from isiw.models.protocol import Tensor
+from isiw.models.streams import systematic
+
+__all__ = ["Method", "PersonDraws", "sample_person"]
+
+Method = Literal["fast", "nuts"]
+
+WITHOUT_WINDOW: Final = Effort(scouts=256, starts=2, steps=15, draws=300, enough=200.0)
+"""Without a window few latents matter, and there is one mode."""
+
+LEAST_WORTH: Final = 50.0
+"""Draws that are worth fewer independent ones than this are trouble."""
+
+LEAST_SHARE: Final = 0.05
+"""Modes with a smaller share of the evidence get no chain."""
+
+MIN_DRAWS: Final = 50
+"""A chain is at least this long."""
+
+MAX_R_HAT: Final = 1.1
+"""Chains that disagree by more (Gelman and Rubin, Stat. Sci. 7, 1992) are trouble."""
+
+
+@dataclass(frozen=True, eq=False)
+class PersonDraws:
+    """Equally weighted draws of one person's posterior.
+
+    Args:
+        latents: shape (s, d).
+        present: whether there is a window, shape (s,).
+        log_evidence: log marginal likelihood of the trials [nat].
+        trouble: what went wrong and what stands in for it, in sentences; None where nothing did.
+    """
+
+    latents: Tensor
+    present: Tensor
+    log_evidence: float
+    trouble: str | None
+
+
+def sample_person(
+    program: WindowProgram, trials: History, method: Method, samples: int, effort: Effort, generator: torch.Generator
+) -> PersonDraws:
+    """Draw from the posterior of one person.
+
+    Args:
+        program: the model.
+        trials: columns of shape (1, n).
+        method: where the draws with a window come from.
+        samples: how many draws.
+        effort: how much work the importance sample with a window is worth.
+        generator: source of randomness.
+    """
+
+    def log_density(latents: Tensor, present: bool) -> Tensor:  # noqa: FBT001 - the one thing the two models differ in
+        return program.log_density(latents, trials, present=present)
+
+    everywhere = Mixture.prior(program.latents)
+    without = importance_sample(partial(log_density, present=False), everywhere, generator, WITHOUT_WINDOW)
+    # Without a window its place and size are as in the prior, and the floor is already known: good scouts.
+    with_ = importance_sample(partial(log_density, present=True), Mixture.at(without.modes), generator, effort)
+    models = (with_, without)
+    prior = torch.tensor([program.prior.p_window, 1.0 - program.prior.p_window], dtype=torch.double)
+    log_joint = torch.tensor([model.log_evidence for model in models], dtype=torch.double) + prior.log()
+    log_shares = torch.log_softmax(log_joint, dim=0)
+    kept, troubles = zip(
+        *(_flattened(model, float(share)) for model, share in zip(models, log_shares, strict=True)), strict=True
+    )
+    log_weights = torch.cat([model.log_weights + share for model, share in zip(kept, log_shares, strict=True)])
+    picks = systematic(log_weights.unsqueeze(0), samples)[0]
+    latents, present = torch.cat([model.points for model in kept])[picks], picks < len(kept[0].points)
+    # Without trials there is nothing to climb, and Pyro knows no empty plate.
+    if method == "nuts" and bool(present.any()) and trials.isi_ms.numel():
+        latents[present], disagree = _by_nuts(program, trials, with_.modes, int(present.sum()), generator)
+        troubles = (*troubles, disagree)
+    trouble = " ".join(sentence for sentence in troubles if sentence)
+    return PersonDraws(latents, present, float(torch.logsumexp(log_joint, dim=0)), trouble or None)
+
+
+def _flattened(drawn: WeightedDraws, log_share: float) -> tuple[WeightedDraws, str | None]:
+    """The draws, their weights raised to the power below 1 that makes them worth enough; and why, if they were not."""
+    before = worth(drawn.log_weights)
+    if before >= LEAST_WORTH or log_share < math.log(0.01):
+        return drawn, None
+    low, high = 0.0, 1.0
+    for _ in range(30):
+        power = 0.5 * (low + high)
+        flatter = replace(drawn, log_weights=torch.log_softmax(power * drawn.log_weights, dim=0))
+        low, high = (power, high) if worth(flatter.log_weights) >= LEAST_WORTH else (low, power)
+    return flatter, (
+        f"The importance sample is worth {before:.0f} independent draws only; its weights were flattened "
+        f"until it was worth {LEAST_WORTH:.0f}, so that the posterior is rough."
+    )
+
+
+def _by_nuts(
+    program: WindowProgram, trials: History, modes: Modes, size: int, generator: torch.Generator
+) -> tuple[Tensor, str | None]:
+    """Draws of a chain of NUTS from each mode that matters, and a sentence if they disagree about the window.
+
+    Chains that do not mix say nothing about the modes' shares, so each counts by its mode's evidence.
+    """
+    shares = torch.softmax(modes.log_evidence, dim=0)
+    shares = shares[shares >= LEAST_SHARE]
+    chains = nuts_sample(program, trials, modes.points[: len(shares)], max(MIN_DRAWS, size // len(shares)), generator)
+    log_weights = (shares / shares.sum() / chains.shape[1]).log().repeat_interleave(chains.shape[1])
+    picks = systematic(log_weights.unsqueeze(0), size)[0]
+    r_hat = _r_hat(chains[..., :2])
+    disagree = None
+    if r_hat > MAX_R_HAT:
+        disagree = f"The chains of NUTS disagree (R-hat {r_hat:.2f}); each counts by the evidence of its mode."
+    return chains.flatten(0, 1)[picks], disagree
+
+
+def _r_hat(chains: Tensor) -> float:
+    """The largest potential scale reduction of chains (c, draws, d) that are split in halves."""
+    half = chains.shape[1] // 2
+    halves = torch.cat((chains[:, :half], chains[:, half : 2 * half]))
+    within, between = halves.var(dim=1).mean(0), halves.mean(dim=1).var(dim=0)
+    return float(torch.sqrt(1.0 + between / within.clamp_min(1e-12)).max())

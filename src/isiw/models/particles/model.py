@@ -1,0 +1,233 @@
+"""The particle posterior: sequential Monte Carlo over people, b sessions at once.
+
+Every trial multiplies the particles' weights by its likelihood. When the effective sample size falls, the particles are
+resampled, and moved by Markov chain steps (resample-move: Gilks and Berzuini, J. R. Stat. Soc. B 63, 2001).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import torch
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.models.particles.evidence import History, levels, observed, total_log_likelihood
+from isiw.models.particles.moves import Mover
+from isiw.models.particles.prior import Latents, Person, Prior
+from isiw.models.particles.response import Response, draw_log_mep
+from isiw.models.particles.sample import PersonSample
+from isiw.models.particles.shapes import Shape
+from isiw.models.protocol import Observation, SimulatedPerson, Tensor
+from isiw.models.streams import SIMULATED, step_generator, systematic
+from isiw.models.windows import profile_grid, sampled_estimate
+from isiw.types import ArrayLike
+from isiw.window import Window, WindowEstimate
+
+__all__ = ["ParticleModel", "ParticlePosterior"]
+
+
+@dataclass(frozen=True)
+class ParticleModel:
+    """A particle posterior over profile, recruitment and noise; the default model.
+
+    Args:
+        beliefs: the prior over people.
+        particles: how many particles a person has.
+        thinned: how many of them represent the posterior where every candidate ISI is scored.
+        moves: sweeps of Markov chain moves after each trial.
+        max_trial_moves: sweeps times trials are at most this many, so that a tell stays fast late in a session.
+        min_ess: effective sample size, as a share of the particles, below which they are resampled.
+        detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
+        response_threshold_mv: what a told response is known to be above [mV].
+        device: torch device.
+
+    Raises:
+        InvalidValueError: fewer than two particles, or a number that cannot be.
+    """
+
+    beliefs: Prior = field(default_factory=Prior)
+    particles: int = 1000
+    thinned: int = 256
+    moves: int = 3
+    max_trial_moves: int = 240
+    min_ess: float = 0.5
+    detection_limit_mv: float = 0.005
+    response_threshold_mv: float = 0.02
+    device: str = "cpu"
+
+    def __post_init__(self) -> None:
+        # Half of the particles move at a time, so that neither half may be empty.
+        for name, least in (("particles", 2), ("thinned", 1), ("moves", 0), ("max_trial_moves", 0)):
+            value = getattr(self, name)
+            if not isinstance(value, int) or value < least:
+                raise InvalidValueError(f"{name} must be a whole number", got=value, expected=f"{least} or more")
+        if not 0.0 <= self.min_ess <= 1.0:
+            raise InvalidValueError("min_ess is a share of the particles", got=self.min_ess, expected="0–1")
+        if not (self.detection_limit_mv > 0 and self.response_threshold_mv > 0):
+            raise InvalidValueError(
+                "a detection limit and a threshold are positive",
+                got=(self.detection_limit_mv, self.response_threshold_mv),
+            )
+
+    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
+        """The posterior before the first trial."""
+        latents = self.beliefs.sample(people, self.particles, step_generator(self.device, seed, 0))
+        size, device = latents.present.shape, latents.present.device
+        return ParticlePosterior(
+            model=self,
+            space=space,
+            seed=seed,
+            latents=latents,
+            log_weights=torch.full(size, -math.log(self.particles), device=device),
+            log_likelihood=torch.zeros(size, device=device),
+            evidence=torch.zeros(people, device=device),
+            history=History.empty(people, device),
+        )
+
+    def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
+        """The posterior after one more trial."""
+        after = self.reweighted(posterior, observation)
+        generator = step_generator(self.device, posterior.seed, after.trials)
+        after = self._resampled(after, generator)
+        mover = Mover(self.beliefs, posterior.space, after.history, generator)
+        latents, log_likelihood = after.latents, after.log_likelihood
+        for _ in range(self._sweeps(after.trials)):
+            latents, log_likelihood = mover.sweep(latents, log_likelihood)
+        return replace(after, latents=latents, log_likelihood=log_likelihood)
+
+    def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
+        """Draw one person from the prior, and a MEP at each ISI; see `SimulatesPeople`."""
+        generator = step_generator(self.device, seed, SIMULATED)
+        person = self.beliefs.person(self.beliefs.sample(1, 1, generator), space)
+        isis_ms = torch.as_tensor(isi_ms, dtype=torch.float32, device=self.device).unsqueeze(0)
+        log_mep = draw_log_mep(person.response, levels(person, isis_ms), generator)
+        grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=torch.float32, device=self.device)
+        mask = PersonSample(person).window_masks(grid_ms)[0, 0]
+        window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
+        return SimulatedPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
+
+    def reweighted(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
+        """The same particles, weighted by one more trial as well."""
+        trial = observed(observation, self.detection_limit_mv, self.response_threshold_mv).to(
+            self.device, torch.float32
+        )
+        gain = total_log_likelihood(posterior.person, trial)
+        return replace(
+            posterior,
+            log_weights=torch.log_softmax(posterior.log_weights + gain, dim=-1),
+            log_likelihood=posterior.log_likelihood + gain,
+            evidence=posterior.evidence + torch.logsumexp(posterior.log_weights + gain, dim=-1),
+            history=posterior.history.appended(trial),
+        )
+
+    def _sweeps(self, trials: int) -> int:
+        """As many sweeps as asked for, but fewer where the history has become long."""
+        return min(self.moves, max(1, self.max_trial_moves // max(1, trials)))
+
+    def _resampled(self, posterior: ParticlePosterior, generator: torch.Generator) -> ParticlePosterior:
+        """Resample those people whose effective sample size has fallen; nobody else notices."""
+        # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
+        shuffled = torch.randperm(self.particles, generator=generator, device=generator.device)
+        ess = torch.exp(-torch.logsumexp(2.0 * posterior.log_weights, dim=-1, keepdim=True))
+        worn = ess < self.min_ess * self.particles
+        if not bool(worn.any()):
+            return posterior
+        kept = torch.arange(self.particles, device=shuffled.device)
+        picks = torch.where(worn, systematic(posterior.log_weights, self.particles)[:, shuffled], kept)
+        return replace(
+            posterior,
+            latents=Latents(*(_take(x, picks) for x in posterior.latents)),
+            log_weights=torch.where(worn, -math.log(self.particles), posterior.log_weights),
+            log_likelihood=_take(posterior.log_likelihood, picks),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ParticlePosterior:
+    """What is believed about b people.
+
+    Args:
+        model: the model's settings.
+        space: the design space.
+        seed: seed of all randomness.
+        latents: the particles, fields of shape (b, p).
+        log_weights: their normalised log weights, shape (b, p).
+        log_likelihood: of the history under each of them, shape (b, p).
+        evidence: log marginal likelihood of the history [nat], shape (b,).
+        history: the trials so far.
+    """
+
+    model: ParticleModel
+    space: DesignSpace
+    seed: int
+    latents: Latents
+    log_weights: Tensor
+    log_likelihood: Tensor
+    evidence: Tensor
+    history: History
+
+    @property
+    def trials(self) -> int:
+        """How many trials of each person it has been told."""
+        return self.history.isi_ms.shape[-1]
+
+    @cached_property
+    def person(self) -> Person:
+        """What the particles mean."""
+        return self.model.beliefs.person(self.latents, self.space)
+
+    @cached_property
+    def _thinned(self) -> PersonSample:
+        picks = systematic(self.log_weights, self.model.thinned)
+        return PersonSample(_each(self.person, lambda x: _take(x, picks)))
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
+        return self._thinned.outcome_mass(isi_ms.to(self.log_weights.device))
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows; see `SamplesWindows`."""
+        return self._thinned.window_masks(isi_ms.to(self.log_weights.device))
+
+    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+        """Sampled profiles; see `SamplesProfiles`."""
+        return self._thinned.expected_mep_mv(isi_ms.to(self.log_weights.device))
+
+    def baselines_mv(self) -> Tensor:
+        """Sampled baselines; see `SamplesProfiles`."""
+        return self._thinned.baselines_mv()
+
+    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> ParticlePosterior:
+        """The same particles, weighted by an imagined trial; see `Conditions`."""
+        unknown = torch.full_like(mep_mv, torch.nan)
+        imagined = Observation(isi_ms, mep_mv, isi_sd_ms=torch.zeros_like(mep_mv), response=unknown)
+        return self.model.reweighted(self, imagined)
+
+    def log_evidence(self) -> Tensor:
+        """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
+        return self.evidence
+
+    def estimate(self, person: int = 0) -> WindowEstimate:
+        """The window of one person."""
+        one = slice(person, person + 1)
+        picks = systematic(self.log_weights[one], self.model.particles)
+        sample = PersonSample(_each(self.person, lambda x: _take(x[one], picks)))
+        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=picks.device)
+        thinned = PersonSample(_each(self._thinned.person, lambda x: x[one]))
+        profiles_mv = thinned.expected_mep_mv(profile_grid(self.space).to(picks.device))
+        return sampled_estimate(sample.window_masks(grid)[0], profiles_mv[0], self.space)
+
+
+def _take(values: Tensor, picks: Tensor) -> Tensor:
+    index = picks.unsqueeze(-1).expand(-1, -1, values.shape[-1]) if values.dim() > picks.dim() else picks
+    return torch.gather(values, 1, index)
+
+
+def _each(person: Person, function: Callable[[Tensor], Tensor]) -> Person:
+    """The same of every field of a person."""
+    shape, response = map(function, person.shape), map(function, person.response)
+    return Person(Shape(*shape), Response(*response), function(person.present))

@@ -1,0 +1,240 @@
+"""What is believed about a person before the first trial, and where each belief comes from.
+
+A particle is a vector of standard normal latents and three discrete kinds. This module maps them to the parameters of
+`shapes` and `response`, so that the prior is the same simple thing whatever the parameters' ranges are, and moves can
+be made between kinds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple, Self
+
+import torch
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.models.particles.response import NoiseKind, Response
+from isiw.models.particles.shapes import Shape, ShapeKind
+from isiw.models.protocol import Tensor
+
+__all__ = ["LATENTS", "Latents", "Person", "Prior", "start_ms"]
+
+LATENTS = ("start", "width", "form", "log_floor", "floor_log_sd", "log_ratio", "spread", "output", "boost", "rest")
+"""Names of the latents, in order."""
+
+SHAPE_LATENTS = slice(0, 3)
+NOISE_LATENTS = slice(5, 10)
+
+
+_SCALES = (
+    "hit_delay_ms",
+    "width_ms",
+    "floor_mv",
+    "floor_log_sd",
+    "gain_ratio",
+    "cv",
+    "recruitment_ratio",
+    "input_sd",
+    "output_sd",
+    "boost",
+)
+
+
+class Latents(NamedTuple):
+    """Particles of b people.
+
+    Args:
+        z: standard normal latents in the order of `LATENTS`, shape (b, p, d).
+        shape: one of `ShapeKind`, shape (b, p).
+        noise: one of `NoiseKind`, shape (b, p).
+        present: whether there is any facilitation, shape (b, p).
+    """
+
+    z: Tensor
+    shape: Tensor
+    noise: Tensor
+    present: Tensor
+
+
+class Person(NamedTuple):
+    """What the latents mean: a profile, a response, and whether there is any facilitation; fields (b, p)."""
+
+    shape: Shape
+    response: Response
+    present: Tensor
+
+
+@dataclass(frozen=True)
+class Prior:
+    """The prior over people.
+
+    Args:
+        p_window: probability that there is any facilitation.
+        p_shape: probabilities of Gaussian, skewed, flat-topped and two-peaked profiles. Most profiles pass a normality
+            test (dissertation, 4.2: 8 of 11), the others are described in its outlook (8.1).
+        p_noise: probabilities of constant-CV noise, the same with missing responses, and a noisy recruitment curve.
+        start_ms: where windows start after the impact [ms], uniform between these.
+        hit_delay_ms: mean and SD of the hit delay of a person unknown [ms]; 172–188 ms measured (dissertation, 4.2).
+        p_anywhere: probability that a window starts anywhere in the range instead, for stimulators unlike that one.
+        width_ms: median and log SD of the width; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
+        floor_mv: median, log SD and cubic tail of the EMG floor; 6–20 µV measured. The tail reaches a factor of ten at
+            2.4 SDs, so that rigs with another gain are learnt rather than pulled to the usual floor.
+        floor_log_sd: median and log SD of the floor's own log SD; 0.12–0.35.
+        gain_ratio: median and log SD of the best expected MEP over the floor; MEPs peak at 0.03–0.3 mV (ibid., 4.2).
+        cv: median and log SD of the constant CV.
+        max_probability: mean and SD, in logits, of the response probability at the best ISI; often about one half
+            (dissertation, Fig. 6.5).
+        recruitment_ratio: median and log SD of the largest MEP over the floor; 0.1–0.25 mV in forearm muscles.
+        input_sd: median and log SD of the input noise in logits: k sigma_x, 0.3 × 5–9 % RMT.
+        output_sd: median and log SD of the output noise, natural log; 0.3–0.5.
+        boost: median and log SD of the boost in logits: k times 5–18 % RMT.
+        rest: mean and SD of the drive at rest in logits: k (90 % RMT − x50).
+
+    Raises:
+        InvalidValueError: probabilities that are none or do not sum to one, medians or SDs that are not positive.
+    """
+
+    p_window: float = 0.75
+    p_shape: tuple[float, float, float, float] = (0.68, 0.12, 0.08, 0.12)
+    p_noise: tuple[float, float, float] = (0.4, 0.15, 0.45)
+    start_ms: tuple[float, float] = (0.0, 125.0)
+    hit_delay_ms: tuple[float, float] = (180.0, 7.0)
+    p_anywhere: float = 0.2
+    width_ms: tuple[float, float] = (100.0, 0.5)
+    floor_mv: tuple[float, float, float] = (0.009, 0.35, 0.12)
+    floor_log_sd: tuple[float, float] = (0.24, 0.4)
+    gain_ratio: tuple[float, float] = (7.0, 0.7)
+    cv: tuple[float, float] = (0.62, 0.3)
+    max_probability: tuple[float, float] = (0.2, 0.7)
+    recruitment_ratio: tuple[float, float] = (16.0, 0.5)
+    input_sd: tuple[float, float] = (2.1, 0.25)
+    output_sd: tuple[float, float] = (0.39, 0.25)
+    boost: tuple[float, float] = (3.3, 0.45)
+    rest: tuple[float, float] = (-4.6, 0.6)
+
+    def __post_init__(self) -> None:
+        for name in ("p_window", "p_anywhere"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise InvalidValueError(f"{name} must be a probability", got=getattr(self, name))
+        for name, kinds in (("p_shape", ShapeKind), ("p_noise", NoiseKind)):
+            shares = getattr(self, name)
+            if len(shares) != len(kinds) or not min(shares) >= 0 or not math.isclose(sum(shares), 1.0, abs_tol=1e-6):
+                raise InvalidValueError(
+                    f"{name} must hold a probability for each kind", got=shares, expected=f"{len(kinds)} that sum to 1"
+                )
+        for name in _SCALES:
+            if not all(math.isfinite(value) and value > 0 for value in getattr(self, name)):
+                raise InvalidValueError(f"{name} must be positive", got=getattr(self, name))
+        if not self.start_ms[0] < self.start_ms[1]:
+            raise InvalidValueError("start_ms is empty", got=self.start_ms, expected="earliest < latest")
+
+    @classmethod
+    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
+        """The prior that has these settings; what is not among them is as by default.
+
+        Raises:
+            InvalidValueError: a setting that the prior does not have.
+        """
+        known = [f.name for f in fields(cls)]
+        unknown = sorted(set(settings) - set(known))
+        if unknown:
+            raise InvalidValueError("the prior has no such setting", got=unknown, expected=", ".join(known))
+        values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
+        return cls(**values)
+
+    def sample_kinds(self, size: tuple[int, ...], generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
+        """Shape, noise and presence of new particles, each of `size`."""
+        uniform = torch.rand((3, *size), generator=generator, device=generator.device)
+        kinds = (
+            torch.bucketize(u, torch.tensor(p, device=u.device).cumsum(0)[:-1])
+            for u, p in zip(uniform[:2], (self.p_shape, self.p_noise), strict=True)
+        )
+        return next(kinds), next(kinds), uniform[2] < self.p_window
+
+    def sample(self, people: int, particles: int, generator: torch.Generator) -> Latents:
+        """Particles of the prior."""
+        z = torch.randn((people, particles, len(LATENTS)), generator=generator, device=generator.device)
+        return Latents(z, *self.sample_kinds((people, particles), generator))
+
+    def person(self, latents: Latents, space: DesignSpace) -> Person:
+        """What particles mean in a design space."""
+        z = dict(zip(LATENTS, latents.z.unbind(-1), strict=True))
+        shape = Shape(
+            latents.shape, self._start(z["start"], space), _log_normal(z["width"], self.width_ms), _even(z["form"])
+        )
+        recruits = latents.noise == NoiseKind.RECRUITMENT
+        response = Response(
+            kind=latents.noise,
+            log_floor=self._log_floor(z["log_floor"]),
+            floor_log_sd=_log_normal(z["floor_log_sd"], self.floor_log_sd),
+            log_ratio=torch.log(
+                torch.where(
+                    recruits,
+                    _log_normal(z["log_ratio"], self.recruitment_ratio),
+                    _log_normal(z["log_ratio"], self.gain_ratio),
+                )
+            ),
+            spread=torch.where(recruits, _log_normal(z["spread"], self.input_sd), _log_normal(z["spread"], self.cv)),
+            output_log_sd=_log_normal(z["output"], self.output_sd),
+            boost=_log_normal(z["boost"], self.boost),
+            rest=self.rest[0] + self.rest[1] * z["rest"],
+            max_probability=torch.sigmoid(self.max_probability[0] + self.max_probability[1] * z["output"]),
+        )
+        return Person(shape, response, latents.present)
+
+    def _log_floor(self, z: Tensor) -> Tensor:
+        median_mv, log_sd, tail = self.floor_mv
+        return math.log(median_mv) + log_sd * z + tail * z**3
+
+    def _start(self, z: Tensor, space: DesignSpace) -> Tensor:
+        return start_ms(z, space, self.start_ms, self.hit_delay_ms, self.p_anywhere)
+
+
+def start_ms(
+    z: Tensor,
+    space: DesignSpace,
+    after_impact_ms: tuple[float, float],
+    hit_delay_ms: tuple[float, float],
+    p_anywhere: float,
+) -> Tensor:
+    """Start of a window in a space [ms] from a standard normal latent: the prior's quantile at its probability.
+
+    Args:
+        z: standard normal latents, any shape.
+        space: the design space.
+        after_impact_ms: the start is uniform between these, counted from the impact [ms].
+        hit_delay_ms: mean and SD of the impact on the clock of the valve [ms].
+        p_anywhere: probability that the start lies anywhere in the range instead, or up to 50 ms before it.
+    """
+    shift, blur = hit_delay_ms if space.reference == "valve" else (0.0, 1.0)
+    low, high = (edge + shift for edge in after_impact_ms)
+    knots = torch.linspace(space.low_ms - 50.0, space.high_ms, 512, device=z.device, dtype=z.dtype)
+    edges = [torch.special.ndtr((knots - edge) / blur) * (knots - edge) for edge in (low, high)]
+    bumps = [torch.exp(-0.5 * ((knots - edge) / blur) ** 2) * blur / math.sqrt(2 * math.pi) for edge in (low, high)]
+    informed = (edges[0] + bumps[0] - edges[1] - bumps[1]) / (high - low)
+    informed = (informed - informed[0]) / (informed[-1] - informed[0]).clamp_min(1e-6)
+    anywhere = (knots - knots[0]) / (knots[-1] - knots[0])
+    cdf = (1 - p_anywhere) * informed + p_anywhere * anywhere
+    return _interpolate(torch.special.ndtr(z), cdf, knots)
+
+
+def _interpolate(x: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
+    right = torch.searchsorted(xs, x.contiguous()).clamp(1, len(xs) - 1)
+    left = right - 1
+    share = (x - xs[left]) / (xs[right] - xs[left]).clamp_min(1e-12)
+    between: Tensor = ys[left] + share.clamp(0.0, 1.0) * (ys[right] - ys[left])
+    return between
+
+
+def _log_normal(z: Tensor, median_and_log_sd: tuple[float, float]) -> Tensor:
+    median, log_sd = median_and_log_sd
+    return median * torch.exp(log_sd * z)
+
+
+def _even(z: Tensor) -> Tensor:
+    """Uniform in -1..1."""
+    even: Tensor = 2.0 * torch.special.ndtr(z) - 1.0
+    return even

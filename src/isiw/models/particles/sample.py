@@ -1,0 +1,101 @@
+"""What equally weighted particles say about the next MEP and about the window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import torch
+
+from isiw.models.particles.evidence import in_pieces, levels
+from isiw.models.particles.prior import Person
+from isiw.models.particles.response import NODES, evoked_mean, outcome_density
+from isiw.models.protocol import Tensor
+from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
+
+__all__ = ["OUTCOMES", "PersonSample", "table_levels", "table_weights"]
+
+LEVELS = 12
+"""Facilitations at which responses are worked out; what lies between is interpolated."""
+
+OUTCOMES = 32
+"""Values of the log MEP on which predictive distributions live."""
+
+
+def table_levels(device: torch.device) -> Tensor:
+    """Facilitations at which tables are worked out, denser where responses begin, shape (l,)."""
+    return torch.linspace(0.0, 1.0, LEVELS, device=device).square()
+
+
+def table_weights(level: Tensor) -> Tensor:
+    """Weights of the tables' levels that interpolate at each facilitation (b, s, t), shape (b, s, t, l)."""
+    position = level.clamp(0.0, 1.0).sqrt() * (LEVELS - 1)
+    return (1.0 - (position.unsqueeze(-1) - torch.arange(LEVELS, device=level.device)).abs()).clamp_min(0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PersonSample:
+    """Equally weighted particles, fields of shape (b, s), and what they say about the next MEP and the window."""
+
+    person: Person
+
+    @cached_property
+    def _levels(self) -> Tensor:
+        return table_levels(self.person.present.device)[None, None, :]
+
+    @cached_property
+    def _evoked(self) -> Tensor:
+        """Expected MEP above the floor at the tables' levels, in floors, shape (b, s, l)."""
+        return evoked_mean(self.person.response, self._levels)
+
+    @cached_property
+    def edge_level(self) -> Tensor:
+        """Facilitation at a window's edge by the 0.135 rule; above 1 where there is no window, shape (b, s)."""
+        response = self.person.response
+        excess = self._evoked - self._evoked[..., :1]
+        peak = excess[..., -1]
+        least_mv = (MIN_EXCESS_OF_BASELINE * self.baselines_mv()).clamp_min(MIN_EXCESS_MV)
+        enough = peak * response.log_floor.exp() >= least_mv
+        share = (excess / peak.clamp_min(1e-12).unsqueeze(-1)).contiguous()
+        right = torch.searchsorted(share, torch.full_like(share[..., :1], EDGE_LEVEL)).clamp(1, LEVELS - 1)
+        low, high = share.gather(-1, right - 1), share.gather(-1, right)
+        position = (right - 1 + (EDGE_LEVEL - low) / (high - low).clamp_min(1e-12)).squeeze(-1) / (LEVELS - 1)
+        return torch.where(enough & self.person.present, position.square(), 2.0)
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows as 0 or 1, shape (b, s, t)."""
+        level = levels(self.person, isi_ms.unsqueeze(0))
+        return (level >= self.edge_level.unsqueeze(-1)).to(level.dtype)
+
+    def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
+        """Expected MEP [mV], shape (b, s, t)."""
+        evoked = (table_weights(levels(self.person, isi_ms.unsqueeze(0))) @ self._evoked.unsqueeze(-1)).squeeze(-1)
+        return self._with_floor_mv(evoked)
+
+    def baselines_mv(self) -> Tensor:
+        """Expected MEP without a tap [mV], shape (b, s)."""
+        return self._with_floor_mv(self._evoked[..., :1]).squeeze(-1)
+
+    def _with_floor_mv(self, evoked: Tensor) -> Tensor:
+        """From an expected MEP above the floor, in floors, to mV, shape (b, s, ...)."""
+        response = self.person.response
+        rest = torch.exp(0.5 * response.floor_log_sd.square()).unsqueeze(-1)
+        return response.log_floor.exp().unsqueeze(-1) * (evoked + rest)
+
+    @cached_property
+    def _outcome_table(self) -> Tensor:
+        """Probability of each outcome at the tables' levels, shape (b, s, l, y)."""
+        response = self.person.response
+        top = response.log_floor + torch.log1p(self._evoked.amax(-1))
+        low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
+        high = torch.quantile(top, 0.95, dim=-1) + 1.5
+        share = torch.linspace(0.0, 1.0, OUTCOMES, device=low.device)
+        log_mep = (low.unsqueeze(-1) + share * (high - low).unsqueeze(-1)).unsqueeze(-2)
+        density = in_pieces(
+            lambda r, grid: outcome_density(r, self._levels, grid), response, (log_mep,), LEVELS * OUTCOMES * NODES
+        )
+        return density / density.sum(-1, keepdim=True)
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
+        return table_weights(levels(self.person, isi_ms.unsqueeze(0))) @ self._outcome_table

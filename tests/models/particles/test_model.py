@@ -1,0 +1,273 @@
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from isiw.design import VALVE_SPACE
+from isiw.errors import InvalidValueError
+from isiw.metrics import covers
+from isiw.models.particles import ParticleModel, ParticlePosterior
+from isiw.models.particles.evidence import History, levels, total_log_likelihood
+from isiw.models.particles.moves import Mover
+from isiw.models.particles.prior import Person, Prior
+from isiw.models.particles.response import log_likelihood
+from isiw.models.particles.sample import PersonSample
+from isiw.models.protocol import (
+    Observation,
+    Posterior,
+    PredictsOutcomes,
+    ResponseModel,
+    SamplesWindows,
+    SimulatesPeople,
+)
+from isiw.models.streams import systematic
+from isiw.subjects import SimulatedSubject, cohort
+from isiw.window import Window
+
+GRID = torch.arange(0.0, 501.0, 5.0)
+
+
+def observation(isi_ms: list[float], mep_mv: list[float], response: list[float] | None = None) -> Observation:
+    unknown = [math.nan] * len(isi_ms)
+    columns = (isi_ms, mep_mv, [0.0] * len(isi_ms), response or unknown)
+    return Observation(*(torch.tensor(column) for column in columns))
+
+
+def after(model: ParticleModel, trials: list[tuple[float, float]], seed: int = 1) -> ParticlePosterior:
+    posterior = model.prior(VALVE_SPACE, seed)
+    for isi_ms, mep_mv in trials:
+        posterior = model.update(posterior, observation([isi_ms], [mep_mv]))
+    return posterior
+
+
+def sampled_meps_mv(person: Person, isi_ms: float, generator: torch.Generator) -> list[float]:
+    """One MEP of each person, by inversion of its distribution function on a fine grid."""
+    ends = torch.linspace(math.log(1e-4), math.log(20.0), 1500)
+    level = levels(person, torch.tensor([[isi_ms]])).expand(-1, -1, len(ends))
+    high = ends.expand(len(level), 1, -1)
+    below = log_likelihood(person.response, level, torch.full_like(high, -torch.inf), high).exp()
+    picks = torch.searchsorted(below[:, 0].contiguous(), torch.rand((len(level), 1), generator=generator))
+    return ends[picks.clamp_max(len(ends) - 1)].exp()[:, 0].tolist()
+
+
+def evenly(subject: SimulatedSubject, n: int, seed: int = 0) -> list[tuple[float, float]]:
+    responder = subject.begin(seed)
+    order = np.random.default_rng(seed).permutation(np.linspace(120, 460, n).round())
+    return [(isi_ms, responder.respond(isi_ms, "valve").mep_mv) for isi_ms in order.tolist()]
+
+
+def test_model_and_posterior_keep_their_protocols() -> None:
+    model = ParticleModel(particles=20)
+    posterior = model.prior(VALVE_SPACE, 0)
+    assert isinstance(model, ResponseModel)
+    assert isinstance(model, SimulatesPeople)
+    for protocol in (Posterior, PredictsOutcomes, SamplesWindows):
+        assert isinstance(posterior, protocol)
+
+
+def test_an_update_changes_no_earlier_posterior() -> None:
+    model = ParticleModel(particles=200)
+    before = model.prior(VALVE_SPACE, 3)
+    latents = before.latents.z.clone()
+    model.update(before, observation([250.0], [0.08]))
+    assert before.trials == 0
+    assert torch.equal(before.latents.z, latents)
+
+
+def test_the_same_seed_and_trials_give_the_same_posterior() -> None:
+    trials = [(250.0, 0.08), (300.0, 0.02), (100.0, 0.009)]
+    first, second = (after(ParticleModel(particles=200), trials).estimate() for _ in range(2))
+    assert first.probability == second.probability
+    np.testing.assert_array_equal(first.edge_samples_ms, second.edge_samples_ms)
+
+
+def test_people_in_one_batch_do_not_see_each_other() -> None:
+    # The first person's particles wear out or not; what the second is told must not change when.
+    model = ParticleModel(particles=200)
+    calm = wild = model.prior(VALVE_SPACE, 3, people=2)
+    for trial, mep_mv in enumerate((0.010, 0.009, 0.011, 0.010)):
+        isi_ms = 20.0 + 10.0 * trial
+        calm = model.update(calm, observation([isi_ms, isi_ms], [mep_mv, 0.010]))
+        wild = model.update(wild, observation([isi_ms, 280.0], [mep_mv, 0.3 * (trial + 1)]))
+        assert torch.equal(calm.latents.z[0], wild.latents.z[0])
+        assert torch.equal(calm.log_weights[0], wild.log_weights[0])
+    assert not torch.equal(calm.latents.z[1], wild.latents.z[1])
+    assert calm.estimate(0).probability == wild.estimate(0).probability
+
+
+def test_an_uncertain_isi_is_integrated_out() -> None:
+    # The likelihood must be the average over the ISIs that may have come about, here by brute force on 400 quantiles.
+    generator = torch.Generator().manual_seed(4)
+    prior = Prior(p_window=1.0)
+    person = prior.person(prior.sample(1, 400, generator), VALVE_SPACE)
+    isi_ms, isi_sd_ms, mep_mv = 230.0, 3.0, 0.05
+
+    def trial(isi: torch.Tensor, sd: float) -> History:
+        log_mep = torch.full_like(isi, math.log(mep_mv))
+        return History(isi, torch.full_like(isi, sd), log_mep, log_mep)
+
+    got = total_log_likelihood(person, trial(torch.tensor([[isi_ms]]), isi_sd_ms))
+    quantiles = torch.special.ndtri((torch.arange(400) + 0.5) / 400)
+    by_isi = [total_log_likelihood(person, trial(torch.tensor([[isi_ms + isi_sd_ms * q]]), 0.0)) for q in quantiles]
+    expected = torch.logsumexp(torch.stack(by_isi), dim=0) - math.log(400)
+    # Three nodes are exact up to the fifth power of the SD; only the steepest flanks differ.
+    assert (got - expected).abs().median() < 0.005
+    assert (got - expected).abs().quantile(0.99) < 0.1
+
+
+def test_moves_without_trials_leave_the_prior_as_it_is() -> None:
+    # 8,000 particles, 20 sweeps: means within 0.05 and SDs within 0.04 of the standard normal (over 4 standard errors),
+    # kinds within 0.025 of their probabilities.
+    prior = Prior()
+    generator = torch.Generator().manual_seed(2)
+    latents = prior.sample(1, 8000, generator)
+    mover = Mover(prior, VALVE_SPACE, History.empty(1, torch.device("cpu")), generator)
+    log_likelihood = torch.zeros(1, 8000)
+    for _ in range(20):
+        latents, log_likelihood = mover.sweep(latents, log_likelihood)
+    assert latents.z[0].mean(0).abs().max() < 0.05
+    assert (latents.z[0].std(0) - 1).abs().max() < 0.04
+    assert abs(latents.present.float().mean().item() - prior.p_window) < 0.025
+    for kinds, probabilities in ((latents.shape, prior.p_shape), (latents.noise, prior.p_noise)):
+        shares = torch.bincount(kinds[0], minlength=len(probabilities)) / 8000
+        assert (shares - torch.tensor(probabilities)).abs().max() < 0.025
+
+
+def test_moved_particles_agree_with_plain_importance_sampling() -> None:
+    # The reference weights 60,000 particles of the prior by the likelihood of all trials at once.
+    trials = evenly(cohort("gaussian", 3, 0)[2], 6)[:4]
+    reference = after(ParticleModel(particles=60_000, moves=0, min_ess=0.0), trials)
+    ess = torch.exp(-torch.logsumexp(2 * reference.log_weights, -1)).item()
+    assert ess > 500
+    expected = reference.estimate()
+    got = [after(ParticleModel(particles=1000), trials, seed).estimate() for seed in range(4)]
+    scale = np.std(np.clip(expected.edge_samples_ms, -50, 550), axis=0)
+    medians = np.median([np.median(e.edge_samples_ms, axis=0) for e in got], axis=0)
+    assert np.abs((medians - [expected.start_ms, expected.end_ms]) / scale).max() < 0.2
+    assert np.mean([e.probability for e in got]) == pytest.approx(expected.probability, abs=0.03)
+
+
+def test_the_order_of_trials_matters_little() -> None:
+    trials = evenly(cohort("gaussian", 3, 0)[2], 16)
+    forth, back = (after(ParticleModel(), order).estimate() for order in (trials, trials[::-1]))
+    scale = np.std(np.clip(forth.edge_samples_ms, -50, 550), axis=0)
+    gap = np.abs([forth.start_ms - back.start_ms, forth.end_ms - back.end_ms])
+    assert (gap < 0.5 * scale + 1).all()
+
+
+def test_a_clear_responder_is_found_and_a_silent_person_is_not_given_a_window() -> None:
+    clear = after(ParticleModel(), evenly(cohort("gaussian", 3, 0)[2], 24)).estimate()
+    silent = after(ParticleModel(), evenly(cohort("nonresponder", 1, 0)[0], 24)).estimate()
+    assert clear.probability > 0.95
+    assert clear.window is not None
+    assert silent.probability < 0.5
+    assert silent.window is None
+
+
+@pytest.mark.parametrize("factor", [10.0, 1 / 3])
+def test_the_unit_of_the_amplitude_is_learnt(factor: float) -> None:
+    # The prior of the floor pulls a little: by less than a posterior SD, averaged over three seeds.
+    trials = evenly(cohort("gaussian", 3, 0)[2], 20)
+    scaled_trials = [(isi_ms, factor * mep_mv) for isi_ms, mep_mv in trials]
+    usual, scaled = (
+        [after(ParticleModel(), data, seed).estimate() for seed in range(3)] for data in (trials, scaled_trials)
+    )
+    edges = [
+        np.mean([np.median(e.edge_samples_ms, axis=0) for e in estimates], axis=0) for estimates in (usual, scaled)
+    ]
+    assert min(e.probability for e in scaled) > 0.9
+    assert (np.abs(edges[0] - edges[1]) < np.std(usual[0].edge_samples_ms, axis=0)).all()
+
+
+@pytest.mark.parametrize(
+    "trials",
+    [
+        [(250.0, 0.02)] * 20,
+        [(250.0, 0.0)] * 20,
+        [(100.0, 0.0), (300.0, 0.0)] * 10,
+        [(250.0, 0.01), (300.0, 50.0), (200.0, 0.01)],
+        [(0.0, 0.01), (500.0, 0.3)] * 5,
+        [(-10.0, 0.01), (510.0, 0.02)],
+    ],
+)
+def test_data_that_break_things_give_finite_beliefs(trials: list[tuple[float, float]]) -> None:
+    posterior = after(ParticleModel(particles=300), trials)
+    estimate = posterior.estimate()
+    assert 0 <= estimate.probability <= 1
+    assert torch.isfinite(posterior.log_likelihood).all()
+    mass = posterior.outcome_mass(GRID)
+    assert torch.isfinite(mass).all()
+    torch.testing.assert_close(mass.sum(-1), torch.ones_like(mass[..., 0]))
+
+
+def test_tms_alone_teaches_the_baseline_and_nothing_about_the_window() -> None:
+    model = ParticleModel()
+    posterior = model.prior(VALVE_SPACE, 1)
+    before = posterior.person.response.log_floor.std().item()
+    for mep_mv in (0.009, 0.011, 0.010, 0.008):
+        posterior = model.update(posterior, observation([math.nan], [mep_mv]))
+    floors = posterior.person.response.log_floor[0, systematic(posterior.log_weights, 1000)[0]]
+    assert floors.std().item() < before / 3
+    assert abs(posterior.estimate().probability - Prior().p_window) < 0.08
+
+
+def test_responses_seen_or_not_are_learnt_from() -> None:
+    model = ParticleModel()
+    posterior = model.prior(VALVE_SPACE, 1)
+    for isi_ms in (190.0, 230.0, 270.0, 310.0, 350.0, 390.0, 430.0) * 3:
+        seen = float(240 <= isi_ms <= 360)
+        posterior = model.update(posterior, observation([isi_ms], [math.nan], [seen]))
+    estimate = posterior.estimate()
+    assert estimate.window is not None
+    assert 190 < estimate.window.start_ms < 270
+    assert 310 < estimate.window.end_ms < 430
+
+
+def test_systematic_picks_are_as_frequent_as_their_weights() -> None:
+    weights = torch.tensor([[0.1, 0.6, 0.3]])
+    picks = systematic(weights.log(), 1000)
+    torch.testing.assert_close(torch.bincount(picks[0]) / 1000, weights[0], rtol=0, atol=1e-3)
+
+
+def test_people_of_its_own_have_windows_as_often_as_believed_and_meps_of_their_own() -> None:
+    # A small excess does not count as a window, so that a few less have one than believed.
+    model = ParticleModel()
+    isis_ms = np.array([math.nan, 250.0])
+    people = [model.simulate(VALVE_SPACE, seed, isis_ms) for seed in range(300)]
+    assert 0.66 < np.mean([person.window is not None for person in people]) < 0.82
+    np.testing.assert_array_equal(people[3].mep_mv, model.simulate(VALVE_SPACE, 3, isis_ms).mep_mv)
+    inside, outside = (
+        np.median([p.mep_mv[1] for p in people if p.window is not None and bool(p.window.mask([250.0])[0]) is there])
+        for there in (True, False)
+    )
+    assert inside > 2 * outside
+
+
+@pytest.mark.slow
+def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
+    # People drawn from the prior, whose MEPs are drawn from their own predictive distribution; 200 people, 20 trials at
+    # even ISIs. The 90 % intervals of 200 honest posteriors cover 0.83 to 0.96 (99.8 %).
+    generator = torch.Generator().manual_seed(11)
+    beliefs = Prior(p_window=1.0)
+    hidden = beliefs.person(beliefs.sample(200, 1, generator), VALVE_SPACE)
+    model = ParticleModel(beliefs=beliefs)
+    posterior = model.prior(VALVE_SPACE, 12, people=200)
+    isis_ms = torch.linspace(170, 440, 20)[torch.randperm(20, generator=generator)]
+    for isi_ms in isis_ms.tolist():
+        meps_mv = sampled_meps_mv(hidden, isi_ms, generator)
+        posterior = model.update(posterior, observation([isi_ms] * 200, meps_mv))
+    masks = PersonSample(hidden).window_masks(torch.tensor(VALVE_SPACE.grid_ms, dtype=torch.float32))[:, 0].numpy()
+    windows = [Window.from_mask(VALVE_SPACE.grid_ms, mask) for mask in masks]
+    pairs = [(posterior.estimate(i), window) for i, window in enumerate(windows) if window is not None]
+    covered = np.array([covers(estimate, window, VALVE_SPACE) for estimate, window in pairs])
+    assert len(covered) > 150
+    assert ((covered.mean(0) > 0.83) & (covered.mean(0) < 0.96)).all()
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"particles": 1}, {"particles": 2.5}, {"moves": -1}, {"min_ess": 1.5}, {"detection_limit_mv": 0.0}]
+)
+def test_a_model_that_cannot_be_is_refused(wrong) -> None:
+    with pytest.raises(InvalidValueError):
+        ParticleModel(**wrong)

@@ -1,0 +1,68 @@
+import pytest
+import torch
+
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.models.particles.prior import Prior
+
+MANY = 20_000
+
+
+def people(prior: Prior, space: DesignSpace):
+    generator = torch.Generator().manual_seed(1)
+    return prior.person(prior.sample(1, MANY, generator), space)
+
+
+@pytest.mark.parametrize(("space", "low_ms", "high_ms"), [(IMPACT_SPACE, 0.0, 125.0), (VALVE_SPACE, 180.0, 305.0)])
+def test_windows_start_soon_after_the_impact_and_sometimes_anywhere(
+    space: DesignSpace, low_ms: float, high_ms: float
+) -> None:
+    start = people(Prior(p_anywhere=0.2), space).shape.start_ms[0]
+    near = ((start > low_ms - 15) & (start < high_ms + 15)).float().mean().item()
+    elsewhere = 0.2 * (1 - (high_ms - low_ms + 30) / (space.high_ms - space.low_ms + 50))
+    assert near == pytest.approx(1 - elsewhere, abs=0.02)
+    assert (start >= space.low_ms - 50).all()
+    assert (start <= space.high_ms).all()
+
+
+def test_a_prior_that_trusts_no_stimulator_is_even_over_the_range() -> None:
+    start = people(Prior(p_anywhere=1.0), VALVE_SPACE).shape.start_ms[0]
+    shares = torch.histc(start, 5, min=-50.0, max=500.0) / MANY
+    assert (shares - 0.2).abs().max() < 0.02  # three SDs of a share are 0.009
+
+
+def test_kinds_come_as_often_as_the_prior_says() -> None:
+    prior = Prior()
+    person = people(prior, VALVE_SPACE)
+    for kinds, probabilities in ((person.shape.kind, prior.p_shape), (person.response.kind, prior.p_noise)):
+        shares = torch.bincount(kinds[0], minlength=len(probabilities)) / MANY
+        assert (shares - torch.tensor(probabilities)).abs().max() < 0.015
+    assert person.present.float().mean().item() == pytest.approx(prior.p_window, abs=0.012)
+
+
+def test_a_prior_is_made_from_what_a_configuration_holds() -> None:
+    prior = Prior.from_settings({"p_window": 0.7, "width_ms": [80.0, 0.3]})
+    assert prior == Prior(p_window=0.7, width_ms=(80.0, 0.3))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"p_window": 2.0},
+        {"p_anywhere": float("nan")},
+        {"p_shape": (0.5, 0.5)},
+        {"p_noise": (0.5, 0.2, 0.2)},
+        {"p_noise": (1.2, -0.2, 0.0)},
+        {"width_ms": (float("nan"), 0.5)},
+        {"boost": (3.0, 0.0)},
+        {"start_ms": (100.0, 5.0)},
+    ],
+)
+def test_a_prior_that_cannot_be_is_refused(wrong) -> None:
+    with pytest.raises(InvalidValueError, match=next(iter(wrong))):
+        Prior(**wrong)
+
+
+def test_a_setting_that_the_prior_does_not_have_is_refused() -> None:
+    with pytest.raises(InvalidValueError, match="p_windov"):
+        Prior.from_settings({"p_windov": 0.5})
