@@ -9,10 +9,10 @@ from scipy.stats import kstest
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.metrics import covers, f1, true_edges_ms
+from isiw.metrics import covers, edge_ranks, f1
+from isiw.models.parametric import ParametricModel, ParametricPosterior
 from isiw.models.parametric import sampling as parametric_sampling
 from isiw.models.parametric.importance import Effort
-from isiw.models.parametric.model import ParametricModel, ParametricPosterior
 from isiw.models.parametric.prior import Likelihood, WindowPrior
 from isiw.models.protocol import (
     Conditions,
@@ -310,9 +310,7 @@ def test_ranks_of_the_true_edges_are_uniform_on_the_models_own_people(likelihood
         estimate = after(model, observations, seed).estimate()
         if truth.window is None:
             continue
-        edges = np.array(true_edges_ms(truth.window, VALVE_SPACE))
-        below, equal = ((f(estimate.edge_samples_ms, edges)).sum(0) for f in (np.less, np.equal))
-        ranks.append((below + rng.random(2) * (equal + 1)) / (len(estimate.edge_samples_ms) + 1))
+        ranks.append(edge_ranks(estimate, truth.window, VALVE_SPACE, rng))
         covered.append(covers(estimate, truth.window, VALVE_SPACE))
     assert len(ranks) > 120
     assert all(kstest(rank, "uniform").pvalue > 0.001 for rank in np.array(ranks).T)

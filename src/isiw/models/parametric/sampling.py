@@ -78,9 +78,11 @@ def sample_person(
     prior = torch.tensor([program.prior.p_window, 1.0 - program.prior.p_window], dtype=torch.double)
     log_joint = torch.tensor([model.log_evidence for model in models], dtype=torch.double) + prior.log()
     log_shares = torch.log_softmax(log_joint, dim=0)
-    kept, troubles = zip(
-        *(_flattened(model, float(share)) for model, share in zip(models, log_shares, strict=True)), strict=True
-    )
+    flattened = [
+        _flattened(model, float(share), which)
+        for model, share, which in zip(models, log_shares, ("with", "without"), strict=True)
+    ]
+    kept, troubles = zip(*flattened, strict=True)
     log_weights = torch.cat([model.log_weights + share for model, share in zip(kept, log_shares, strict=True)])
     picks = systematic(log_weights.unsqueeze(0), samples)[0]
     latents, present = torch.cat([model.points for model in kept])[picks], picks < len(kept[0].points)
@@ -92,7 +94,7 @@ def sample_person(
     return PersonDraws(latents, present, float(torch.logsumexp(log_joint, dim=0)), trouble or None)
 
 
-def _flattened(drawn: WeightedDraws, log_share: float) -> tuple[WeightedDraws, str | None]:
+def _flattened(drawn: WeightedDraws, log_share: float, which: str) -> tuple[WeightedDraws, str | None]:
     """The draws, their weights raised to the power below 1 that makes them worth enough; and why, if they were not."""
     before = worth(drawn.log_weights)
     if before >= LEAST_WORTH or log_share < math.log(0.01):
@@ -103,8 +105,8 @@ def _flattened(drawn: WeightedDraws, log_share: float) -> tuple[WeightedDraws, s
         flatter = replace(drawn, log_weights=torch.log_softmax(power * drawn.log_weights, dim=0))
         low, high = (power, high) if worth(flatter.log_weights) >= LEAST_WORTH else (low, power)
     return flatter, (
-        f"The importance sample is worth {before:.0f} independent draws only; its weights were flattened "
-        f"until it was worth {LEAST_WORTH:.0f}, so that the posterior is rough."
+        f"The sample {which} a window is worth {before:.0f} independent draws only; its weights were flattened until "
+        f"it was worth {LEAST_WORTH:.0f}, so that the posterior is rough."
     )
 
 
