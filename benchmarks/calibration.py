@@ -166,7 +166,7 @@ def main() -> None:
     text = "\n\n".join([f"- command: `{command}`\n- python {platform.python_version()}, {versions}", *parts])
     print(text)
     chosen.out.with_suffix(".md").write_text(f"{text}\n")
-    ranks = {name: json.loads(rows.to_json(orient="list", double_precision=4)) for name, rows in tables.items()}
+    ranks = {name: json.loads(rows.to_json(orient="split", double_precision=4)) for name, rows in tables.items()}
     chosen.out.with_suffix(".json").write_text(json.dumps({"command": command, "versions": versions, "rows": ranks}))
     figure(tables).savefig(chosen.out.with_suffix(".png"), dpi=110)
 
