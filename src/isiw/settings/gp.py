@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from isiw.models.beliefs import prior_with
 from isiw.models.gp import GaussianProcess
 from isiw.models.gp.prior import HyperparameterPrior
 from isiw.settings.common import PosteriorSettings
@@ -48,4 +49,4 @@ class GPSettings(PosteriorSettings):
         """The Gaussian process."""
         names = ("kernel", "noise", "transform", "hyperparameters", "floor", "samples")
         chosen = {name: getattr(self, name) for name in (*names, "detection_limit_mv", "zero_below_mv")}
-        return GaussianProcess(beliefs=HyperparameterPrior.from_settings(self.prior), **chosen)
+        return GaussianProcess(beliefs=prior_with(self.prior, HyperparameterPrior), **chosen)

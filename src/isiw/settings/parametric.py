@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from isiw.models.beliefs import prior_with
 from isiw.models.parametric import ParametricModel
 from isiw.models.parametric.prior import Likelihood, WindowPrior
 from isiw.settings.common import PosteriorSettings
@@ -37,7 +38,7 @@ class ParametricSettings(PosteriorSettings):
     def model(self) -> ParametricModel:
         """The parametric model."""
         return ParametricModel(
-            beliefs=WindowPrior.from_settings(self.prior),
+            beliefs=prior_with(self.prior, WindowPrior),
             likelihood=self.likelihood,
             samples=self.samples,
             detection_limit_mv=self.detection_limit_mv,

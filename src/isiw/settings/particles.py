@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from isiw.models.beliefs import prior_with
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.prior import Prior
 from isiw.settings.common import PosteriorSettings
@@ -35,7 +36,7 @@ class ParticleSettings(PosteriorSettings):
     def model(self) -> ParticleModel:
         """The particle model."""
         return ParticleModel(
-            beliefs=Prior.from_settings(self.prior),
+            beliefs=prior_with(self.prior, Prior),
             particles=self.particles,
             detection_limit_mv=self.detection_limit_mv,
             response_threshold_mv=self.response_threshold_mv,

@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from isiw.errors import InvalidValueError
+from isiw.models.beliefs import prior_with
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior
 
 
@@ -32,9 +33,9 @@ def test_hyperparameters_there_and_back() -> None:
 
 
 def test_settings_that_differ_are_told_by_name() -> None:
-    assert HyperparameterPrior.from_settings({"length_ms": [50, 0.3]}).length_ms == (50.0, 0.3)
+    assert prior_with({"length_ms": [50, 0.3]}, HyperparameterPrior).length_ms == (50.0, 0.3)
     with pytest.raises(InvalidValueError, match=r"no such setting.*length.*length_ms"):
-        HyperparameterPrior.from_settings({"length": (50.0, 0.3)})
+        prior_with({"length": (50.0, 0.3)}, HyperparameterPrior)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +52,7 @@ def test_settings_that_differ_are_told_by_name() -> None:
 )
 def test_a_prior_that_cannot_be_is_refused(settings: dict[str, object], what: str) -> None:
     with pytest.raises(InvalidValueError, match=what):
-        HyperparameterPrior.from_settings(settings)
+        prior_with(settings, HyperparameterPrior)
 
 
 @pytest.mark.parametrize(

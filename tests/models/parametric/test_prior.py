@@ -5,6 +5,7 @@ import torch
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.models.beliefs import prior_with
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior, latent_names
 
 
@@ -45,9 +46,9 @@ def test_with_noise_on_the_input_the_expected_mep_saturates_and_tms_alone_evokes
 
 
 def test_settings_from_a_file_are_a_prior_and_unknown_ones_are_named() -> None:
-    assert WindowPrior.from_settings({"width_ms": [90.0, 0.4]}) == WindowPrior(width_ms=(90.0, 0.4))
+    assert prior_with({"width_ms": [90.0, 0.4]}, WindowPrior) == WindowPrior(width_ms=(90.0, 0.4))
     with pytest.raises(InvalidValueError, match="p_windows"):
-        WindowPrior.from_settings({"p_windows": 0.5})
+        prior_with({"p_windows": 0.5}, WindowPrior)
 
 
 @pytest.mark.parametrize(

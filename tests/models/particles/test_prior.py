@@ -3,6 +3,7 @@ import torch
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.models.beliefs import prior_with
 from isiw.models.particles.prior import Prior
 
 MANY = 20_000
@@ -41,7 +42,7 @@ def test_kinds_come_as_often_as_the_prior_says() -> None:
 
 
 def test_a_prior_is_made_from_what_a_configuration_holds() -> None:
-    prior = Prior.from_settings({"p_window": 0.7, "width_ms": [80.0, 0.3]})
+    prior = prior_with({"p_window": 0.7, "width_ms": [80.0, 0.3]}, Prior)
     assert prior == Prior(p_window=0.7, width_ms=(80.0, 0.3))
 
 
@@ -65,4 +66,4 @@ def test_a_prior_that_cannot_be_is_refused(wrong) -> None:
 
 def test_a_setting_that_the_prior_does_not_have_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="p_windov"):
-        Prior.from_settings({"p_windov": 0.5})
+        prior_with({"p_windov": 0.5}, Prior)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, Self
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 
@@ -72,19 +71,6 @@ class HyperparameterPrior:
                 got=least,
                 expected=f"a median {GRID_SD:g} log SDs above {LEAST_NOISE:g}",
             )
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The prior that has these settings; what is not among them is as by default.
-
-        Raises:
-            InvalidValueError: a setting that the prior does not have.
-        """
-        known = [f.name for f in fields(cls)]
-        unknown = sorted(set(settings) - set(known))
-        if unknown:
-            raise InvalidValueError("the prior has no such setting", got=unknown, expected=", ".join(known))
-        return cls(**settings)
 
     @property
     def log_hypotheses(self) -> Tensor:

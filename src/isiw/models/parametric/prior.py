@@ -7,9 +7,8 @@ the latents have no bounds.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, Final, Literal, NamedTuple, Self
+from dataclasses import dataclass
+from typing import Final, Literal, NamedTuple
 
 import torch
 
@@ -126,20 +125,6 @@ class WindowPrior:
             raise InvalidValueError("an SD must be positive", got=(self.outliers, self.rest))
         if not self.start_ms[0] < self.start_ms[1]:
             raise InvalidValueError("start_ms is empty", got=self.start_ms, expected="earliest < latest")
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The prior that has these settings; what is not among them is as by default.
-
-        Raises:
-            InvalidValueError: a setting that the prior does not have.
-        """
-        known = [f.name for f in fields(cls)]
-        unknown = sorted(set(settings) - set(known))
-        if unknown:
-            raise InvalidValueError("the prior has no such setting", got=unknown, expected=", ".join(known))
-        values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
-        return cls(**values)
 
     def unknowns(self, latents: Tensor, likelihood: Likelihood, space: DesignSpace) -> Unknowns:
         """What standard normal latents mean.

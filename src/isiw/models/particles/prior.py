@@ -8,9 +8,8 @@ be made between kinds.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, Self
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 
@@ -130,20 +129,6 @@ class Prior:
                 raise InvalidValueError(f"{name} must be positive", got=getattr(self, name))
         if not self.start_ms[0] < self.start_ms[1]:
             raise InvalidValueError("start_ms is empty", got=self.start_ms, expected="earliest < latest")
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The prior that has these settings; what is not among them is as by default.
-
-        Raises:
-            InvalidValueError: a setting that the prior does not have.
-        """
-        known = [f.name for f in fields(cls)]
-        unknown = sorted(set(settings) - set(known))
-        if unknown:
-            raise InvalidValueError("the prior has no such setting", got=unknown, expected=", ".join(known))
-        values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
-        return cls(**values)
 
     def sample_kinds(self, size: tuple[int, ...], generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
         """Shape, noise and presence of new particles, each of `size`."""
