@@ -264,13 +264,19 @@ def edges_ms(model: ParametricModel, observations: Sequence[Observation]) -> np.
     return np.median(after(model, observations).estimate().edge_samples_ms, axis=0)
 
 
+def nuts_gap_ms(model: ParametricModel, observations: Sequence[Observation]) -> np.ndarray:
+    """How far apart the medians of each edge are; two that lie beyond the range agree."""
+    fast, slow = edges_ms(model, observations), edges_ms(replace(model, method="nuts"), observations)
+    with np.errstate(invalid="ignore"):
+        return np.where(fast == slow, 0.0, np.abs(fast - slow))
+
+
 def test_fast_inference_agrees_with_nuts(monkeypatch: pytest.MonkeyPatch) -> None:
     # One data set and few draws: the Monte-Carlo error of a median is about 2 ms.
     monkeypatch.setattr("isiw.models.parametric.program.WARMUP", 60)
     model = ParametricModel(likelihood="log-normal", samples=90)
     _, observations = simulated(model, 1, np.random.default_rng(1).uniform(150, 450, 30))
-    gap_ms = edges_ms(model, observations) - edges_ms(replace(model, method="nuts"), observations)
-    assert np.abs(gap_ms).max() < 8
+    assert nuts_gap_ms(model, observations).max() < 8
 
 
 def test_chains_of_nuts_that_disagree_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -293,8 +299,8 @@ def test_fast_inference_agrees_with_nuts_on_twenty_data_sets() -> None:
     gaps_ms = []
     for seed in range(20):
         _, observations = simulated(model, seed, np.random.default_rng(seed).uniform(150, 450, 30))
-        gaps_ms.append(edges_ms(model, observations) - edges_ms(replace(model, method="nuts"), observations))
-    assert np.median(np.abs(gaps_ms)) < 3
+        gaps_ms.append(nuts_gap_ms(model, observations))
+    assert np.median(gaps_ms) < 3
 
 
 @pytest.mark.slow
