@@ -14,6 +14,7 @@ from isiw.models.parametric import ParametricModel, ParametricPosterior
 from isiw.models.parametric import sampling as parametric_sampling
 from isiw.models.parametric.importance import Effort
 from isiw.models.parametric.prior import Likelihood, WindowPrior
+from isiw.models.particles.sample import OUTCOMES
 from isiw.models.protocol import (
     Conditions,
     HasEvidence,
@@ -204,14 +205,14 @@ def test_a_fantasy_moves_the_samples_as_an_update_would() -> None:
 
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_the_predicted_outcomes_have_the_expectation_of_the_profile(likelihood: Likelihood) -> None:
-    # Without outliers, on a fine scale of outcomes: within 15 %, for the scale has 32 steps.
+    # Without outliers; the scale of outcomes is coarse, and the loud ISI is an eighth of it above the quiet one.
     model = ParametricModel(beliefs=WindowPrior(outliers=(-12.0, 0.1)), likelihood=likelihood)
     posterior = after(model, evenly("gaussian", 2, 20))
     mass = posterior.outcome_mass(GRID)[0].mean(0)
-    assert mass.shape == (len(GRID), 32)
+    assert mass.shape == (len(GRID), OUTCOMES)
     quiet, loud = mass[0], mass[GRID == 290.0][0]
-    outcome = torch.arange(32.0)
-    assert (loud @ outcome) > (quiet @ outcome) + 4
+    outcome = torch.arange(float(OUTCOMES))
+    assert (loud @ outcome) > (quiet @ outcome) + OUTCOMES / 8
 
 
 def test_the_unit_of_the_amplitude_is_learnt() -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from isiw.acquisition.information import mutual_information
 from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.metrics import covers
@@ -11,7 +12,7 @@ from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.evidence import History, levels, total_log_likelihood
 from isiw.models.particles.moves import Mover
 from isiw.models.particles.prior import Person, Prior
-from isiw.models.particles.response import log_likelihood
+from isiw.models.particles.response import draw_log_mep, log_likelihood
 from isiw.models.particles.sample import PersonSample
 from isiw.models.protocol import (
     Observation,
@@ -271,3 +272,20 @@ def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
 def test_a_model_that_cannot_be_is_refused(wrong) -> None:
     with pytest.raises(InvalidValueError):
         ParticleModel(**wrong)
+
+
+@pytest.mark.parametrize("isi_ms", [180.0, 260.0, 330.0, 450.0])
+def test_mutual_information_agrees_with_brute_force_within_its_error(isi_ms: float) -> None:
+    # 6400 MEPs drawn from the law itself, each weighed under its own sample and under all 128; three standard errors.
+    posterior = after(ParticleModel(thinned=128), [(100.0, 0.01), (250.0, 0.09), (280.0, 0.12), (400.0, 0.012)])
+    person = posterior._thinned.person  # noqa: SLF001 - the samples that the score is of
+    draws, samples = 50, person.present.shape[1]
+    level = levels(person, torch.tensor([[isi_ms]]))
+    log_mep = draw_log_mep(person.response, level.expand(-1, -1, draws), torch.Generator().manual_seed(3))
+    everyone = log_mep.reshape(1, 1, -1)
+    each = log_likelihood(person.response, level.expand(-1, -1, everyone.shape[-1]), everyone, everyone)[0]
+    own = each.gather(0, torch.arange(samples).repeat_interleave(draws)[None]).squeeze(0)
+    gain = own - torch.logsumexp(each, dim=0) + math.log(samples)
+    error = gain.std().item() / math.sqrt(len(gain))
+    score = mutual_information(posterior, torch.tensor([isi_ms])).item()
+    assert score == pytest.approx(gain.mean().item(), abs=3 * error)

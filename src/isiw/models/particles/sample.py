@@ -15,10 +15,10 @@ from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
 
 __all__ = ["OUTCOMES", "PersonSample", "table_levels", "table_weights"]
 
-LEVELS = 12
+LEVELS = 24
 """Facilitations at which responses are worked out; what lies between is interpolated."""
 
-OUTCOMES = 32
+OUTCOMES = 24
 """Values of the log MEP on which predictive distributions live."""
 
 
