@@ -163,7 +163,9 @@ def main() -> None:
     packages = ("isiw", "torch", "pyro-ppl", "gpytorch", "botorch", "numpy")
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
     command = shlex.join(["python", "benchmarks/calibration.py", *sys.argv[1:]])
-    text = "\n\n".join([f"- command: `{command}`\n- python {platform.python_version()}, {versions}", *parts])
+    drawn = f"seed {chosen.seed}, {chosen.replications} people of each model's own, {chosen.trials} trials"
+    facts = f"- command: `{command}`\n- {drawn}\n- python {platform.python_version()}, {versions}"
+    text = "\n\n".join([facts, *parts])
     print(text)
     chosen.out.with_suffix(".md").write_text(f"{text}\n")
     ranks = {name: json.loads(rows.to_json(orient="split", double_precision=4)) for name, rows in tables.items()}

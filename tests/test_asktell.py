@@ -279,6 +279,15 @@ def test_a_batch_begins_with_what_is_asked_and_repeats_no_isi_that_has_been_lear
     assert len(set(batch)) == 4
 
 
+def test_a_batch_says_why_one_of_its_isis_is_not_the_acquisition_functions_choice() -> None:
+    model = make_strategy("default", particles=50).model
+    first = Strategy(DesignSpace(0, 4), model, Scores(torch.full((5,), math.nan)), Budget(3), initial_ms=(2.0,))
+    assert first.ask_batch(1) == [2.0]
+    assert first.fallback_reason is None
+    assert len(first.ask_batch(2)) == 2
+    assert "no ISI a finite score" in (first.fallback_reason or "")
+
+
 def test_a_batch_takes_up_the_initial_isis_first(scripted_strategy: MakeStrategy) -> None:
     usual = scripted_strategy()
     strategy = Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, initial_ms=(0.0, 100.0, 200.0))

@@ -166,7 +166,12 @@ class Strategy:
         if n < 1:
             raise InvalidValueError("a batch has at least one ISI", got=n)
         chosen = (self._planned() or [self.ask()])[:n]
-        return greedy_batch(self._posterior, self.acquisition, chosen, n, lambda posterior: self._best(posterior)[0])
+        return greedy_batch(self._posterior, self.acquisition, chosen, n, self._next_of_batch)
+
+    def _next_of_batch(self, posterior: Posterior) -> float:
+        isi_ms, reason = self._best(posterior)
+        self._fallback_reason = self._fallback_reason or reason
+        return isi_ms
 
     def _planned(self) -> list[float]:
         """What is left of the initial ISIs, and the plan of a method that has its own [ms]."""
@@ -175,7 +180,7 @@ class Strategy:
 
     @property
     def fallback_reason(self) -> str | None:
-        """Why the current ISI is not the acquisition function's choice; None where it is."""
+        """Why the current ISI, or one of the batch, is not the acquisition function's choice; None where all are."""
         return self._fallback_reason
 
     @property

@@ -1,7 +1,4 @@
-"""Conformance suites: what every implementation of one of isiw's protocols must pass.
-
-Run them from your own tests, and for hardware with the coil on a phantom.
-"""
+"""The conformance suite of devices."""
 
 from __future__ import annotations
 
@@ -10,6 +7,7 @@ from collections.abc import Callable, Sequence
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
 from isiw.errors import DeviceError
+from isiw.testing.promises import require
 from isiw.trials import Measurement, Stimulus, Sweep
 
 __all__ = ["check_device"]
@@ -27,7 +25,7 @@ def check_device(make: Callable[[], Device], space: DesignSpace, *, timeout_s: f
         AssertionError: a promise is broken; the message says which.
     """
     device = make()
-    _require(isinstance(device, Device), "it has describe, stage, deliver, stop and unstage")
+    require(isinstance(device, Device), "it has describe, stage, deliver, stop and unstage")
     _check_description(device, space)
     _check_refusal(device, "before stage()", timeout_s)
     device.stage()
@@ -45,16 +43,11 @@ def check_device(make: Callable[[], Device], space: DesignSpace, *, timeout_s: f
         _check_memory(make, space, timeout_s)
 
 
-def _require(condition: object, promise: str) -> None:
-    if not condition:
-        raise AssertionError(f"a device promises that {promise}")
-
-
 def _check_description(device: Device, space: DesignSpace) -> None:
     info = device.describe()
-    _require(isinstance(info, DeviceInfo), "describe() returns a DeviceInfo before it is staged")
-    _require(info == device.describe(), "describe() says the same each time")
-    _require(info.reference == space.reference, f"its reference is the space's, {space.reference}")
+    require(isinstance(info, DeviceInfo), "describe() returns a DeviceInfo before it is staged")
+    require(info == device.describe(), "describe() says the same each time")
+    require(info.reference == space.reference, f"its reference is the space's, {space.reference}")
 
 
 def _check_refusal(device: Device, when: str, timeout_s: float) -> None:
@@ -62,22 +55,22 @@ def _check_refusal(device: Device, when: str, timeout_s: float) -> None:
         device.deliver(Stimulus(0, None), timeout_s)
     except DeviceError:
         return
-    raise AssertionError(f"a device promises that deliver raises a DeviceError {when}")
+    raise AssertionError(f"broken promise: deliver raises a DeviceError {when}")
 
 
 def _check_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, space: DesignSpace) -> None:
-    _require(isinstance(answer, Sweep | Measurement), "deliver returns a Sweep or a Measurement")
+    require(isinstance(answer, Sweep | Measurement), "deliver returns a Sweep or a Measurement")
     if isinstance(answer, Sweep):
         units = {name: channel.unit for name, channel in answer.channels.items()}
-        _require(units == dict(info.channels), f"a sweep has the channels and units of describe(), here {units}")
-        _require("emg" in units and answer.t_tms_ms is not None, "a sweep has its EMG and the time of the pulse")
+        require(units == dict(info.channels), f"a sweep has the channels and units of describe(), here {units}")
+        require("emg" in units and answer.t_tms_ms is not None, "a sweep has its EMG and the time of the pulse")
         return
-    _require(not info.channels, "a device that measures the MEP itself describes no channels")
+    require(not info.channels, "a device that measures the MEP itself describes no channels")
     if stimulus.isi_ms is None or answer.isi_ms is None:
-        _require(stimulus.isi_ms is answer.isi_ms, "the realised ISI is None for TMS alone, and only then")
+        require(stimulus.isi_ms is answer.isi_ms, "the realised ISI is None for TMS alone, and only then")
     else:
         off_ms = abs(answer.isi_ms - stimulus.isi_ms)
-        _require(off_ms <= space.tolerance_ms, f"the realised ISI is near the commanded one, here {off_ms:g} ms off")
+        require(off_ms <= space.tolerance_ms, f"the realised ISI is near the commanded one, here {off_ms:g} ms off")
 
 
 def _check_memory(make: Callable[[], Device], space: DesignSpace, timeout_s: float) -> None:
@@ -88,7 +81,7 @@ def _check_memory(make: Callable[[], Device], space: DesignSpace, timeout_s: flo
     if isinstance(resumed, HasMemory):
         resumed.resume_after(stimuli[:3])
     (last,) = _answers(resumed, stimuli[3:], timeout_s)
-    _require(_same(last, uninterrupted[3]), "after resume_after it answers as if it had never been interrupted")
+    require(_same(last, uninterrupted[3]), "after resume_after it answers as if it had never been interrupted")
 
 
 def _answers(device: Device, stimuli: Sequence[Stimulus], timeout_s: float) -> list[Answer]:
