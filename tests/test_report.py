@@ -31,6 +31,7 @@ def test_the_statement_has_window_intervals_counts_and_reason(record):
     assert final_statement(record) == (
         "The tap enhances the MEP at ISIs of 33–93 ms after the valve command (probability of a window: 0.90). "
         "With 90 % probability each, it starts between 28 and 38 ms and ends after 150 ms. "
+        "Given a window, it ends beyond the range with probability 0.67. "
         "4 pairs of stimuli were given; 3 count; mistrials: 1 background activity. "
         "The budget of 4 stimuli is used up."
     )
@@ -47,6 +48,14 @@ def test_the_statement_has_window_intervals_counts_and_reason(record):
 )
 def test_an_edge_beyond_the_range_is_said_in_words(record, low, high, words):
     assert words in final_statement(with_estimate(record, start_low_ms=low, start_high_ms=high))
+
+
+def test_an_unusual_window_is_said_with_its_probability_once_it_is_worth_saying(record):
+    statement = final_statement(with_estimate(record, start_beyond=0.25, end_beyond=0.0, split=0.6))
+    assert (
+        "Given a window, it starts before the range with probability 0.25, "
+        "it has more than one segment with probability 0.60." in statement
+    )
 
 
 def test_no_window_is_an_answer(record):

@@ -170,6 +170,12 @@ def test_an_edge_beyond_the_range_makes_an_infinite_interval_and_never_nan() -> 
     assert intervals == ((-math.inf, 30.0), (50.0, math.inf))
 
 
+def test_edges_beyond_the_range_are_counted() -> None:
+    edges = np.array([[-np.inf, 60.0], [20.0, np.inf], [-np.inf, np.inf], [-np.inf, 70.0]])
+    estimate = WindowEstimate(probability=1.0, window=None, edge_samples_ms=edges)
+    assert estimate.beyond_probability == (0.75, 0.5)
+
+
 @pytest.mark.parametrize("level", [0.0, 1.0, -0.1, 1.5, math.nan])
 def test_a_credible_level_lies_between_0_and_1(level: float) -> None:
     with pytest.raises(InvalidValueError, match="between 0 and 1"):

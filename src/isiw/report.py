@@ -21,6 +21,9 @@ PROGRESS_HEADINGS = ("trial", "ISI", "MEP", "P(window)", "window", "start", "end
 TRIAL_HEADINGS = ("trial", "asked", "outcome", "realised")
 """What `trial_rows` hold."""
 
+WORTH_SAYING = 0.1
+"""Probability from which on an unusual window is mentioned."""
+
 _AFTER = {"impact": "after the impact", "valve": "after the valve command"}
 
 
@@ -53,7 +56,14 @@ def _edges(estimate: Estimate, space: DesignSpace) -> str:
     low, high = (estimate.start_low_ms, estimate.start_high_ms), (estimate.end_low_ms, estimate.end_high_ms)
     if estimate.window is None or None in low or None in high:
         return ""
-    return f"With 90 % probability each, it starts {_between(low, space)} and ends {_between(high, space)}."
+    edges = f"With 90 % probability each, it starts {_between(low, space)} and ends {_between(high, space)}."
+    unusual = {
+        "starts before the range": estimate.start_beyond,
+        "ends beyond the range": estimate.end_beyond,
+        "has more than one segment": estimate.split,
+    }
+    said = [f"it {what} with probability {p:.2f}" for what, p in unusual.items() if p is not None and p >= WORTH_SAYING]
+    return f"{edges} Given a window, {', '.join(said)}." if said else edges
 
 
 def _between(interval: tuple[float | None, float | None], space: DesignSpace) -> str:

@@ -134,6 +134,7 @@ class WindowEstimate:
         edge_samples_ms: posterior samples of (start, end) given a window, ±inf beyond the range, shape (s, 2).
         profile_quantiles_mv: the 0.05, 0.5 and 0.95 quantiles of the expected MEP by ISI [mV], shape (3, t).
         spread_ms: SD of the ISIs that a particle search has narrowed itself down to [ms].
+        split_probability: probability that the window has more than one segment, given that there is one.
 
     Raises:
         InvalidValueError: a probability outside 0–1, or a window reported against it.
@@ -147,6 +148,7 @@ class WindowEstimate:
     edge_samples_ms: FloatArray | None = field(default=None, repr=False)
     profile_quantiles_mv: FloatArray | None = field(default=None, repr=False)
     spread_ms: float | None = None
+    split_probability: float | None = None
 
     def __post_init__(self) -> None:
         if self.probability is None:
@@ -178,6 +180,14 @@ class WindowEstimate:
         quantiles = np.quantile(self.edge_samples_ms, [tail, 1.0 - tail], axis=0, method="nearest")
         (start_low, end_low), (start_high, end_high) = quantiles.tolist()
         return (start_low, start_high), (end_low, end_high)
+
+    @property
+    def beyond_probability(self) -> tuple[float, float] | None:
+        """Probability that the window starts before the range, and that it ends beyond it, given that there is one."""
+        if self.edge_samples_ms is None or not len(self.edge_samples_ms):
+            return None
+        start, end = np.isinf(self.edge_samples_ms).mean(axis=0).tolist()
+        return start, end
 
     def profile(self, isi_ms: ArrayLike) -> ProfileBand | None:
         """Median and 90 % band of the expected MEP at some ISIs.

@@ -79,12 +79,14 @@ def test_an_estimate_keeps_window_intervals_and_profile():
         grid_ms=grid,
         edge_samples_ms=np.array([[9.0, 38.0], [10.0, math.inf], [11.0, math.inf]]),
         profile_quantiles_mv=np.stack([grid, grid + 1, grid + 2]),
+        split_probability=0.25,
     )
     record = decode(
         "/estimate", encode("/estimate", Estimate.of(4, estimate, StopDecision(stop=False, reason="r"), 7.0))
     )
     assert record.window == estimate.window
     assert (record.start_low_ms, record.start_high_ms, record.end_low_ms, record.end_high_ms) == (9, 11, 38, math.inf)
+    assert (record.start_beyond, record.end_beyond, record.split) == (0.0, pytest.approx(2 / 3), 0.25)
     assert record.band_high_mv == tuple(grid + 2)
     assert record.decision == StopDecision(stop=False, reason="r")
     assert record.next_isi_ms == 7.0

@@ -2,7 +2,7 @@ import numpy as np
 import torch
 
 from isiw.design import DesignSpace
-from isiw.models.windows import best_window, edge_samples
+from isiw.models.windows import best_window, edge_samples, sampled_estimate
 
 SPACE = DesignSpace(0, 9)
 
@@ -33,3 +33,10 @@ def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets():
 def test_an_edge_at_the_border_of_the_range_lies_beyond_it():
     edges = edge_samples(masks("1110000000", "0000011111", "0011100000"), SPACE)
     assert edges.tolist() == [[-np.inf, 2.0], [5.0, np.inf], [2.0, 4.0]]
+
+
+def test_more_than_one_segment_has_a_probability_given_a_window():
+    sampled = masks("0111001100", "1100110000", "0011110000", "0000000011", "0000000000")
+    estimate = sampled_estimate(sampled, torch.ones(5, 10), SPACE)
+    assert estimate.split_probability == 0.5
+    assert sampled_estimate(masks("0000000000"), torch.ones(1, 10), SPACE).split_probability is None

@@ -122,11 +122,12 @@ def _read(file: IO[bytes], found: Salvage) -> None:
     """Read record after record; a chunk that fails is left out, and reading goes on behind it."""
     whole = cast("IO[bytes]", _Exact(file))
     reader = StreamReader(whole, emit_chunks=True, validate_crcs=True, record_size_limit=found.size)
-    readable_to, sealed = 0, False
+    readable_to, chunks, sealed = 0, 0, False
     try:
         for record in reader.records:
             if isinstance(record, mcap.Chunk):
                 _read_chunk(record, readable_to, found)
+                chunks += 1
             elif isinstance(record, mcap.Attachment):
                 found.attachments[record.name] = record.data
             readable_to = file.tell()
@@ -137,8 +138,8 @@ def _read(file: IO[bytes], found: Salvage) -> None:
         if not found.losses:
             found.losses.append("The checksum of the whole file fails, though every record's own is good.")
     except _UNREADABLE as error:
-        if isinstance(error, EndOfFile) and file.tell() == readable_to:
-            pass  # a session that never closed its log; nothing is torn
+        if isinstance(error, EndOfFile) and file.tell() == readable_to and chunks == sum(1 for _ in _chunks(file)):
+            pass  # a session that never closed its log; nothing is torn, and no chunk was taken for something else
         elif sealed:
             found.losses.append("The index at the end of the file is damaged. No record is affected.")
         else:
@@ -165,15 +166,20 @@ def _search_chunks(file: IO[bytes], found: Salvage) -> None:
     """Read all chunks of a file in which the records' lengths can no longer be followed from one to the next."""
     found.messages.clear()
     found.losses.clear()
+    for start, chunk in _chunks(file):
+        _read_chunk(chunk, start, found)
+
+
+def _chunks(file: IO[bytes]) -> Iterator[tuple[int, mcap.Chunk]]:
+    """All chunks that can be read, wherever they are, and where; a torn one shows in the numbers of its records."""
     file.seek(0)
     data = file.read()
     for match in re.finditer(re.escape(_CHUNK_MARK), data):
         start = max(0, match.start() - _CHUNK_MARK_AT)
         try:
-            chunk = mcap.Chunk.read(ReadDataStream(cast("IO[bytes]", _Exact(io.BytesIO(data[start:])))))
+            yield start, mcap.Chunk.read(ReadDataStream(cast("IO[bytes]", _Exact(io.BytesIO(data[start:])))))
         except _UNREADABLE:
-            continue  # torn; the numbers of the records tell what it held
-        _read_chunk(chunk, start, found)
+            continue
 
 
 def _read_chunk(chunk: mcap.Chunk, offset: int, found: Salvage) -> None:

@@ -126,7 +126,11 @@ class Waveform(_Record):
 
 
 class Estimate(_Record):
-    """What was believed after a trial, whether to stop, and what is asked next."""
+    """What was believed after a trial, whether to stop, and what is asked next.
+
+    `start_beyond`, `end_beyond` and `split` are probabilities given a window: that an edge lies beyond the range, and
+    that there is more than one segment.
+    """
 
     trial: int
     probability: float | None
@@ -137,6 +141,9 @@ class Estimate(_Record):
     start_high_ms: Number | None = None
     end_low_ms: Number | None = None
     end_high_ms: Number | None = None
+    start_beyond: float | None = None
+    end_beyond: float | None = None
+    split: float | None = None
     grid_ms: tuple[float, ...] = ()
     profile_mv: Numbers = ()
     band_low_mv: Numbers = ()
@@ -150,6 +157,7 @@ class Estimate(_Record):
         """The record of an estimate, with its 90 % intervals."""
         segments = () if estimate.window is None else tuple(itertools.chain(*estimate.window.segments))
         start, end = estimate.interval(0.9) or ((None, None), (None, None))
+        beyond = estimate.beyond_probability or (None, None)
         return cls(
             trial=trial,
             probability=estimate.probability,
@@ -160,6 +168,9 @@ class Estimate(_Record):
             start_high_ms=start[1],
             end_low_ms=end[0],
             end_high_ms=end[1],
+            start_beyond=beyond[0],
+            end_beyond=beyond[1],
+            split=estimate.split_probability,
             next_isi_ms=next_isi_ms,
             stop=decision.stop,
             reason=decision.reason,

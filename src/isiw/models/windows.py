@@ -46,6 +46,12 @@ def edge_samples(masks: Tensor, space: DesignSpace) -> Tensor:
     return torch.stack((start, end), dim=-1)
 
 
+def _split(masks: Tensor) -> Tensor:
+    """Which sampled windows have more than one segment, shape (s,)."""
+    rises = (masks[:, 1:] > masks[:, :-1]).sum(-1) + (masks[:, 0] > 0)
+    return rises > 1
+
+
 def profile_grid(space: DesignSpace) -> Tensor:
     """The ISIs at which profiles are reported [ms], shape (t,)."""
     return torch.tensor(space.grid_ms[:: max(1, len(space.grid_ms) // PROFILE_POINTS)], dtype=torch.float32)
@@ -72,4 +78,5 @@ def sampled_estimate(masks: Tensor, profiles_mv: Tensor, space: DesignSpace) -> 
         grid_ms=profile_grid(space).double().numpy(),
         edge_samples_ms=edges.double().cpu().numpy(),
         profile_quantiles_mv=torch.quantile(profiles_mv, levels, dim=0).double().cpu().numpy(),
+        split_probability=float(_split(present).double().mean()) if len(present) else None,
     )

@@ -22,6 +22,7 @@ TRIALS = History(
             [0.0, 0.0, 0.0, 4.0, 0.0, 0.0],
             [math.log(0.08), math.log(0.02), math.log(0.01), math.log(0.03), -math.inf, math.log(0.02)],
             [math.log(0.08), math.log(0.02), math.log(0.01), math.log(0.03), math.log(0.005), math.inf],
+            [0.0, 1.0, 2.0, 3.0, 4.0, 5.0],
         )
     )
 )
@@ -75,7 +76,7 @@ def test_the_program_draws_meps_of_its_own_where_none_are_told() -> None:
     pyro.set_rng_seed(1)
     model = program("log-normal")
     latent = torch.zeros(model.latents, dtype=torch.double)
-    trials = History(*(torch.full((1, 4000), value, dtype=torch.double) for value in (250.0, 0.0, 0.0, 0.0)))
+    trials = History(*(torch.full((1, 4000), value, dtype=torch.double) for value in (250.0, 0.0, 0.0, 0.0, 0.0)))
     conditioned = pyro.poutine.condition(model, data={"latents": latent})
     trace = pyro.poutine.trace(conditioned).get_trace(trials, told=False)
     drawn = trace.nodes["log_mep"]["value"]

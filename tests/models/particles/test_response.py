@@ -11,6 +11,7 @@ from isiw.models.particles.response import (
     Response,
     draw_log_mep,
     evoked_mean,
+    log_gain,
     log_likelihood,
     outcome_density,
 )
@@ -30,6 +31,8 @@ def particle(kind: NoiseKind, **values: float) -> Response:
         "boost": 3.6,
         "rest": -4.5,
         "max_probability": 0.55,
+        "drift": 0.0,
+        "startup": 0.0,
     }
     return Response(torch.tensor([[kind]]), *(torch.tensor([[v]]) for v in (defaults | values).values()))
 
@@ -100,3 +103,21 @@ def test_draws_have_the_distribution_that_the_likelihood_is_of(response: Respons
     log_mep = draw_log_mep(response, level, torch.Generator().manual_seed(1))
     below = log_likelihood(response, level, torch.full_like(log_mep, -torch.inf), log_mep).exp()
     assert kstest(below.flatten().numpy(), "uniform").pvalue > 0.01
+
+
+def test_startle_and_drift_belong_to_the_trial_and_not_to_its_isi() -> None:
+    believed = particle(NoiseKind.GAIN, drift=0.4, startup=0.5)
+    gain = log_gain(believed, torch.tensor([0.0, 1.0, 2.0, 500.0]))[0, 0].tolist()
+    # Half of the +0.29 and +0.20 that were measured; then 3 % of the way to 0.4 with each trial.
+    assert gain == pytest.approx([0.145, 0.100 + 0.4 * 0.03, 0.4 * (1 - 0.97**2), 0.4], abs=1e-6)
+
+
+@pytest.mark.parametrize(("believed", "true"), PAIRS)
+def test_a_gain_is_the_gain_of_the_simulated_persons_trials(believed: Response, true: ResponseCurve) -> None:
+    rng, log_gain_of_trial = np.random.default_rng(6), 0.5
+    floor = FLOOR.median_mv * np.exp(FLOOR.log_sd * rng.standard_normal(20_000))
+    evoked = [true.sample_evoked_mv(0.6, TrialNoise(z, log_gain_of_trial), rng) for z in rng.standard_normal(20_000)]
+    log_mep = torch.tensor(np.log(np.quantile(floor + evoked, [0.25, 0.5, 0.75])), dtype=torch.float32)[None, None]
+    level, gain = torch.full((1, 1, 3), 0.6), torch.full((1, 1, 3), log_gain_of_trial)
+    below = log_likelihood(believed, level, torch.full_like(log_mep, -torch.inf), log_mep, gain).exp()
+    assert below[0, 0].tolist() == pytest.approx([0.25, 0.5, 0.75], abs=0.05)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from isiw.models.particles.shapes import Shape, ShapeKind, facilitation
+from isiw.models.particles.shapes import TOGETHER, Shape, ShapeKind, facilitation
 from isiw.profiles import PeakProfile, TwoPeakProfile
 
 ISI_MS = np.linspace(-50, 400, 451)
@@ -36,7 +36,14 @@ def test_every_plateau_of_the_cohort_is_in_the_family(exponent: float) -> None:
 @pytest.mark.parametrize(("first", "second"), [(1.0, 0.4), (0.7, 1.0), (1.0, 1.0)])
 def test_every_pair_of_peaks_of_the_cohort_is_in_the_family(first: float, second: float) -> None:
     lower = min(first, second)
-    form = (1 - lower) / 0.7 * (1 if second < first else -1)
+    form = TOGETHER * (1 - lower) / 0.7 * (1 if second < first else -1)
     np.testing.assert_allclose(
         level(ShapeKind.TWO_PEAK, form), TwoPeakProfile(40, 100, first, second)(ISI_MS), atol=1e-5
     )
+
+
+@pytest.mark.parametrize("form", [-0.8, 0.77, 0.9])
+def test_two_peaks_far_apart_are_two_windows_by_the_rule(form: float) -> None:
+    got = level(ShapeKind.TWO_PEAK, form)
+    enhanced = got >= 0.135 * got.max()
+    assert (np.diff(enhanced.astype(int)) == 1).sum() == 2

@@ -87,12 +87,13 @@ class ParametricModel:
         """The posterior after several more trials: the same as after one by one, at the cost of one."""
         history = posterior.history
         for observation in observations:
-            history = history.appended(self.observed(observation))
+            history = history.appended(self.observed(observation, history.isi_ms.shape[-1]))
         return self._after(posterior.space, posterior.seed, history)
 
-    def observed(self, observation: Observation) -> History:
+    def observed(self, observation: Observation, order: int) -> History:
         """One trial of each person as a history."""
-        return observed(observation, self.detection_limit_mv, self.response_threshold_mv).to("cpu", torch.double)
+        known = self.detection_limit_mv, self.response_threshold_mv
+        return observed(observation, *known, order=order).to("cpu", torch.double)
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
         """Draw one person from the prior, and a MEP at each ISI; see `SimulatesPeople`."""
@@ -135,7 +136,7 @@ class ParametricModel:
 def _sorted(history: History, person: int) -> History:
     """The trials of one person in an order of their own, so that the posterior does not depend on that of telling."""
     columns = [column[person] for column in history.columns]
-    order = torch.from_numpy(np.lexsort([column.numpy() for column in columns]))
+    order = torch.from_numpy(np.lexsort([column.numpy() for column in columns[:-1]]))  # whenever they came
     return History(*(column[order].unsqueeze(0) for column in columns))
 
 
@@ -246,7 +247,9 @@ class ParametricPosterior:
     def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> ParametricPosterior:
         """The same samples, some more often and some no more, by an imagined trial; see `Conditions`."""
         unknown = torch.full_like(mep_mv, torch.nan)
-        trial = self.model.observed(Observation(isi_ms, mep_mv, isi_sd_ms=torch.zeros_like(mep_mv), response=unknown))
+        trial = self.model.observed(
+            Observation(isi_ms, mep_mv, isi_sd_ms=torch.zeros_like(mep_mv), response=unknown), self.trials
+        )
         ends = torch.stack((trial.log_mep, trial.log_mep_high), dim=-1).unsqueeze(1)
         level = self.sample.levels(trial.isi_ms.unsqueeze(1))
         gain = log_likelihood(self.sample.unknowns, level, ends, self.model.likelihood).squeeze(-1)

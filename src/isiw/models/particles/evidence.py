@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import torch
 
 from isiw.models.particles.prior import Person
-from isiw.models.particles.response import NODES, Response, log_likelihood
+from isiw.models.particles.response import NODES, Response, log_gain, log_likelihood
 from isiw.models.particles.shapes import facilitation
 from isiw.models.protocol import Observation, Tensor
 
@@ -31,22 +31,24 @@ class History:
         isi_sd_ms: their SDs [ms], shape (b, n).
         log_mep: lower end of the log MEP, shape (b, n).
         log_mep_high: upper end, shape (b, n).
+        order: how many trials came before each, shape (b, n).
     """
 
     isi_ms: Tensor
     isi_sd_ms: Tensor
     log_mep: Tensor
     log_mep_high: Tensor
+    order: Tensor
 
     @classmethod
     def empty(cls, people: int, device: torch.device) -> History:
         """No trials."""
-        return cls(*(torch.empty((people, 0), device=device) for _ in range(4)))
+        return cls(*(torch.empty((people, 0), device=device) for _ in range(5)))
 
     @property
-    def columns(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    def columns(self) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
         """All of it, in order."""
-        return self.isi_ms, self.isi_sd_ms, self.log_mep, self.log_mep_high
+        return self.isi_ms, self.isi_sd_ms, self.log_mep, self.log_mep_high, self.order
 
     def to(self, device: torch.device | str, dtype: torch.dtype) -> History:
         """The same on another device, or in another precision."""
@@ -57,13 +59,14 @@ class History:
         return History(*(torch.cat(pair, dim=-1) for pair in zip(self.columns, trial.columns, strict=True)))
 
 
-def observed(observation: Observation, detection_limit_mv: float, response_threshold_mv: float) -> History:
+def observed(observation: Observation, detection_limit_mv: float, response_threshold_mv: float, order: int) -> History:
     """One trial of each person as a history.
 
     Args:
         observation: the trial.
         detection_limit_mv: what an amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a response is known to be above, and no response below [mV].
+        order: how many trials came before.
     """
     seen, silent = observation.response == 1, observation.response == 0
     log_mep = torch.log(observation.mep_mv)
@@ -71,7 +74,8 @@ def observed(observation: Observation, detection_limit_mv: float, response_thres
     low = torch.where(seen, threshold, torch.where(silent, -torch.inf, log_mep))
     high = torch.where(seen, torch.inf, torch.where(silent, threshold, log_mep))
     high = torch.where(observation.mep_mv == 0, limit, high)
-    return History(*(x.unsqueeze(-1) for x in (observation.isi_ms, observation.isi_sd_ms, low, high)))
+    columns = (observation.isi_ms, observation.isi_sd_ms, low, high, torch.full_like(log_mep, order))
+    return History(*(x.unsqueeze(-1) for x in columns))
 
 
 def levels(person: Person, isi_ms: Tensor) -> Tensor:
@@ -106,7 +110,8 @@ def total_log_likelihood(person: Person, history: History) -> Tensor:
 def _by_trial(person: Person, history: History, isi_ms: Tensor) -> Tensor:
     """Log likelihood of each trial at some ISIs, shape (b, p, n)."""
     ends = (history.log_mep.unsqueeze(-2), history.log_mep_high.unsqueeze(-2))
-    return in_pieces(log_likelihood, person.response, (levels(person, isi_ms), *ends), NODES * isi_ms.shape[-1])
+    others = (levels(person, isi_ms), *ends, log_gain(person.response, history.order.unsqueeze(-2)))
+    return in_pieces(log_likelihood, person.response, others, NODES * isi_ms.shape[-1])
 
 
 def in_pieces(function: Callable[..., Tensor], response: Response, others: tuple[Tensor, ...], elements: int) -> Tensor:

@@ -18,7 +18,7 @@ from isiw.errors import InvalidValueError
 from isiw.models.particles.evidence import History, levels, observed, total_log_likelihood
 from isiw.models.particles.moves import Mover
 from isiw.models.particles.prior import Latents, Person, Prior
-from isiw.models.particles.response import Response, draw_log_mep
+from isiw.models.particles.response import Response, draw_log_mep, log_gain
 from isiw.models.particles.sample import PersonSample
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Observation, SimulatedPerson, Tensor
@@ -104,7 +104,8 @@ class ParticleModel:
         generator = step_generator(self.device, seed, SIMULATED)
         person = self.beliefs.person(self.beliefs.sample(1, 1, generator), space)
         isis_ms = torch.as_tensor(isi_ms, dtype=torch.float32, device=self.device).unsqueeze(0)
-        log_mep = draw_log_mep(person.response, levels(person, isis_ms), generator)
+        gain = log_gain(person.response, torch.arange(isis_ms.shape[-1], dtype=torch.float32, device=self.device))
+        log_mep = draw_log_mep(person.response, levels(person, isis_ms), generator, gain)
         grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=torch.float32, device=self.device)
         mask = PersonSample(person).window_masks(grid_ms)[0, 0]
         window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
@@ -112,9 +113,8 @@ class ParticleModel:
 
     def reweighted(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The same particles, weighted by one more trial as well."""
-        trial = observed(observation, self.detection_limit_mv, self.response_threshold_mv).to(
-            self.device, torch.float32
-        )
+        known = self.detection_limit_mv, self.response_threshold_mv
+        trial = observed(observation, *known, order=posterior.trials).to(self.device, torch.float32)
         gain = total_log_likelihood(posterior.person, trial)
         return replace(
             posterior,
@@ -183,7 +183,7 @@ class ParticlePosterior:
     @cached_property
     def _thinned(self) -> PersonSample:
         picks = systematic(self.log_weights, self.model.thinned)
-        return PersonSample(_each(self.person, lambda x: _take(x, picks)))
+        return PersonSample(_each(self.person, lambda x: _take(x, picks)), self.trials)
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""

@@ -21,12 +21,15 @@ from isiw.models.protocol import Tensor
 
 __all__ = ["LATENTS", "Latents", "Person", "Prior", "start_ms"]
 
-LATENTS = ("start", "width", "form", "log_floor", "floor_log_sd", "log_ratio", "spread", "output", "boost", "rest")
-"""Names of the latents, in order."""
+LATENTS = (
+    *("start", "width", "form"),
+    *("log_floor", "floor_log_sd", "drift", "startup"),
+    *("log_ratio", "spread", "output", "boost", "rest"),
+)
+"""Names of the latents, in order: of the profile, of every response, and those whose meaning depends on the noise."""
 
 SHAPE_LATENTS = slice(0, 3)
-NOISE_LATENTS = slice(5, 10)
-
+NOISE_LATENTS = slice(7, 12)
 
 _SCALES = (
     "hit_delay_ms",
@@ -91,6 +94,8 @@ class Prior:
         output_sd: median and log SD of the output noise, natural log; 0.3–0.5.
         boost: median and log SD of the boost in logits: k times 5–18 % RMT.
         rest: mean and SD of the drive at rest in logits: k (90 % RMT − x50).
+        drift_sd: SD of what the log of evoked MEPs drifts by in the long run; about 0.26 over a session measured.
+        startup: mean and SD of how strongly the first trials startle, 1 being as much as in blocks of plain TMS.
 
     Raises:
         InvalidValueError: probabilities that are none or do not sum to one, medians or SDs that are not positive.
@@ -99,10 +104,10 @@ class Prior:
     p_window: float = 0.75
     p_shape: tuple[float, float, float, float] = (0.68, 0.12, 0.08, 0.12)
     p_noise: tuple[float, float, float] = (0.4, 0.15, 0.45)
-    start_ms: tuple[float, float] = (0.0, 125.0)
-    hit_delay_ms: tuple[float, float] = (180.0, 7.0)
-    p_anywhere: float = 0.2
-    width_ms: tuple[float, float] = (100.0, 0.5)
+    start_ms: tuple[float, float] = (0.0, 115.0)
+    hit_delay_ms: tuple[float, float] = (180.0, 6.2)
+    p_anywhere: float = 0.08
+    width_ms: tuple[float, float] = (100.0, 0.44)
     floor_mv: tuple[float, float, float] = (0.009, 0.35, 0.12)
     floor_log_sd: tuple[float, float] = (0.24, 0.4)
     gain_ratio: tuple[float, float] = (7.0, 0.7)
@@ -113,6 +118,8 @@ class Prior:
     output_sd: tuple[float, float] = (0.39, 0.25)
     boost: tuple[float, float] = (3.3, 0.45)
     rest: tuple[float, float] = (-4.6, 0.6)
+    drift_sd: float = 0.3
+    startup: tuple[float, float] = (0.5, 0.5)
 
     def __post_init__(self) -> None:
         for name in ("p_window", "p_anywhere"):
@@ -127,6 +134,8 @@ class Prior:
         for name in _SCALES:
             if not all(math.isfinite(value) and value > 0 for value in getattr(self, name)):
                 raise InvalidValueError(f"{name} must be positive", got=getattr(self, name))
+        if not all(math.isfinite(value) and value >= 0 for value in (self.drift_sd, *self.startup)):
+            raise InvalidValueError("drift_sd and startup must not be negative", got=(self.drift_sd, self.startup))
         if not self.start_ms[0] < self.start_ms[1]:
             raise InvalidValueError("start_ms is empty", got=self.start_ms, expected="earliest < latest")
 
@@ -167,6 +176,8 @@ class Prior:
             boost=_log_normal(z["boost"], self.boost),
             rest=self.rest[0] + self.rest[1] * z["rest"],
             max_probability=torch.sigmoid(self.max_probability[0] + self.max_probability[1] * z["output"]),
+            drift=self.drift_sd * z["drift"],
+            startup=self.startup[0] + self.startup[1] * z["startup"],
         )
         return Person(shape, response, latents.present)
 

@@ -6,7 +6,9 @@ the cohorts' `recruitment`). Noise of constant CV is the same formula far below 
 facilitation as the drive and log-gamma noise. The noise on the input is integrated out on equidistant nodes, whose
 error is negligible because the output noise smooths between them.
 
-    mep / floor = floor noise + ratio * sigmoid(drive + spread_q) * output noise,     q = 1 ... Q with weights w_q
+    mep / floor = floor noise + ratio * gain_n * sigmoid(drive + spread_q) * output noise,     q = 1 ... Q, weights w_q
+
+The gain belongs to trial n and not to its ISI: the first trials of a session startle, and amplitudes wander slowly.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ __all__ = [
     "Response",
     "draw_log_mep",
     "evoked_mean",
+    "log_gain",
     "log_likelihood",
     "node_weights",
     "outcome_density",
@@ -40,6 +43,13 @@ GAMMA_KERNEL = 0.25
 OUTLIER_PROBABILITY = 0.03
 OUTLIER_LOG_RANGE = (math.log(2.0), math.log(200.0))
 """Artefacts and false positives: log-uniform between these multiples of the floor."""
+
+
+STARTUP = (0.29, 0.20)
+"""What the first trials have on top of the others, natural log: measured on single trials in blocks."""
+
+PERSISTENCE = 0.97
+"""How slowly amplitudes wander, from trial to trial: as an autoregressive walk relaxes towards where it will stay."""
 
 
 class NoiseKind(IntEnum):
@@ -64,6 +74,8 @@ class Response(NamedTuple):
         boost: shift of the drive at the best ISI, in logits (recruitment).
         rest: drive without a tap, in logits (recruitment).
         max_probability: probability of a response at the best ISI (missing responses).
+        drift: by how much the log of evoked MEPs will have changed after many trials.
+        startup: how strongly the first trials startle; 1 is `STARTUP`.
     """
 
     kind: Tensor
@@ -75,6 +87,24 @@ class Response(NamedTuple):
     boost: Tensor
     rest: Tensor
     max_probability: Tensor
+    drift: Tensor
+    startup: Tensor
+
+
+def log_gain(response: Response, order: Tensor) -> Tensor:
+    """By how much a trial's evoked MEP differs because of when it came, natural log.
+
+    Args:
+        response: response parameters, fields of shape (..., p).
+        order: how many trials came before each, shape (..., 1 or p, n).
+
+    Returns:
+        Shape (..., p, n).
+    """
+    startle = torch.zeros_like(order)
+    for trial, excess in enumerate(STARTUP):
+        startle = torch.where(order == trial, excess, startle)
+    return response.drift.unsqueeze(-1) * (1.0 - PERSISTENCE**order) + response.startup.unsqueeze(-1) * startle
 
 
 def _nodes(like: Tensor) -> Tensor:
@@ -107,16 +137,16 @@ def _log_gamma_nodes(cv: Tensor) -> Tensor:
 class _Curve(NamedTuple):
     """The nodes' view of a response: evoked/floor at node q is exp(log_scale) * sigmoid(drive + spread_q)."""
 
-    scale: Tensor  # (..., p, 1)
+    scale: Tensor  # (..., p, 1 or t)
     spread: Tensor  # (..., p, q)
     kernel: Tensor  # (..., p, 1)
 
 
-def _curve(response: Response) -> _Curve:
+def _curve(response: Response, gain: Tensor | float = 0.0) -> _Curve:
     recruits = (response.kind == NoiseKind.RECRUITMENT).unsqueeze(-1)
     input_noise = response.spread.unsqueeze(-1) * _nodes(response.spread)
     spread = torch.where(recruits, input_noise, _log_gamma_nodes(response.spread) - FAR_BELOW)
-    log_scale = response.log_ratio.unsqueeze(-1) + torch.where(recruits, 0.0, FAR_BELOW)
+    log_scale = response.log_ratio.unsqueeze(-1) + torch.where(recruits, 0.0, FAR_BELOW) + gain
     kernel = torch.where(recruits, response.output_log_sd.unsqueeze(-1), GAMMA_KERNEL)
     return _Curve(log_scale.exp(), spread, kernel)
 
@@ -149,9 +179,9 @@ def evoked_mean(response: Response, level: Tensor) -> Tensor:
     return mean * _response_probability(response, level)
 
 
-def _components(response: Response, level: Tensor) -> tuple[Tensor, Tensor]:
+def _components(response: Response, level: Tensor, gain: Tensor | float = 0.0) -> tuple[Tensor, Tensor]:
     """Mean and precision of log(mep / floor) at each node, shapes (..., p, t, q)."""
-    curve = _curve(response)
+    curve = _curve(response, gain)
     drive = _drive(response, level).unsqueeze(-1) + curve.spread.unsqueeze(-2)
     evoked = drive.sigmoid_().mul_(curve.scale.unsqueeze(-1))
     total = evoked.add(1.0)
@@ -173,7 +203,9 @@ def _mix(response: Response, level: Tensor, log_relative: Tensor, evoked: Tensor
     return (1.0 - OUTLIER_PROBABILITY) * density + OUTLIER_PROBABILITY * outlier
 
 
-def log_likelihood(response: Response, level: Tensor, log_mep: Tensor, log_mep_high: Tensor) -> Tensor:
+def log_likelihood(
+    response: Response, level: Tensor, log_mep: Tensor, log_mep_high: Tensor, gain: Tensor | float = 0.0
+) -> Tensor:
     """Log likelihood of MEPs, trial by trial: a density of the log MEP, or the probability of an interval.
 
     Args:
@@ -181,12 +213,13 @@ def log_likelihood(response: Response, level: Tensor, log_mep: Tensor, log_mep_h
         level: facilitation of each trial, shape (..., p, n).
         log_mep: natural log of the MEPs [mV], or the lower end of what is known of them, shape (..., 1 or p, n).
         log_mep_high: the upper end; equal to `log_mep` where the amplitude is known, same shape.
+        gain: `log_gain` of each trial, shape (..., p, n).
 
     Returns:
         Shape (..., p, n).
     """
     low, high = (end - response.log_floor.unsqueeze(-1) for end in (log_mep, log_mep_high))
-    mean, precision = _components(response, level)
+    mean, precision = _components(response, level, gain)
     censored = log_mep != log_mep_high
     inside = _interval_likelihood(response, level, (low, high), mean, precision) if bool(censored.any()) else None
     root = precision.sqrt()
@@ -234,18 +267,19 @@ def outcome_density(response: Response, level: Tensor, log_mep: Tensor) -> Tenso
     return _mix(flat, level.unsqueeze(-1), log_relative.unsqueeze(-2), evoked)
 
 
-def draw_log_mep(response: Response, level: Tensor, generator: torch.Generator) -> Tensor:
+def draw_log_mep(response: Response, level: Tensor, generator: torch.Generator, gain: Tensor | float = 0.0) -> Tensor:
     """Draw natural logs of MEPs [mV] from the distribution that `log_likelihood` is of.
 
     Args:
         response: response parameters, fields of shape (..., p).
         level: facilitation of each trial, shape (..., p, n).
         generator: source of randomness.
+        gain: `log_gain` of each trial, shape (..., p, n).
 
     Returns:
         Shape (..., p, n).
     """
-    mean, precision = _components(response, level)
+    mean, precision = _components(response, level, gain)
     node = torch.multinomial(node_weights(level).expand(level.numel(), -1), 1, generator=generator)
     mean, precision = (x.gather(-1, node.view(*level.shape, 1)).squeeze(-1) for x in (mean, precision))
     z = torch.randn(level.shape, generator=generator, device=level.device)

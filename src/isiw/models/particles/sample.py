@@ -1,4 +1,4 @@
-"""What equally weighted particles say about the next MEP and about the window."""
+"""A sample of the posterior: predictive distributions, windows and profiles of equally weighted particles."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import torch
 
 from isiw.models.particles.evidence import in_pieces, levels
 from isiw.models.particles.prior import Person
-from isiw.models.particles.response import NODES, evoked_mean, outcome_density
+from isiw.models.particles.response import NODES, evoked_mean, log_gain, outcome_density
 from isiw.models.protocol import Tensor
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
 
@@ -35,9 +35,15 @@ def table_weights(level: Tensor) -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class PersonSample:
-    """Equally weighted particles, fields of shape (b, s), and what they say about the next MEP and the window."""
+    """What equally weighted particles say about the next MEP and about the window.
+
+    Args:
+        person: the particles, fields of shape (b, s).
+        order: how many trials came before the next one.
+    """
 
     person: Person
+    order: int = 0
 
     @cached_property
     def _levels(self) -> Tensor:
@@ -84,8 +90,10 @@ class PersonSample:
 
     @cached_property
     def _outcome_table(self) -> Tensor:
-        """Probability of each outcome at the tables' levels, shape (b, s, l, y)."""
+        """Probability of each outcome of the next trial at the tables' levels, shape (b, s, l, y)."""
         response = self.person.response
+        gain = log_gain(response, torch.full_like(response.drift, self.order).unsqueeze(-1)).squeeze(-1)
+        response = response._replace(log_ratio=response.log_ratio + gain)
         top = response.log_floor + torch.log1p(self._evoked.amax(-1))
         low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
         high = torch.quantile(top, 0.95, dim=-1) + 1.5

@@ -16,6 +16,11 @@ __all__ = ["Shape", "ShapeKind", "facilitation"]
 
 PEAKS_AT = (0.27, 0.73)
 PEAK_SD = 1 / 7.5
+APART_SD = 1 / 12.0
+"""SD of two peaks that are windows of their own, as a share of the span: the valley between them is below the rule."""
+
+TOGETHER = 0.75
+"""Up to which form, of either sign, two peaks are one window."""
 
 
 class ShapeKind(IntEnum):
@@ -34,7 +39,8 @@ class Shape(NamedTuple):
         kind: the family, one of `ShapeKind`.
         start_ms: where the rising flank has exp(-2) of the peak [ms].
         width_ms: width of the span [ms].
-        form: what the family leaves open, in -1..1: position of the peak, flatness, or the heights of two peaks.
+        form: what the family leaves open, in -1..1: position of the peak, flatness, or which of two peaks is lower and
+            by how much, in one window up to `TOGETHER` and in two beyond.
     """
 
     kind: Tensor
@@ -66,10 +72,11 @@ def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:
 
 
 def _two_peaks(form: Tensor, share: Tensor) -> Tensor:
-    lower = 1.0 - 0.7 * form.abs()
+    apart = form.abs() > TOGETHER
+    sd = torch.where(apart, APART_SD, PEAK_SD)
+    lower = 1.0 - 0.7 * torch.where(apart, (form.abs() - TOGETHER) / (1.0 - TOGETHER), form.abs() / TOGETHER)
     heights = torch.where(form < 0, lower, 1.0), torch.where(form < 0, 1.0, lower)
     first, second = (
-        height * torch.exp(-0.5 * ((share - at) / PEAK_SD).square())
-        for height, at in zip(heights, PEAKS_AT, strict=True)
+        height * torch.exp(-0.5 * ((share - at) / sd).square()) for height, at in zip(heights, PEAKS_AT, strict=True)
     )
     return first + second
