@@ -8,6 +8,7 @@ from isiw.acquisition.information import Alternating, MutualInformation, WindowG
 from isiw.acquisition.levelset import IntegratedFeasibility, Straddle
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.sweeps import EvenSpacing, IncrementalSweep, OwnProposal, RandomIsi, SobolIsi
+from isiw.acquisition.twostep import TwoStep
 from isiw.acquisition.variance import EdgeVariance, IntegratedVariance, ProfileVariance
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "SobolIsi",
     "Straddle",
     "Thompson",
+    "TwoStep",
     "UpperConfidenceBound",
     "WindowGain",
     "WindowInformation",

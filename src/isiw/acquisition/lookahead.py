@@ -21,15 +21,17 @@ class Lookahead(NamedTuple):
     mean: Tensor
 
 
-def lookahead(mass: Tensor, values: Tensor) -> Lookahead:
+def lookahead(mass: Tensor, values: Tensor, weights: Tensor | None = None) -> Lookahead:
     """Expectations of some quantities after each value of the next MEP.
 
     Args:
         mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
         values: the quantities under each sample, shape (b, s, g).
+        weights: of the samples, normalised, shape (b, s); by default all alike.
     """
     people, samples, candidates, outcomes = mass.shape
-    joint = mass.flatten(2).transpose(1, 2) / samples
+    share = 1.0 / samples if weights is None else weights.unsqueeze(1)
+    joint = mass.flatten(2).transpose(1, 2) * share
     probability = joint.sum(-1, keepdim=True).clamp_min(1e-12)
     mean = (joint @ values) / probability
     return Lookahead(
@@ -37,7 +39,7 @@ def lookahead(mass: Tensor, values: Tensor) -> Lookahead:
     )
 
 
-def expected_variance_reduction(mass: Tensor, values: Tensor) -> Tensor:
+def expected_variance_reduction(mass: Tensor, values: Tensor, weights: Tensor | None = None) -> Tensor:
     """By how much the next MEP is expected to reduce the summed variance of some quantities.
 
     By the law of total variance it is the variance of their means after the next MEP.
@@ -45,10 +47,12 @@ def expected_variance_reduction(mass: Tensor, values: Tensor) -> Tensor:
     Args:
         mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
         values: the quantities under each sample, shape (b, s, g).
+        weights: of the samples, normalised, shape (b, s); by default all alike.
 
     Returns:
         Shape (b, t).
     """
+    mean = values.mean(dim=1, keepdim=True) if weights is None else weights.unsqueeze(1) @ values
     # Centred, so that a small reduction is not the difference of two large numbers.
-    ahead = lookahead(mass, values - values.mean(dim=1, keepdim=True))
+    ahead = lookahead(mass, values - mean, weights)
     return (ahead.probability * ahead.mean.square().sum(-1)).sum(-1)

@@ -12,6 +12,7 @@ from isiw.acquisition.information import Alternating, MutualInformation, WindowG
 from isiw.acquisition.levelset import IntegratedFeasibility, Straddle
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.sweeps import EvenSpacing, IncrementalSweep, OwnProposal, RandomIsi, SobolIsi
+from isiw.acquisition.twostep import TwoStep
 from isiw.acquisition.variance import EdgeVariance, IntegratedVariance, ProfileVariance
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
@@ -25,6 +26,7 @@ ACQUISITIONS: Final[Mapping[str, Callable[[int], AcquisitionFunction]]] = {
     "window-gain": lambda _seed: WindowGain(),
     "window-information": lambda _seed: WindowInformation(),
     "mutual-information": lambda _seed: MutualInformation(),
+    "two-step": lambda _seed: TwoStep(),
     "edge-variance": lambda _seed: EdgeVariance(),
     "straddle": lambda _seed: Straddle(),
     "feasibility": lambda _seed: IntegratedFeasibility(),
