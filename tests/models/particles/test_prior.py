@@ -1,3 +1,5 @@
+import math
+
 import pytest
 import torch
 
@@ -5,6 +7,7 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.beliefs import prior_with
 from isiw.models.particles.prior import Prior
+from isiw.models.particles.response import NoiseKind
 
 MANY = 20_000
 
@@ -42,8 +45,8 @@ def test_kinds_come_as_often_as_the_prior_says() -> None:
 
 
 def test_a_prior_is_made_from_what_a_configuration_holds() -> None:
-    prior = prior_with({"p_window": 0.7, "width_ms": [80.0, 0.3]}, Prior)
-    assert prior == Prior(p_window=0.7, width_ms=(80.0, 0.3))
+    prior = prior_with({"p_window": 0.7, "width_ms": [80.0, 0.3, 0.0]}, Prior)
+    assert prior == Prior(p_window=0.7, width_ms=(80.0, 0.3, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -54,8 +57,12 @@ def test_a_prior_is_made_from_what_a_configuration_holds() -> None:
         {"p_shape": (0.5, 0.5)},
         {"p_noise": (0.5, 0.2, 0.2)},
         {"p_noise": (1.2, -0.2, 0.0)},
-        {"width_ms": (float("nan"), 0.5)},
-        {"boost": (3.0, 0.0)},
+        {"width_ms": (float("nan"), 0.5, 0.0)},
+        {"width_ms": (80.0, 0.3)},
+        {"boost": (3.0, 0.0, 0.1)},
+        {"boost": (0.0, 0.3, 0.1)},
+        {"rest": (-4.5, 0.4, -0.1)},
+        {"hit_delay_ms": (180.0, 0.0)},
         {"start_ms": (100.0, 5.0)},
     ],
 )
@@ -67,3 +74,15 @@ def test_a_prior_that_cannot_be_is_refused(wrong) -> None:
 def test_a_setting_that_the_prior_does_not_have_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="p_windov"):
         prior_with({"p_windov": 0.5}, Prior)
+
+
+def test_most_people_are_usual_and_the_tail_reaches_the_others() -> None:
+    # Half of all lie within 0.68 SDs of the median, as without a tail; the hand's drive at rest, -6.2, and its largest
+    # MEPs, a hundred floors, are rare but there.
+    prior = Prior()
+    response = people(prior, VALVE_SPACE).response
+    recruits = response.kind[0] == NoiseKind.RECRUITMENT
+    rest = response.rest[0][recruits]
+    assert (rest - prior.rest[0]).abs().median().item() == pytest.approx(0.68 * prior.rest[1], rel=0.1)
+    for rare in (rest < -6.2, response.log_ratio[0][recruits] > math.log(100.0)):
+        assert 0.001 < rare.float().mean().item() < 0.03

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import torch
 
@@ -32,7 +32,6 @@ SHAPE_LATENTS = slice(0, 3)
 NOISE_LATENTS = slice(7, 12)
 
 _SCALES = (
-    "hit_delay_ms",
     "width_ms",
     "floor_mv",
     "floor_log_sd",
@@ -43,6 +42,13 @@ _SCALES = (
     "output_sd",
     "boost",
 )
+
+
+Scale: TypeAlias = tuple[float, float, float]
+"""Median, SD and cubic tail: a latent z stands for the median plus SD z + tail z³, of the logarithm where it is one.
+
+The SD is that of the people who were measured, the tail reaches those whom nobody measured: they are learnt from their
+trials rather than pulled to the usual."""
 
 
 class Latents(NamedTuple):
@@ -81,43 +87,44 @@ class Prior:
         start_ms: where windows start after the impact [ms], uniform between these.
         hit_delay_ms: mean and SD of the hit delay of a person unknown [ms]; 172–188 ms measured (dissertation, 4.2).
         p_anywhere: probability that a window starts anywhere in the range instead, for stimulators unlike that one.
-        width_ms: median and log SD of the width; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
-        floor_mv: median, log SD and cubic tail of the EMG floor; 6–20 µV measured. The tail reaches a factor of ten at
-            2.4 SDs, so that rigs with another gain are learnt rather than pulled to the usual floor.
-        floor_log_sd: median and log SD of the floor's own log SD; 0.12–0.35.
-        gain_ratio: median and log SD of the best expected MEP over the floor; MEPs peak at 0.03–0.3 mV (ibid., 4.2).
-        cv: median and log SD of the constant CV.
+        width_ms: logarithmic scale of the width; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
+        floor_mv: logarithmic scale of the EMG floor; 6–20 µV measured. The tail reaches a factor of ten at 2.4 SDs, for
+            rigs with another gain.
+        floor_log_sd: logarithmic scale of the floor's own log SD; 0.12–0.35.
+        gain_ratio: logarithmic scale of the best expected MEP over the floor; MEPs peak at 0.03–0.3 mV (ibid., 4.2).
+        cv: logarithmic scale of the constant CV.
         max_probability: mean and SD, in logits, of the response probability at the best ISI; often about one half
             (dissertation, Fig. 6.5).
-        recruitment_ratio: median and log SD of the largest MEP over the floor; 0.1–0.25 mV in forearm muscles.
-        input_sd: median and log SD of the input noise in logits: k sigma_x, 0.3 × 5–9 % RMT.
-        output_sd: median and log SD of the output noise, natural log; 0.3–0.5.
-        boost: median and log SD of the boost in logits: k times 5–18 % RMT.
-        rest: mean and SD of the drive at rest in logits: k (90 % RMT − x50).
+        recruitment_ratio: logarithmic scale of the largest MEP over the floor; 0.1–0.25 mV in forearm muscles, up to
+            3 mV in the hand.
+        input_sd: logarithmic scale of the input noise in logits: k sigma_x, 0.3 × 5–9 % RMT in the forearm.
+        output_sd: logarithmic scale of the output noise, natural log; 0.3–0.5.
+        boost: logarithmic scale of the boost in logits: k times 5–18 % RMT.
+        rest: scale of the drive at rest in logits: k (90 % RMT − x50), −4 to −5 in the forearm, −6 in the hand.
         drift_sd: SD of what the log of evoked MEPs drifts by in the long run; about 0.26 over a session measured.
         startup: mean and SD of how strongly the first trials startle, 1 being as much as in blocks of plain TMS.
 
     Raises:
-        InvalidValueError: probabilities that are none or do not sum to one, medians or SDs that are not positive.
+        InvalidValueError: probabilities that are none or do not sum to one, scales that cannot be.
     """
 
-    p_window: float = 0.75
+    p_window: float = 0.72
     p_shape: tuple[float, float, float, float] = (0.68, 0.12, 0.08, 0.12)
     p_noise: tuple[float, float, float] = (0.4, 0.15, 0.45)
     start_ms: tuple[float, float] = (0.0, 115.0)
     hit_delay_ms: tuple[float, float] = (180.0, 6.2)
     p_anywhere: float = 0.08
-    width_ms: tuple[float, float] = (100.0, 0.44)
-    floor_mv: tuple[float, float, float] = (0.009, 0.35, 0.12)
-    floor_log_sd: tuple[float, float] = (0.24, 0.4)
-    gain_ratio: tuple[float, float] = (7.0, 0.7)
-    cv: tuple[float, float] = (0.62, 0.3)
+    width_ms: Scale = (100.0, 0.42, 0.02)
+    floor_mv: Scale = (0.009, 0.35, 0.12)
+    floor_log_sd: Scale = (0.22, 0.38, 0.02)
+    gain_ratio: Scale = (7.3, 0.6, 0.04)
+    cv: Scale = (0.62, 0.25, 0.02)
     max_probability: tuple[float, float] = (0.2, 0.7)
-    recruitment_ratio: tuple[float, float] = (16.0, 0.5)
-    input_sd: tuple[float, float] = (2.1, 0.25)
-    output_sd: tuple[float, float] = (0.39, 0.25)
-    boost: tuple[float, float] = (3.3, 0.45)
-    rest: tuple[float, float] = (-4.6, 0.6)
+    recruitment_ratio: Scale = (16.0, 0.42, 0.04)
+    input_sd: Scale = (2.1, 0.18, 0.015)
+    output_sd: Scale = (0.39, 0.18, 0.02)
+    boost: Scale = (3.4, 0.33, 0.02)
+    rest: Scale = (-4.5, 0.38, 0.05)
     drift_sd: float = 0.3
     startup: tuple[float, float] = (0.5, 0.5)
 
@@ -131,9 +138,12 @@ class Prior:
                 raise InvalidValueError(
                     f"{name} must hold a probability for each kind", got=shares, expected=f"{len(kinds)} that sum to 1"
                 )
-        for name in _SCALES:
-            if not all(math.isfinite(value) and value > 0 for value in getattr(self, name)):
-                raise InvalidValueError(f"{name} must be positive", got=getattr(self, name))
+        for name in (*_SCALES, "rest"):
+            scale = getattr(self, name)
+            if not _is_scale(scale, of_logarithm=name != "rest"):
+                raise InvalidValueError(f"{name} is no scale", got=scale, expected="a median, an SD, and a cubic tail")
+        if not all(math.isfinite(value) and value > 0 for value in self.hit_delay_ms):
+            raise InvalidValueError("hit_delay_ms must be positive", got=self.hit_delay_ms)
         if not all(math.isfinite(value) and value >= 0 for value in (self.drift_sd, *self.startup)):
             raise InvalidValueError("drift_sd and startup must not be negative", got=(self.drift_sd, self.startup))
         if not self.start_ms[0] < self.start_ms[1]:
@@ -162,7 +172,7 @@ class Prior:
         recruits = latents.noise == NoiseKind.RECRUITMENT
         response = Response(
             kind=latents.noise,
-            log_floor=self._log_floor(z["log_floor"]),
+            log_floor=_log_normal(z["log_floor"], self.floor_mv).log(),
             floor_log_sd=_log_normal(z["floor_log_sd"], self.floor_log_sd),
             log_ratio=torch.log(
                 torch.where(
@@ -174,16 +184,12 @@ class Prior:
             spread=torch.where(recruits, _log_normal(z["spread"], self.input_sd), _log_normal(z["spread"], self.cv)),
             output_log_sd=_log_normal(z["output"], self.output_sd),
             boost=_log_normal(z["boost"], self.boost),
-            rest=self.rest[0] + self.rest[1] * z["rest"],
+            rest=self.rest[0] + _spread(z["rest"], self.rest),
             max_probability=torch.sigmoid(self.max_probability[0] + self.max_probability[1] * z["output"]),
             drift=self.drift_sd * z["drift"],
             startup=self.startup[0] + self.startup[1] * z["startup"],
         )
         return Person(shape, response, latents.present)
-
-    def _log_floor(self, z: Tensor) -> Tensor:
-        median_mv, log_sd, tail = self.floor_mv
-        return math.log(median_mv) + log_sd * z + tail * z**3
 
     def _start(self, z: Tensor, space: DesignSpace) -> Tensor:
         return start_ms(z, space, self.start_ms, self.hit_delay_ms, self.p_anywhere)
@@ -225,9 +231,21 @@ def _interpolate(x: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
     return between
 
 
-def _log_normal(z: Tensor, median_and_log_sd: tuple[float, float]) -> Tensor:
-    median, log_sd = median_and_log_sd
-    return median * torch.exp(log_sd * z)
+def _is_scale(scale: Scale, *, of_logarithm: bool) -> bool:
+    if len(scale) != 3 or not all(map(math.isfinite, scale)):
+        return False
+    median, sd, tail = scale
+    return sd > 0 and tail >= 0 and (median > 0 or not of_logarithm)
+
+
+def _spread(z: Tensor, scale: Scale) -> Tensor:
+    """How far from its median a latent is."""
+    _, sd, tail = scale
+    return sd * z + tail * z**3
+
+
+def _log_normal(z: Tensor, scale: Scale) -> Tensor:
+    return scale[0] * torch.exp(_spread(z, scale))
 
 
 def _even(z: Tensor) -> Tensor:
