@@ -276,10 +276,10 @@ def test_a_model_that_cannot_be_is_refused(wrong) -> None:
 
 @pytest.mark.parametrize("isi_ms", [180.0, 260.0, 330.0, 450.0])
 def test_mutual_information_agrees_with_brute_force_within_its_error(isi_ms: float) -> None:
-    # 6400 MEPs drawn from the law itself, each weighed under its own sample and under all 128; three standard errors.
+    # 25600 MEPs drawn from the law itself, each weighed under its own sample and under all 128; three standard errors.
     posterior = after(ParticleModel(thinned=128), [(100.0, 0.01), (250.0, 0.09), (280.0, 0.12), (400.0, 0.012)])
     person = posterior._thinned.person  # noqa: SLF001 - the samples that the score is of
-    draws, samples = 50, person.present.shape[1]
+    draws, samples = 200, person.present.shape[1]
     level = levels(person, torch.tensor([[isi_ms]]))
     gain = log_gain(person.response, torch.tensor([float(posterior.trials)]))
     log_mep = draw_log_mep(person.response, level.expand(-1, -1, draws), torch.Generator().manual_seed(3), gain)
