@@ -45,7 +45,7 @@ def test_what_is_wrong_is_named(values, message):
 
 def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path):
     (tmp_path / "broken.toml").write_text("people = = 3")
-    with pytest.raises(ConfigError, match="broken.toml is not valid TOML"):
+    with pytest.raises(ConfigError, match=r"broken\.toml is not valid TOML"):
         read_toml(tmp_path / "broken.toml")
     with pytest.raises(ConfigError, match="cannot be read"):
         read_toml(tmp_path / "nowhere.toml")
