@@ -16,7 +16,7 @@ from isiw.studies.plan import Study, Unit, run_unit
 from isiw.studies.sessions import TIMES, SimulatedSession, simulate
 from isiw.studies.store import Store, begin_store
 
-__all__ = ["Replay", "conduct", "paired_sessions", "replay", "run_study"]
+__all__ = ["Replay", "conduct", "paired_sessions", "replay", "run_study", "unit_of_row"]
 
 
 def conduct(
@@ -84,6 +84,22 @@ def replay(store: Store, key: str, person: int | None = None) -> Replay:
     kept, again = kept.reset_index(drop=True), again.reset_index(drop=True)
     columns = [name for name in kept.columns if name not in TIMES]
     return Replay(kept, again, tuple(name for name in columns if not _same(kept, again, name)))
+
+
+def unit_of_row(store: Store, row: int) -> tuple[str, int]:
+    """The unit and the person of a row of a study.
+
+    Args:
+        store: the study.
+        row: its number in `store.rows()`.
+
+    Raises:
+        StudyError: there is no such row.
+    """
+    rows = store.rows()
+    if not 0 <= row < len(rows):
+        raise StudyError("the study has no such row", got=row, expected=f"0 to {len(rows) - 1}")
+    return str(rows["unit"].iloc[row]), int(rows["person"].iloc[row])
 
 
 def _same(kept: pd.DataFrame, again: pd.DataFrame, name: str) -> bool:

@@ -142,8 +142,9 @@ def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
         been delivered by then, mistrials among them; F1; whether there is and was reported a window, its edges [ms],
         its probability, whether the 90 % intervals cover start and end (NaN where there are none); how many asks were
         fallbacks and how many fits failed (NaN where a batch cannot say whose); after how many pairs the stopping rule
-        fired (NaN where it has not), why, and whether that was before the budget was used up; the time that the last
-        ask and the last tell took for each person [ms]. After the end of a session its last estimate stays.
+        fired (NaN where it has not), why, and whether that was before the budget was used up (NaN where the rule is
+        ignored); the time that the last ask and the last tell took for each person [ms]. After the end of a session its
+        last estimate stays.
     """
     people = [_Person(session, number, crowd) for number, session in enumerate(sessions)]
     for trial in range(1, sessions[0].trials + 1):
@@ -173,7 +174,8 @@ class _Person:
         self.rows: list[dict[str, Any]] = []
         self.mistrials = self.fallbacks = 0
         self.troubles = 0.0
-        self.stop: dict[str, Any] = {"stop_trial": math.nan, "stop_reason": "", "converged": False}
+        converged = math.nan if session.stopping == "ignored" else 0.0
+        self.stop: dict[str, Any] = {"stop_trial": math.nan, "stop_reason": "", "converged": converged}
 
     @property
     def ended(self) -> bool:
@@ -206,7 +208,7 @@ class _Person:
         rule = self.crowd.stopping
         if rule is not None and (decision := self.crowd.decision(self.number)).stop:
             left = stimuli_left(rule, delivered)
-            self.stop = {"stop_trial": float(delivered), "stop_reason": decision.reason, "converged": left != 0}
+            self.stop = {"stop_trial": float(delivered), "stop_reason": decision.reason, "converged": float(left != 0)}
 
     def _row(self, delivered: int) -> dict[str, Any]:
         session = self.session
