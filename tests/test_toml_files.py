@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import pytest
-from pydantic import ConfigDict
 
 from isiw.errors import ConfigError
 from isiw.toml_files import checked, read_toml
@@ -15,14 +13,12 @@ from isiw.toml_files import checked, read_toml
 @dataclass(frozen=True)
 class Part:
     name: str
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
 
 
 @dataclass(frozen=True)
 class Whole:
     parts: tuple[Part, ...]
     people: int = 3
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
 
 
 def test_values_become_the_dataclass():

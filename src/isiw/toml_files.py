@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any, TypeVar, cast, get_args, get_type_hints
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
 from isiw.errors import ConfigError, IsiwError
@@ -49,18 +49,24 @@ def checked(kind: type[_T], values: Mapping[str, Any], source: str) -> _T:
         ConfigError: an unknown key or a bad value; the message names source, key and value.
     """
     try:
-        return TypeAdapter(kind).validate_python(values)
+        return cast("_T", dict(_strict(kind).model_validate({"values": values}))["values"])
     except ValidationError as error:
         found = error.errors()
         # A key that was misspelt is reported before the one that is missing because of it.
         raise _explained(kind, next((e for e in found if e["type"] in _UNKNOWN), found[0]), source) from error
 
 
+def _strict(kind: type) -> type[BaseModel]:
+    """A model around the kind: dataclasses take from it that unknown keys are an error."""
+    return create_model("Strict", __config__=ConfigDict(extra="forbid"), values=(kind, ...))
+
+
 def _explained(kind: Any, error: ErrorDetails, source: str) -> ConfigError:
-    key = ".".join(str(part) for part in error["loc"])
+    _, *path = error["loc"]
+    key = ".".join(str(part) for part in path)
     if error["type"] in _UNKNOWN:
-        known = _known_keys(kind, error["loc"][:-1])
-        close = difflib.get_close_matches(str(error["loc"][-1]), known, n=1)
+        known = _known_keys(kind, path[:-1])
+        close = difflib.get_close_matches(str(path[-1]), known, n=1)
         return ConfigError(
             f"{source}: the key {key} is unknown",
             got=error["input"],
@@ -76,7 +82,7 @@ def _explained(kind: Any, error: ErrorDetails, source: str) -> ConfigError:
     return ConfigError(what, got=error["input"], expected=error["msg"].removeprefix("Input should be "), remedy=remedy)
 
 
-def _known_keys(kind: Any, section: tuple[int | str, ...]) -> list[str]:
+def _known_keys(kind: Any, section: Sequence[int | str]) -> list[str]:
     for name in section:
         kind = get_args(kind)[0] if isinstance(name, int) else get_type_hints(kind)[name]
     return sorted(f.name for f in fields(kind)) if is_dataclass(kind) else sorted(kind.model_fields)

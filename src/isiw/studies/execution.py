@@ -9,10 +9,11 @@ from __future__ import annotations
 import importlib
 import threading
 import traceback
+import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
@@ -44,7 +45,7 @@ class Executor(Protocol):
 
     def results(
         self, run: Callable[[_Item], _Result], items: Sequence[_Item]
-    ) -> Iterator[tuple[_Item, _Result | Failure]]:
+    ) -> Generator[tuple[_Item, _Result | Failure], None, None]:
         """Each item with its result, or with its failure, in the order of finishing.
 
         Args:
@@ -77,7 +78,7 @@ class Processes:
 
     def results(
         self, run: Callable[[_Item], _Result], items: Sequence[_Item]
-    ) -> Iterator[tuple[_Item, _Result | Failure]]:
+    ) -> Generator[tuple[_Item, _Result | Failure], None, None]:
         """See `Executor`."""
         if self.workers == 1:
             yield from ((item, _attempt(run, item)) for item in items)
@@ -87,8 +88,9 @@ class Processes:
             suspects = [number for number in left if deaths[number]]
             begun: list[int] = []
             try:
-                for number, result in self._pool(run, left, suspects[:1] or list(left), begun):
-                    yield left.pop(number), result
+                with closing(self._pool(run, left, suspects[:1] or list(left), begun)) as results:
+                    for number, result in results:
+                        yield left.pop(number), result
             except BrokenProcessPool as error:
                 if not begun:
                     raise StudyError("the worker processes cannot be started", got=str(error)) from error
@@ -98,7 +100,7 @@ class Processes:
 
     def _pool(
         self, run: Callable[[_Item], _Result], items: dict[int, _Item], numbers: Sequence[int], begun: list[int]
-    ) -> Iterator[tuple[int, _Result | Failure]]:
+    ) -> Generator[tuple[int, _Result | Failure], None, None]:
         def work() -> Iterator[Any]:
             for number in numbers:
                 begun.append(number)
@@ -109,7 +111,15 @@ class Processes:
             pool = Parallel(
                 n_jobs=self.workers, return_as="generator_unordered", batch_size=1, pre_dispatch=self.workers
             )
-        yield from pool(work())
+        results = pool(work())
+        try:
+            for result in results:  # noqa: UP028 - `yield from` would close it before the finally
+                yield result
+        finally:
+            with warnings.catch_warnings():
+                # Whoever stops early knows that work is lost.
+                warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
+                results.close()
 
 
 @dataclass(frozen=True)
@@ -126,7 +136,7 @@ class DaskCluster:
 
     def results(
         self, run: Callable[[_Item], _Result], items: Sequence[_Item]
-    ) -> Iterator[tuple[_Item, _Result | Failure]]:
+    ) -> Generator[tuple[_Item, _Result | Failure], None, None]:
         """See `Executor`.
 
         Raises:

@@ -17,10 +17,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import Any, ClassVar, Final, Literal, TypeAlias, get_args
+from typing import Any, Final, Literal, TypeAlias, get_args
 
 import pandas as pd
-from pydantic import ConfigDict
 
 from isiw.catalogue import settings_of
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
@@ -35,7 +34,6 @@ __all__ = ["Engine", "Study", "StudyStrategy", "Unit", "load_study", "run_unit",
 Engine: TypeAlias = Literal["single", "batched"]
 
 _SPACES: Final[Mapping[str, DesignSpace]] = {"valve": VALVE_SPACE, "impact": IMPACT_SPACE}
-_STRICT: Final = ConfigDict(extra="forbid")
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,6 @@ class StudyStrategy:
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     label: str = ""
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
     def __post_init__(self) -> None:
         family, meant = settings_of(self.name)
@@ -125,7 +122,6 @@ class Study:
     engine: Engine = "single"
     batch: int = 25
     device: str = "cpu"
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
     def __post_init__(self) -> None:
         for name in ("strategies", "cohorts", "marks"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,9 +41,11 @@ def conduct(
         StudyError: the folder is another study's, or the executor is lost.
     """
     store = begin_store(study, folder)
-    for unit, result in (executor or Processes()).results(run_unit, store.left(retry=retry)):
-        store.keep(unit, result)
-        on_done(unit, result)
+    # Closed at once where it is interrupted, so that no worker goes on in vain.
+    with closing((executor or Processes()).results(run_unit, store.left(retry=retry))) as results:
+        for unit, result in results:
+            store.keep(unit, result)
+            on_done(unit, result)
     return store
 
 
