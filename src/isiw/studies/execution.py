@@ -6,16 +6,18 @@ down with it again and again, comes back as a `Failure` among the results: nothi
 
 from __future__ import annotations
 
+import asyncio
 import importlib
 import threading
 import traceback
 import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from joblib import Parallel, delayed, parallel_config
 
@@ -126,9 +128,11 @@ class Processes:
 class DaskCluster:
     """A Dask cluster: a scheduler's address, or a `distributed.Client`, whose workers have isiw installed.
 
+    Dask itself hands out again what ran on a worker that died, as often as its setting `allowed-failures` says.
+
     Args:
         scheduler: the address, such as `"tcp://10.0.0.1:8786"`, or the client.
-        attempts: how often a task is tried that the cluster itself could not carry out.
+        attempts: an item whose result was lost on the cluster so often is given up.
     """
 
     scheduler: Any
@@ -144,19 +148,41 @@ class DaskCluster:
         """
         dask = _distributed()
         with ExitStack() as stack:
-            client = (
-                stack.enter_context(_client(dask, self.scheduler)) if _is_address(self.scheduler) else self.scheduler
-            )
-            futures = client.map(_attempt_alone, [run] * len(items), items, pure=False, retries=self.attempts - 1)
-            stack.callback(client.cancel, futures)
-            item_of = {future.key: item for future, item in zip(futures, items, strict=True)}
-            for future in dask.as_completed(futures):
-                yield item_of[future.key], _result_of(future)
-                future.release()
+            address = self.scheduler if isinstance(self.scheduler, str) else None
+            client = self.scheduler if address is None else stack.enter_context(_client(dask, address))
+            running, held = dask.as_completed(loop=client.loop), dict[str, _HandedOut[_Item]]()
+            stack.callback(lambda: client.cancel([each.future for each in held.values()]))
+
+            def hand_out(item: _Item, losses: int = 0) -> None:
+                future = client.submit(_attempt_alone, run, item, pure=False)
+                held[future.key] = _HandedOut(item, future, losses)
+                running.add(future)
+
+            for item in items:
+                hand_out(item)
+            for future in running:
+                item, _, losses = held.pop(future.key)
+                result = _result_of(future)
+                if not isinstance(result, _Lost):
+                    yield item, result
+                elif client.status != "running":
+                    raise StudyError("the Dask scheduler was lost", remedy="Run again: what is finished is kept.")
+                elif losses + 1 < self.attempts:
+                    hand_out(item, losses + 1)
+                else:
+                    yield item, Failure(f"Its result was lost on the cluster {self.attempts} times.")
 
 
-def _is_address(scheduler: Any) -> bool:
-    return isinstance(scheduler, str)
+class _HandedOut(NamedTuple, Generic[_Item]):
+    """What a Dask cluster works on."""
+
+    item: _Item
+    future: Any
+    losses: int
+
+
+class _Lost:
+    """A result that went down with the worker, or the cluster, that held it."""
 
 
 def _distributed() -> Any:
@@ -176,11 +202,12 @@ def _client(dask: Any, address: str) -> Any:
 
 
 def _result_of(future: Any) -> Any:
-    """What a Dask future came to; the death of its workers is its failure, the loss of the cluster an error."""
-    if future.status in {"cancelled", "lost"}:
-        raise StudyError("the Dask scheduler was lost", remedy="Run the study again: what is finished is kept.")
-    error = future.exception()
-    return future.result() if error is None else Failure(_line(error))
+    """What a Dask future came to; what took its workers down is a failure."""
+    try:
+        error = future.exception()
+        return future.result() if error is None else Failure(_line(error))
+    except (asyncio.CancelledError, CancelledError):
+        return _Lost()
 
 
 def _attempt(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
