@@ -7,16 +7,18 @@ down with it again and again, comes back as a `Failure` among the results: nothi
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import importlib
 import threading
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from joblib import Parallel, delayed, parallel_config
@@ -151,7 +153,7 @@ class DaskCluster:
             address = self.scheduler if isinstance(self.scheduler, str) else None
             client = self.scheduler if address is None else stack.enter_context(_client(dask, address))
             running, held = dask.as_completed(loop=client.loop), dict[str, _HandedOut[_Item]]()
-            stack.callback(lambda: client.cancel([each.future for each in held.values()]))
+            stack.callback(_cancel, client, held)
 
             def hand_out(item: _Item, losses: int = 0) -> None:
                 future = client.submit(_attempt_alone, run, item, pure=False)
@@ -201,6 +203,11 @@ def _client(dask: Any, address: str) -> Any:
         ) from error
 
 
+def _cancel(client: Any, held: Mapping[str, _HandedOut[Any]]) -> None:
+    if client.status == "running":
+        client.cancel([each.future for each in held.values()])
+
+
 def _result_of(future: Any) -> Any:
     """What a Dask future came to; what took its workers down is a failure."""
     try:
@@ -218,7 +225,24 @@ def _attempt(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
 
 
 def _numbered(run: Callable[[_Item], _Result], number: int, item: _Item) -> tuple[int, _Result | Failure]:
+    _keep_memory()
     return number, _attempt(run, item)
+
+
+@cache
+def _keep_memory() -> None:
+    """Have this worker keep the memory that it frees.
+
+    glibc gives large blocks back to the system at once; a batch of people, which needs them again on the next trial,
+    spent a quarter of its time on getting them.
+    """
+    with suppress(AttributeError, OSError, TypeError):  # another C library has no such setting
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(_MMAP_THRESHOLD, 1 << 30)
+        mallopt(_TRIM_THRESHOLD, 1 << 30)
+
+
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # malloc.h
 
 
 _ONE_AT_A_TIME = threading.Lock()
@@ -226,6 +250,7 @@ _ONE_AT_A_TIME = threading.Lock()
 
 def _attempt_alone(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
     """One session at a time in each worker process, however many threads it has: torch and Pyro share global state."""
+    _keep_memory()
     with _ONE_AT_A_TIME:
         return _attempt(run, item)
 
