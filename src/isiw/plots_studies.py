@@ -37,11 +37,11 @@ def study_figure(table: pd.DataFrame) -> Figure:
     columns = min(_COLUMNS, max(1, len(cohorts)))
     lines = max(1, -(-len(cohorts) // columns))
     figure = Figure(figsize=(0.8 + 3.2 * columns, 0.6 + 2.7 * lines), layout="constrained")
-    panels = figure.subplots(lines, columns, squeeze=False, sharey=True).flat
+    panels = list(figure.subplots(lines, columns, squeeze=False, sharey=True).flat)
     for axes, cohort in zip(panels, cohorts, strict=False):
         _draw_cohort(axes, played[played["cohort"] == cohort], strategies)
         axes.set_title(cohort, fontsize=10, loc="left", color=INK)
-    for axes in list(panels)[len(cohorts) :]:
+    for axes in panels[len(cohorts) :]:
         axes.set_visible(False)
     if strategies:
         figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside right upper", fontsize=8, frameon=False)
