@@ -165,7 +165,7 @@ COMMAND = [sys.executable, "-c", "from isiw.cli import app; app()"]
 
 @pytest.fixture
 def started(tmp_path):
-    """A study that runs in another process, some of it finished; its workers end with the test."""
+    """A study that runs in another process, some of it finished; its workers must not outlive it."""
     (tmp_path / "tiny.toml").write_text(TOML.replace("people = 12", "people = 40"))
     parts = tmp_path / "tiny.study" / "parts"
     command = [*COMMAND, "study", "run", str(tmp_path / "tiny.toml"), "--workers", "2"]
@@ -174,10 +174,9 @@ def started(tmp_path):
             assert process.poll() is None
             time.sleep(0.01)
         workers = workers_of(psutil.Process(process.pid))
+        assert len(workers) == 2
         yield process
-        for worker in workers:
-            if worker.is_running():
-                worker.kill()
+        assert psutil.wait_procs(workers, timeout=10)[1] == []
 
 
 def finished_to_the_end(folder: Path) -> pd.DataFrame:
@@ -204,11 +203,9 @@ def test_the_death_of_the_main_process_in_mid_study_loses_no_row(tmp_path, start
 
 @posix
 def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path, started):
-    workers = workers_of(psutil.Process(started.pid))
     os.killpg(started.pid, signal.SIGINT)  # a terminal tells the workers, too
     _, errors = started.communicate(timeout=30)
     assert started.returncode == 130
     assert f"go on with: isiw study run {tmp_path / 'tiny.study'}" in errors
     assert "Traceback" not in errors
-    assert psutil.wait_procs(workers, timeout=10)[1] == []
     finished_to_the_end(tmp_path / "tiny.study")

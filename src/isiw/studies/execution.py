@@ -9,7 +9,9 @@ from __future__ import annotations
 import asyncio
 import ctypes
 import importlib
+import os
 import threading
+import time
 import traceback
 import warnings
 from collections import Counter
@@ -226,7 +228,21 @@ def _attempt(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
 
 def _numbered(run: Callable[[_Item], _Result], number: int, item: _Item) -> tuple[int, _Result | Failure]:
     _keep_memory()
+    _leave_with_parent()
     return number, _attempt(run, item)
+
+
+@cache
+def _leave_with_parent() -> None:
+    """End this worker once the process that runs the study has died: nobody would fetch what it computes."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @cache
