@@ -110,7 +110,7 @@ class Processes:
         def work() -> Iterator[Any]:
             for number in numbers:
                 begun.append(number)
-                yield delayed(_numbered)(run, number, items[number])
+                yield delayed(_numbered)(run, number, items[number], os.getpid())
 
         with parallel_config(backend="loky", inner_max_num_threads=1):
             # No more are handed out than run at once, so that few are under suspicion when a worker dies.
@@ -226,16 +226,15 @@ def _attempt(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
         return Failure(_line(error), traceback.format_exc())
 
 
-def _numbered(run: Callable[[_Item], _Result], number: int, item: _Item) -> tuple[int, _Result | Failure]:
+def _numbered(run: Callable[[_Item], _Result], number: int, item: _Item, parent: int) -> tuple[int, _Result | Failure]:
     _keep_memory()
-    _leave_with_parent()
+    _leave_with(parent)
     return number, _attempt(run, item)
 
 
 @cache
-def _leave_with_parent() -> None:
-    """End this worker once the process that runs the study has died: nobody would fetch what it computes."""
-    parent = os.getppid()
+def _leave_with(parent: int) -> None:
+    """End this worker once its parent has died, which runs the study: nobody would fetch what it computes."""
 
     def watch() -> None:
         while os.getppid() == parent:
