@@ -129,13 +129,13 @@ def test_a_batch_on_a_gpu_finds_windows_as_well():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("strategy", ["default", "nr", "pf"])
-def test_the_mean_f1_of_a_batch_is_that_of_one_at_a_time(strategy):
-    # The same people with the same noise, other draws of the model: paired differences within three standard errors.
-    batch = sessions(strategy, 60, trials=30, cohort="gaussian", stopping="ignored")
+@pytest.mark.parametrize(("strategy", "trials"), [("default", 15), ("nr", 20), ("pf", 40)])
+def test_the_mean_f1_of_a_batch_is_that_of_one_at_a_time(strategy, trials):
+    # The same people with the same noise, other draws of the model: paired, so that people do not blur the difference.
+    batch = sessions(strategy, 40, trials=trials, cohort="gaussian", stopping="ignored")
     together, apart = (
-        rows[rows["trial"] == 30]["f1"].to_numpy() for rows in (simulate_batch(batch), one_at_a_time(batch))
+        rows[rows["trial"] == trials]["f1"].to_numpy() for rows in (simulate_batch(batch), one_at_a_time(batch))
     )
     difference = together - apart
-    assert abs(difference.mean()) < 3 * difference.std(ddof=1) / np.sqrt(len(difference)) + 1e-9
-    assert abs(difference.mean()) < 0.05
+    assert difference.any()
+    assert abs(difference.mean()) < 3 * difference.std(ddof=1) / np.sqrt(len(difference))
