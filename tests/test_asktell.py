@@ -11,9 +11,9 @@ import pytest
 import torch
 
 from isiw.acquisition.information import MutualInformation, WindowGain
-from isiw.asktell import Recipe, Strategy, candidate_isis
+from isiw.asktell import Recipe, Strategy
 from isiw.catalogue import make_strategy
-from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, OutOfSpaceError, StrategyError
 from isiw.models.protocol import Posterior, Tensor
 from isiw.stopping import Budget, EdgeVariance
@@ -301,13 +301,3 @@ def test_a_batch_from_a_model_that_imagines_no_trials_is_refused(scripted_strate
     assert len(scripted_strategy().ask_batch(1)) == 1
     with pytest.raises(InvalidValueError, match="at least one"):
         scripted_strategy().ask_batch(0)
-
-
-@pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE, DesignSpace(0, 1), DesignSpace(-20, 30, step_ms=0.1)])
-def test_candidates_are_few_evenly_spaced_and_hold_both_ends(space: DesignSpace) -> None:
-    candidates = candidate_isis(space).double().numpy()
-    assert len(candidates) <= 101
-    assert (candidates[0], candidates[-1]) == pytest.approx((space.low_ms, space.high_ms))
-    steps = np.diff(candidates)
-    np.testing.assert_allclose(steps[:-1], steps[0], rtol=1e-4)
-    assert 0 < steps[-1] <= steps[0] * (1 + 1e-4)

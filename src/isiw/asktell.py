@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -14,32 +13,17 @@ from typing import Any, TypeVar
 import torch
 
 from isiw.acquisition.batch import greedy_batch, own_plan
-from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
-from isiw.acquisition.sweeps import golden_index
+from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.asking import Choice, Cost, best_choices, evenly_spaced, planned_choices, remembered
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
-from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel, Tensor
-from isiw.stopping import Progress, StopDecision, StoppingRule, looks_back
+from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel
+from isiw.stopping import Progress, StopDecision, StoppingRule
 from isiw.window import WindowEstimate
 
-__all__ = ["Recipe", "Strategy", "candidate_isis"]
-
-MAX_CANDIDATES = 101
+__all__ = ["Recipe", "Strategy"]
 
 _T = TypeVar("_T")
-
-
-def candidate_isis(space: DesignSpace, max_candidates: int = MAX_CANDIDATES) -> Tensor:
-    """Evenly spaced ISIs of the design grid to score [ms], both ends included, shape (t,).
-
-    Args:
-        space: the design space.
-        max_candidates: at most this many, so that the cost of an ask does not grow with the range.
-    """
-    grid = space.grid_ms
-    stride = max(1, math.ceil((len(grid) - 1) / (max_candidates - 1)))
-    picked = sorted({*range(0, len(grid), stride), len(grid) - 1})
-    return torch.as_tensor(grid[picked], dtype=torch.float32)
 
 
 def _fulfil(answer: Future[_T], choose: Callable[[], _T]) -> None:
@@ -90,15 +74,14 @@ class Strategy:
         stopping: StoppingRule,
         *,
         initial_ms: Sequence[float] = (),
-        cost: Callable[[Tensor], Tensor] | None = None,
+        cost: Cost | None = None,
         seed: int = 0,
         recipe: Recipe | None = None,
     ) -> None:
         self.space, self.model, self.acquisition, self.stopping = space, model, acquisition, stopping
         self.initial_ms = tuple(space.snap(isi_ms) for isi_ms in initial_ms)
         self.recipe = recipe or Recipe(name="", seed=seed)
-        self._cost, self._seed = cost, seed
-        self._candidates = candidate_isis(space)
+        self.cost, self.seed = cost, seed
         self._posterior: Posterior = model.prior(space, seed)
         missing = [c.__name__ for c in acquisition.needs if not isinstance(self._posterior, c)]
         if missing:
@@ -110,8 +93,8 @@ class Strategy:
         self._told = 0
         self._told_alone = 0
         self._mistrials = 0
-        self._past: deque[WindowEstimate] = deque(maxlen=looks_back(stopping))
-        self._next_isi_ms: float | None = None
+        self._past: tuple[WindowEstimate, ...] = ()
+        self._choice: Choice | None = None
         self._estimate: WindowEstimate | None = None
         self._fallback_reason: str | None = None
 
@@ -123,8 +106,8 @@ class Strategy:
             self.acquisition,
             self.stopping,
             initial_ms=self.initial_ms,
-            cost=self._cost,
-            seed=self._seed,
+            cost=self.cost,
+            seed=self.seed,
             recipe=self.recipe,
         )
 
@@ -144,14 +127,13 @@ class Strategy:
         """
         if deadline_s is not None and not deadline_s >= 0:
             raise InvalidValueError("deadline_s must be a time from 0 up", got=deadline_s)
-        if self._next_isi_ms is None:
-            if planned := self._planned():
-                self._next_isi_ms = planned[0]
+        if self._choice is None:
+            if planned := planned_choices(self._posterior, self.acquisition, self.space, self._initial_left):
+                self._choice = planned[0]
             else:
-                self._next_isi_ms, self._fallback_reason = (
-                    self._best(self._posterior) if deadline_s is None else self._best_within(deadline_s)
-                )
-        return self._next_isi_ms
+                self._choice = self._best(self._posterior) if deadline_s is None else self._best_within(deadline_s)
+            self._fallback_reason = self._fallback_reason or self._choice.fallback
+        return self._choice.isi_ms
 
     def ask_batch(self, n: int) -> list[float]:
         """The next n ISIs [ms], to be delivered before anything is told; the first is what `ask` answers.
@@ -169,14 +151,23 @@ class Strategy:
         return greedy_batch(self._posterior, self.acquisition, chosen, n, self._next_of_batch)
 
     def _next_of_batch(self, posterior: Posterior) -> float:
-        isi_ms, reason = self._best(posterior)
-        self._fallback_reason = self._fallback_reason or reason
-        return isi_ms
+        choice = self._best(posterior)
+        self._fallback_reason = self._fallback_reason or choice.fallback
+        return choice.isi_ms
+
+    @property
+    def _pairs(self) -> int:
+        """How many pairs of stimuli have been told."""
+        return self._told - self._told_alone
+
+    @property
+    def _initial_left(self) -> tuple[float, ...]:
+        """What is left of the initial ISIs [ms]."""
+        return self.initial_ms[self._pairs :]
 
     def _planned(self) -> list[float]:
         """What is left of the initial ISIs, and the plan of a method that has its own [ms]."""
-        own = own_plan(self._posterior, self.acquisition)
-        return [*self.initial_ms[self._told - self._told_alone :], *map(self.space.snap, own)]
+        return [*self._initial_left, *map(self.space.snap, own_plan(self._posterior, self.acquisition))]
 
     @property
     def fallback_reason(self) -> str | None:
@@ -188,28 +179,18 @@ class Strategy:
         """What went wrong with the last fit and what stands in for it; None where nothing did."""
         return self._posterior.trouble if isinstance(self._posterior, ReportsTrouble) else None
 
-    def _best(self, posterior: Posterior) -> tuple[float, str | None]:
-        """The best ISI [ms], or an evenly spaced one and why."""
-        scores = self.acquisition(posterior, self._candidates)
-        turn = golden_index(self._told, len(self._candidates))
-        reason = None
-        if not scores[0].isfinite().any():
-            reason = f"{type(self.acquisition).__name__} gives no ISI a finite score: an evenly spaced one instead."
-        cost = None if self._cost is None else self._cost(self._candidates)
-        return self._isi_ms(int(best_candidate(scores, cost, first=turn)[0])), reason
+    def _best(self, posterior: Posterior) -> Choice:
+        return best_choices(posterior, self.acquisition, self.space, told=self._told, cost=self.cost)[0]
 
-    def _isi_ms(self, candidate: int) -> float:
-        return self.space.snap(float(self._candidates[candidate]))
-
-    def _best_within(self, deadline_s: float) -> tuple[float, str | None]:
-        answer: Future[tuple[float, str | None]] = Future()
+    def _best_within(self, deadline_s: float) -> Choice:
+        answer: Future[Choice] = Future()
         # A posterior never changes, so a late thread can go on with it and be forgotten.
         threading.Thread(target=_fulfil, args=(answer, partial(self._best, self._posterior)), daemon=True).start()
         try:
             return answer.result(deadline_s)
         except TimeoutError:
             reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
-            return self._isi_ms(golden_index(self._told, len(self._candidates))), reason
+            return Choice(evenly_spaced(self.space, self._told), reason)
 
     def tell(
         self,
@@ -252,9 +233,9 @@ class Strategy:
         self._posterior = self.model.update(self._posterior, observation)
         self._told += 1
         self._told_alone += isi_ms is None
-        self._next_isi_ms = self._estimate = self._fallback_reason = None
-        if self._past.maxlen and isi_ms is not None and self._told - self._told_alone >= len(self.initial_ms):
-            self._past.append(self.estimate())
+        self._choice = self._estimate = self._fallback_reason = None
+        if isi_ms is not None:
+            self._past = remembered(self._past, self.estimate, self.stopping, self._pairs - len(self.initial_ms))
 
     def count_mistrial(self) -> None:
         """Count a delivered stimulus whose outcome is not told: it uses up budget and changes nothing else."""
@@ -268,6 +249,4 @@ class Strategy:
 
     def decision(self) -> StopDecision:
         """Whether to stop now, and why."""
-        return self.stopping(
-            Progress(self._told + self._mistrials, self._told, self.estimate(), past=tuple(self._past))
-        )
+        return self.stopping(Progress(self._told + self._mistrials, self._told, self.estimate(), past=self._past))

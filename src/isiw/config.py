@@ -13,11 +13,9 @@ Every key may be left out. Example:
 from __future__ import annotations
 
 import datetime as dt
-import difflib
 import itertools
-import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import asdict
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final, Literal, Self
@@ -26,7 +24,6 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    ValidationError,
     ValidationInfo,
     create_model,
     field_validator,
@@ -39,10 +36,11 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
 from isiw.devices.recorded import RecordedDevice, load_recordings
 from isiw.devices.simulated import SimulatedDevice
-from isiw.errors import ConfigError, InvalidValueError, IsiwError
+from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.reader import SessionRecord
 from isiw.session import Session, SessionUpdate
 from isiw.subjects import COHORTS, SimulatedSubject, cohort
+from isiw.toml_files import checked, read_toml
 from isiw.types import Reference
 from isiw.window import Window
 
@@ -183,43 +181,11 @@ def load_config(path: str | Path | None = None) -> RunConfig:
     """
     if path is None:
         return _validated({}, "the defaults")
-    try:
-        values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(
-            f"the configuration cannot be read: {error.strerror}", got=str(path), remedy="Check the path."
-        ) from error
-    except ValueError as error:  # not TOML, or not UTF-8
-        raise ConfigError(f"{path} is not valid TOML: {error}", remedy="Mend the line that it names.") from error
-    return _validated(values, str(path))
+    return _validated(read_toml(path), str(path))
 
 
 def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
-    kind = _kind(_named(values))
-    try:
-        return kind.model_validate(values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        if first["type"] in {"extra_forbidden", "unexpected_keyword_argument"}:
-            known = _known_keys(kind, first["loc"][:-1])
-            close = difflib.get_close_matches(str(first["loc"][-1]), known, n=1)
-            guess = f"Did you mean {close[0]}? " if close else ""
-            raise ConfigError(
-                f"{source}: the key {key} is unknown",
-                got=first["input"],
-                expected=f"one of {', '.join(known)}",
-                remedy=f"{guess}Correct it or remove it.",
-            ) from error
-        own = first.get("ctx", {}).get("error")
-        what, remedy = f"{source}: the value of {key} cannot be used", "Correct it, or remove the key for its default."
-        if isinstance(own, IsiwError):
-            raise ConfigError(
-                f"{what}: {own.what}", got=own.got, expected=own.expected, remedy=own.remedy or remedy
-            ) from error
-        raise ConfigError(
-            what, got=first["input"], expected=first["msg"].removeprefix("Input should be "), remedy=remedy
-        ) from error
+    return checked(_kind(_named(values)), values, source)
 
 
 def _named(values: Mapping[str, Any]) -> str:
@@ -235,12 +201,6 @@ def _kind(strategy: str) -> type[RunConfig]:
     family, _ = settings_of(strategy)
     settings = create_model("StrategyConfig", __base__=StrategyConfig, settings=(family, _FILLED))
     return create_model("RunConfig", __base__=RunConfig, strategy=(settings, _FILLED))
-
-
-def _known_keys(kind: Any, section: tuple[int | str, ...]) -> list[str]:
-    for name in section:
-        kind = kind.model_fields[str(name)].annotation
-    return sorted(f.name for f in fields(kind)) if is_dataclass(kind) else sorted(kind.model_fields)
 
 
 def config_of_log(record: SessionRecord) -> RunConfig:

@@ -80,6 +80,10 @@ class DesignSpace:
         steps = round((min(max(isi_ms, self.low_ms), self.high_ms) - self.low_ms) / self.step_ms)
         return float(self.grid_ms[steps])
 
+    def admits(self, isi_ms: float) -> bool:
+        """Whether a realised ISI [ms] can have come from this space."""
+        return self.low_ms - self.tolerance_ms <= isi_ms <= self.high_ms + self.tolerance_ms
+
     def check_realised(self, isi_ms: float) -> float:
         """Return a realised ISI [ms] if it can have come from this space.
 
@@ -89,7 +93,7 @@ class DesignSpace:
         """
         if not math.isfinite(isi_ms):
             raise InvalidValueError("a realised ISI must be a finite number of milliseconds", got=isi_ms)
-        if not self.low_ms - self.tolerance_ms <= isi_ms <= self.high_ms + self.tolerance_ms:
+        if not self.admits(isi_ms):
             raise OutOfSpaceError(
                 "the realised ISI is beyond the design space",
                 got=isi_ms,

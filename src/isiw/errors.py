@@ -10,6 +10,7 @@ Every message says what is wrong, what was got, what was expected, and the way o
     ├── DeviceError                       a device that failed, refused, or did not answer
     │   ├── LimitExceededError            a stimulus refused by a limit, before anything was delivered
     │   └── DeviceTimeoutError            no answer within the time allowed
+    ├── StudyError                        a study that cannot go on, or whose folder is another one's
     └── LogError                          a log that cannot be written or read
         └── DamagedLogError               a log that ends too early or fails its checksums
 """
@@ -66,6 +67,10 @@ class LimitExceededError(DeviceError):
 
 class DeviceTimeoutError(DeviceError):
     """A device that did not answer within the time allowed."""
+
+
+class StudyError(IsiwError):
+    """A study that cannot be run, gone on with or read."""
 
 
 class LogError(IsiwError):

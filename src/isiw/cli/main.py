@@ -1,24 +1,21 @@
-"""The command line. Everything else is loaded only once a command runs, so that `--help` is there at once."""
+"""The commands about sessions, and what the command line is made of."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 import isiw
+from isiw.cli import study
+from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show
 
 if TYPE_CHECKING:
     from isiw.session import Session, SessionUpdate
 
 __all__ = ["app"]
-
-DAMAGED = 3
-INTERRUPTED = 130  # what shells report for Ctrl-C
 
 app = typer.Typer(
     name="isiw",
@@ -27,29 +24,30 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.add_typer(study.app, name="study")
 
 _WIDTHS = (5, 7, 30, 9, 14, 8, 8, 4)
-_NO_DEFAULT = {"show_default": False}
+_INTERRUPTED = "Interrupted: the device is stopped and the log is closed."
 
-Log = Annotated[Path, typer.Argument(help="A session's log.", **_NO_DEFAULT)]
-Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **_NO_DEFAULT)]
-Seed = Annotated[int | None, typer.Option(help="Seed of the person, the trials and the strategy.", **_NO_DEFAULT)]
+Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
+Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **NO_DEFAULT)]
+Seed = Annotated[int | None, typer.Option(help="Seed of the person, the trials and the strategy.", **NO_DEFAULT)]
 
 
 @app.command()
 def run(
-    config: Annotated[Path | None, typer.Argument(help="A configuration file (TOML).", **_NO_DEFAULT)] = None,
+    config: Annotated[Path | None, typer.Argument(help="A configuration file (TOML).", **NO_DEFAULT)] = None,
     subject: Annotated[
         str | None,
-        typer.Option(help="simulated, or recorded: a simulated person's MEPs in recorded EMG.", **_NO_DEFAULT),
+        typer.Option(help="simulated, or recorded: a simulated person's MEPs in recorded EMG.", **NO_DEFAULT),
     ] = None,
     data: Data = None,
-    strategy: Annotated[str | None, typer.Option(help="A strategy of isiw strategies.", **_NO_DEFAULT)] = None,
+    strategy: Annotated[str | None, typer.Option(help="A strategy of isiw strategies.", **NO_DEFAULT)] = None,
     seed: Seed = None,
     log: Annotated[Path | None, typer.Option(help="Where to log; by default a new file in isiw-sessions.")] = None,
 ) -> None:
     """Run a session with a simulated person, and say what was found."""
-    with _errors_reported():
+    with errors_reported(_INTERRUPTED):
         given = {"seed": seed, "log": log, "subject": subject, "data": data, "strategy": strategy}
         settings = isiw.config.load_config(config).with_overrides(**given)
         _run_to_the_end(isiw.config.session_for(settings, on_trial=_show_progress))
@@ -62,22 +60,22 @@ def resume(
     verify: Annotated[bool, typer.Option(help="Check that the strategy asks again what it asked then.")] = True,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Go on with a session that was interrupted."""
-    with _errors_reported():
+    with errors_reported(_INTERRUPTED):
         settings = isiw.config.config_of_log(isiw.read_session(log)).with_overrides(data=data)
         device = isiw.config.device_for(settings)
         _run_to_the_end(isiw.resume(log, device, on_trial=_show_progress, verify=verify))
 
 
-@app.command()
-def show(log: Log) -> None:
+@app.command("show")
+def show_log(log: Log) -> None:
     """List a session's trials and say what was found; works on a damaged log, too."""
-    with _errors_reported():
+    with errors_reported(_INTERRUPTED):
         record = isiw.read_session(log)
         for row in (isiw.report.TRIAL_HEADINGS, *isiw.report.trial_rows(record)):
             _print_row(row)
         for event in record.events:
-            _print(f"{event.kind} (trial {event.trial}): {event.text}")
-        _print(isiw.report.final_statement(record), style="bold")
+            show(f"{event.kind} (trial {event.trial}): {event.text}")
+        show(isiw.report.final_statement(record), style="bold")
         _exit_if_damaged(record.losses)
 
 
@@ -87,10 +85,10 @@ def plot(
     output: Annotated[Path, typer.Option("--output", "-o", help="Where to: .png, .pdf, .svg …")],
 ) -> None:
     """Draw a session: profile, trials, window, and how they came."""
-    with _errors_reported():
+    with errors_reported(_INTERRUPTED):
         record = isiw.read_session(log)
         truth = isiw.config.true_window(record)
-        _print(f"picture: {isiw.plots.save_session_plot(record, output, truth=truth)}")
+        show(f"picture: {isiw.plots.save_session_plot(record, output, truth=truth)}")
         _exit_if_damaged(record.losses)
 
 
@@ -101,53 +99,53 @@ def exclude(
     reason: Annotated[str, typer.Option(help="Why, for whoever reads the log.")],
 ) -> None:
     """Exclude a trial afterwards; nothing is erased, and resuming learns without it."""
-    with _errors_reported():
+    with errors_reported(_INTERRUPTED):
         isiw.exclude(log, trial, reason)
-        _print(f"Trial {trial} is excluded: {reason}")
+        show(f"Trial {trial} is excluded: {reason}")
 
 
 @app.command()
 def strategies() -> None:
     """List the named strategies, and what each does."""
     for name, summary in isiw.list_strategies().items():
-        _print(f"{name:18}{summary}")
+        show(f"{name:18}{summary}")
 
 
 @app.command()
 def timing(
-    source: Annotated[str, typer.Argument(help="A preset of the tapping robot, or a session's log.", **_NO_DEFAULT)],
+    source: Annotated[str, typer.Argument(help="A preset of the tapping robot, or a session's log.", **NO_DEFAULT)],
     taps: Annotated[int, typer.Option(help="Taps of a preset for each ISI.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of a preset's taps.")] = 0,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **_NO_DEFAULT)] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
 ) -> None:
     """Say how repeatable the taps are: events, ISI errors, mistrials."""
-    with _errors_reported():
+    with errors_reported(_INTERRUPTED):
         recorded = Path(source).is_file()
         study = (
             isiw.timing.study_session(isiw.read_session(source))
             if recorded
             else isiw.timing.study_preset(source, taps=taps, seed=seed)
         )
-        _print(isiw.timing.timing_report(study))
+        show(isiw.timing.timing_report(study))
         if output is not None:
-            _print(f"picture: {isiw.plots_timing.save_timing_plot(study, output)}")
+            show(f"picture: {isiw.plots_timing.save_timing_plot(study, output)}")
 
 
 def _run_to_the_end(session: Session) -> None:
-    _print(f"log: {session.log_path}")
+    show(f"log: {session.log_path}")
     _print_row(isiw.report.PROGRESS_HEADINGS)
     try:
         result = session.run()
     except BaseException:
         if session.trials:
-            _print(f"The session ended early. Its log is safe; go on with: isiw resume {session.log_path}")
+            show(f"The session ended early. Its log is safe; go on with: isiw resume {session.log_path}")
         raise
     record = isiw.read_session(result.log)
     truth = isiw.config.true_window(record)
     picture = isiw.plots.save_session_plot(record, result.log.with_suffix(".png"), truth=truth)
-    _print(f"\n{isiw.report.final_statement(record)}", style="bold")
-    _print(isiw.report.truth_sentence(record, truth))
-    _print(f"log:     {result.log}\npicture: {picture}")
+    show(f"\n{isiw.report.final_statement(record)}", style="bold")
+    show(isiw.report.truth_sentence(record, truth))
+    show(f"log:     {result.log}\npicture: {picture}")
 
 
 def _show_progress(update: SessionUpdate) -> None:
@@ -155,29 +153,11 @@ def _show_progress(update: SessionUpdate) -> None:
 
 
 def _print_row(cells: Sequence[str]) -> None:
-    _print("  ".join(cell.ljust(width) for cell, width in zip(cells, _WIDTHS, strict=False)).rstrip())
-
-
-def _print(text: str, *, style: str | None = None, stderr: bool = False) -> None:
-    """Print, coloured where the output is a terminal."""
-    Console(stderr=stderr, highlight=False, soft_wrap=True).print(text, style=style, markup=False)
+    show("  ".join(cell.ljust(width) for cell, width in zip(cells, _WIDTHS, strict=False)).rstrip())
 
 
 def _exit_if_damaged(losses: Sequence[str]) -> None:
     for loss in losses:
-        _print(loss, style="red")
+        show(loss, style="red")
     if losses:
         raise typer.Exit(DAMAGED)
-
-
-@contextmanager
-def _errors_reported() -> Iterator[None]:
-    """Turn what isiw raises into a message and an exit code."""
-    try:
-        yield
-    except isiw.errors.IsiwError as error:
-        _print(f"error: {error}", style="red", stderr=True)
-        raise typer.Exit(DAMAGED if isinstance(error, isiw.errors.DamagedLogError) else 1) from error
-    except KeyboardInterrupt as error:
-        _print("Interrupted: the device is stopped and the log is closed.", style="red", stderr=True)
-        raise typer.Exit(INTERRUPTED) from error

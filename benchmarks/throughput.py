@@ -1,0 +1,114 @@
+"""How many sessions of 30 trials of the default strategy a study runs per second: one at a time, and side by side.
+
+    python benchmarks/throughput.py > benchmarks/results/throughput.md
+    python benchmarks/throughput.py --law 500 > benchmarks/results/batch_law.md
+
+The sessions are those of a study on the `recruitment` cohort in the valve space whose stopping rule is ignored and
+whose estimate is recorded after 10, 20 and 30 trials. Timed is from the first session handed out to the last one
+finished, by workers that have loaded everything and have run a session before. Where there is a GPU it runs batches as
+well. With `--law` nothing is timed: the mean F1 of both engines is compared on so many people, who are the same.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import os
+import platform
+import shlex
+import sys
+import time
+from dataclasses import replace
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import pandas as pd
+import torch
+
+from isiw.studies import Failure, Processes, Study, StudyStrategy, run_unit
+
+TRIALS = 30
+LAW_TRIALS = {"default": TRIALS, "nr": TRIALS, "pf": 4 * TRIALS}  # a generation of the particle filter is 30 trials
+
+
+def finished(study: Study, workers: int) -> pd.DataFrame:
+    """The rows of a study; any failure ends it."""
+    tables = []
+    for unit, result in Processes(workers).results(run_unit, study.units()):
+        if isinstance(result, Failure):
+            sys.exit(f"{unit.key} failed: {result.error}\n{result.details}")
+        tables.append(result)
+    return pd.concat(tables, ignore_index=True)
+
+
+def sessions_per_second(study: Study, workers: int) -> float:
+    """How many sessions of a study so many workers finish per second."""
+    finished(replace(study, people=workers, batch=1, trials=2, marks=(2,)), workers)
+    began_s = time.perf_counter()
+    finished(study, workers)
+    return study.people / (time.perf_counter() - began_s)
+
+
+def print_throughput(plan: Study, arguments: argparse.Namespace) -> None:
+    """Time both engines, with one worker and with several."""
+    batched = replace(plan, engine="batched", batch=arguments.batch, people=arguments.batch * arguments.batches)
+    measured = [("one at a time", plan, n) for n in (1, arguments.workers)]
+    measured += [(f"{arguments.batch} side by side", batched, n) for n in (1, arguments.workers)]
+    if torch.cuda.is_available():
+        gpu = replace(batched, batch=arguments.gpu_batch, people=2 * arguments.gpu_batch, device="cuda")
+        measured.append((f"{arguments.gpu_batch} side by side on {torch.cuda.get_device_name()}", gpu, 1))
+    print("| engine | sessions | workers | sessions per second | against one worker |\n|---|---|---|---|---|")
+    alone = 0.0
+    for engine, study, workers in measured:
+        rate = sessions_per_second(study, workers)
+        alone = rate if workers == 1 else alone
+        print(f"| {engine} | {study.people} | {workers} | {rate:.2f} | {rate / alone:.2f} |", flush=True)
+
+
+def print_law(plan: Study, workers: int) -> None:
+    """Compare the mean F1 of both engines, person by person."""
+    print("| strategy | trials | F1 one at a time | F1 side by side | difference ± SE |\n|---|---|---|---|---|")
+    for name, trials in LAW_TRIALS.items():
+        study = replace(plan, strategies=(StudyStrategy(name),), trials=trials, marks=(trials // 2, trials))
+        tables = [finished(each, workers) for each in (study, replace(study, engine="batched"))]
+        f1 = [table.pivot_table(index="trial", columns="person", values="f1") for table in tables]
+        difference = f1[1] - f1[0]
+        for trial in study.marks:
+            means = " | ".join(f"{each.loc[trial].mean():.4f}" for each in f1)
+            paired = f"{difference.loc[trial].mean():+.4f} ± {difference.loc[trial].sem():.4f}"
+            print(f"| {name} | {trial} | {means} | {paired} |", flush=True)
+
+
+def main() -> None:
+    """Measure and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--single", type=int, default=40, help="sessions one at a time")
+    parser.add_argument("--batches", type=int, default=8, help="batches")
+    parser.add_argument("--batch", type=int, default=25, help="people side by side on a CPU")
+    parser.add_argument("--gpu-batch", type=int, default=200, help="people side by side on a GPU")
+    parser.add_argument("--workers", type=int, default=2, help="as many as there are cores, beside one")
+    parser.add_argument("--seed", type=int, default=10_000)
+    parser.add_argument("--law", type=int, default=0, help="compare the mean F1 of both engines on so many people")
+    arguments = parser.parse_args()
+    plan = Study(
+        (StudyStrategy("default"),),
+        ("recruitment",),
+        people=arguments.law or arguments.single,
+        seed=arguments.seed,
+        trials=TRIALS,
+        marks=(10, 20, TRIALS),
+        stopping="ignored",
+        batch=arguments.batch,
+    )
+    versions = {name: importlib.metadata.version(name) for name in ("isiw", "torch", "numpy", "joblib")}
+    print(f"- command: `{shlex.join(['python', 'benchmarks/throughput.py', *sys.argv[1:]])}`")
+    print(f"- python {platform.python_version()}, {', '.join(f'{name} {v}' for name, v in versions.items())}")
+    print(f"- {os.cpu_count()} cores, {platform.machine()}; one torch thread a worker\n")
+    if arguments.law:
+        print_law(plan, arguments.workers)
+    else:
+        print_throughput(plan, arguments)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,41 @@
+"""What all commands share: printing, and errors that end as a message and an exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import typer
+from rich.console import Console
+
+import isiw
+
+__all__ = ["DAMAGED", "INTERRUPTED", "NO_DEFAULT", "errors_reported", "show"]
+
+DAMAGED = 3
+INTERRUPTED = 130  # what shells report for Ctrl-C
+
+NO_DEFAULT: dict[str, Any] = {"show_default": False}
+
+
+def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:
+    """Print, coloured where the output is a terminal."""
+    Console(stderr=stderr, highlight=False, soft_wrap=True).print(text, style=style, markup=False)
+
+
+@contextmanager
+def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
+    """Turn what isiw raises into a message and an exit code.
+
+    Args:
+        interrupted: what to say after Ctrl-C.
+    """
+    try:
+        yield
+    except isiw.errors.IsiwError as error:
+        show(f"error: {error}", style="red", stderr=True)
+        raise typer.Exit(DAMAGED if isinstance(error, isiw.errors.DamagedLogError) else 1) from error
+    except KeyboardInterrupt as error:
+        show(interrupted, style="red", stderr=True)
+        raise typer.Exit(INTERRUPTED) from error

@@ -1,0 +1,112 @@
+"""The commands about studies."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+import isiw
+from isiw.cli.console import NO_DEFAULT, errors_reported, show
+
+if TYPE_CHECKING:
+    from isiw.studies import Store, Unit
+
+__all__ = ["app"]
+
+app = typer.Typer(help="Compare strategies on simulated people.", no_args_is_help=True)
+
+Folder = Annotated[Path, typer.Argument(help="The folder of a study.", **NO_DEFAULT)]
+
+
+@app.command()
+def run(
+    source: Annotated[Path, typer.Argument(help="A study (TOML), or the folder of one to go on with.", **NO_DEFAULT)],
+    out: Annotated[
+        Path | None, typer.Option(help="The folder of its results; by default beside it, as NAME.study.", **NO_DEFAULT)
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; by default one a core.", **NO_DEFAULT)] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler that gives the work away.", **NO_DEFAULT)
+    ] = None,
+    retry: Annotated[bool, typer.Option(help="Run what failed once more.")] = False,  # noqa: FBT002 - a flag
+) -> None:
+    """Run a study, or what is left of it."""
+    with errors_reported():
+        studies = isiw.studies
+        begun = source.is_dir()
+        folder = source if begun and out is None else out or source.with_name(f"{source.stem}.study")
+        plan = studies.open_store(source).study if begun else studies.load_study(source)
+        store = studies.begin_store(plan, folder)
+        processes = (os.cpu_count() or 1) if workers is None else workers
+        executor = studies.DaskCluster(scheduler) if scheduler else studies.Processes(processes)
+        kept = f"Interrupted. All that is finished is kept; go on with: isiw study run {folder}"
+        with errors_reported(kept), _bar(store.left(retry=retry)) as on_done:
+            studies.conduct(plan, folder, executor, retry=retry, on_done=on_done)
+        _say_what_is_there(store)
+
+
+@app.command()
+def replay(
+    folder: Folder,
+    key: Annotated[str, typer.Argument(help="A unit's key, or the number of a row of all.", **NO_DEFAULT)],
+    person: Annotated[int | None, typer.Option(help="Compare this person of a batch only.", **NO_DEFAULT)] = None,
+) -> None:
+    """Run a session of a study once more, alone, and say whether it is the same."""
+    with errors_reported():
+        store = isiw.studies.open_store(folder)
+        if key.isdigit():
+            key, person = isiw.studies.unit_of_row(store, int(key))
+        result = isiw.studies.replay(store, key, person)
+        show(result.again.T.to_string(header=False))
+        if result.differing:
+            show(f"{key} is not what it was: {', '.join(result.differing)} differ.", style="red", stderr=True)
+            raise typer.Exit(1)
+        show(f"{key} is identical: {len(result.kept)} rows.", style="bold")
+
+
+@app.command()
+def summary(folder: Folder) -> None:
+    """Print the table of a study, and write it and its figure into the folder."""
+    with errors_reported():
+        store = isiw.studies.open_store(folder)
+        table = isiw.studies.summarise(store.rows(), store.errors())
+        show(table.to_string(index=False, float_format=lambda value: f"{value:.3f}"))
+        table.to_csv(folder / "summary.csv", index=False)
+        picture = isiw.plots_studies.save_study_plot(table, folder / "summary.png")
+        _say_what_is_there(store)
+        show(f"table:   {folder / 'summary.csv'}\npicture: {picture}")
+
+
+@contextmanager
+def _bar(left: list[Unit]) -> Iterator[Callable[[Unit, Any], None]]:
+    """A progress bar with rate and remaining time, and what moves it."""
+    rate, people = TextColumn("{task.fields[rate]}"), sum(len(unit.sessions) for unit in left)
+    columns = (TextColumn("sessions"), BarColumn(), MofNCompleteColumn(), rate, TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task("sessions", total=people, rate="")
+
+        def on_done(unit: Unit, result: Any) -> None:
+            progress.advance(task, len(unit.sessions))
+            state = progress.tasks[0]
+            progress.update(task, rate=f"{state.completed / max(state.elapsed or 0.0, 1e-9):.2f}/s")
+            if isinstance(result, isiw.studies.Failure):
+                progress.console.print(f"{unit.key} failed: {result.error}", style="red", markup=False)
+
+        yield on_done
+
+
+def _say_what_is_there(store: Store) -> None:
+    rows, errors = store.rows(), store.errors()
+    sessions = rows.groupby(["strategy", "cohort", "person"]).ngroups if len(rows) else 0
+    show(f"{sessions} sessions are in {store.folder}, {len(store.left())} units are left.", style="bold")
+    if len(errors):
+        show(f"{len(errors)} sessions failed:", style="red")
+        for line, people in (errors["strategy"] + ": " + errors["error"]).value_counts().items():
+            show(f"  {line} ({people} sessions)", style="red")

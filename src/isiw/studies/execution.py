@@ -1,0 +1,274 @@
+"""Where the work of a study is done: here, in local processes, or on a Dask cluster, behind one interface.
+
+An executor maps a function over items and gives each result as it is finished. What raises, and what takes its process
+down with it again and again, comes back as a `Failure` among the results: nothing ends the others.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import ctypes
+import importlib
+import os
+import threading
+import time
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack, closing, suppress
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+
+from joblib import Parallel, delayed, parallel_config
+
+from isiw.errors import InvalidValueError, StudyError
+
+__all__ = ["DaskCluster", "Executor", "Failure", "Processes"]
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What became of an item without a result.
+
+    Args:
+        error: what was raised, in a line.
+        details: the traceback, where there is one.
+    """
+
+    error: str
+    details: str = ""
+
+
+class Executor(Protocol):
+    """Where work is done."""
+
+    def results(
+        self, run: Callable[[_Item], _Result], items: Sequence[_Item]
+    ) -> Generator[tuple[_Item, _Result | Failure], None, None]:
+        """Each item with its result, or with its failure, in the order of finishing.
+
+        Args:
+            run: gives the result of an item; importable where it is to run in another process.
+            items: the items.
+        """
+
+
+@dataclass(frozen=True)
+class Processes:
+    """This machine: one worker is this process itself; several are processes of joblib's, of one torch thread each.
+
+    A worker that dies takes the pool with it. What was running then is run again, each item alone so that the one to
+    blame is known; the others go on in a new pool.
+
+    Args:
+        workers: how many.
+        attempts: an item that has taken its worker down so often is given up.
+
+    Raises:
+        InvalidValueError: fewer than one worker or attempt.
+    """
+
+    workers: int = 1
+    attempts: int = 3
+
+    def __post_init__(self) -> None:
+        if self.workers < 1 or self.attempts < 1:
+            raise InvalidValueError("there is at least one worker and one attempt", got=(self.workers, self.attempts))
+
+    def results(
+        self, run: Callable[[_Item], _Result], items: Sequence[_Item]
+    ) -> Generator[tuple[_Item, _Result | Failure], None, None]:
+        """See `Executor`."""
+        if self.workers == 1:
+            yield from ((item, _attempt(run, item)) for item in items)
+            return
+        left, deaths = dict(enumerate(items)), Counter[int]()
+        while left:
+            suspects = [number for number in left if deaths[number]]
+            begun: list[int] = []
+            try:
+                with closing(self._pool(run, left, suspects[:1] or list(left), begun)) as results:
+                    for number, result in results:
+                        yield left.pop(number), result
+            except BrokenProcessPool as error:
+                if not begun:
+                    raise StudyError("the worker processes cannot be started", got=str(error)) from error
+                deaths.update(number for number in begun if number in left)
+                for number in [number for number in left if deaths[number] >= self.attempts]:
+                    yield left.pop(number), Failure(f"Its worker died {self.attempts} times: {error}")
+
+    def _pool(
+        self, run: Callable[[_Item], _Result], items: dict[int, _Item], numbers: Sequence[int], begun: list[int]
+    ) -> Generator[tuple[int, _Result | Failure], None, None]:
+        def work() -> Iterator[Any]:
+            for number in numbers:
+                begun.append(number)
+                yield delayed(_numbered)(run, number, items[number], os.getpid())
+
+        with parallel_config(backend="loky", inner_max_num_threads=1):
+            # No more are handed out than run at once, so that few are under suspicion when a worker dies.
+            pool = Parallel(
+                n_jobs=self.workers, return_as="generator_unordered", batch_size=1, pre_dispatch=self.workers
+            )
+        results = pool(work())
+        try:
+            for result in results:  # noqa: UP028 - `yield from` would close it before the finally
+                yield result
+        finally:
+            with warnings.catch_warnings():
+                # Whoever stops early knows that work is lost.
+                warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
+                results.close()
+
+
+@dataclass(frozen=True)
+class DaskCluster:
+    """A Dask cluster: a scheduler's address, or a `distributed.Client`, whose workers have isiw installed.
+
+    Dask itself hands out again what ran on a worker that died, as often as its setting `allowed-failures` says.
+
+    Args:
+        scheduler: the address, such as `"tcp://10.0.0.1:8786"`, or the client.
+        attempts: an item whose result was lost on the cluster so often is given up.
+    """
+
+    scheduler: Any
+    attempts: int = 3
+
+    def results(
+        self, run: Callable[[_Item], _Result], items: Sequence[_Item]
+    ) -> Generator[tuple[_Item, _Result | Failure], None, None]:
+        """See `Executor`.
+
+        Raises:
+            StudyError: Dask is not installed, or the scheduler is not reached or lost.
+        """
+        dask = _distributed()
+        with ExitStack() as stack:
+            address = self.scheduler if isinstance(self.scheduler, str) else None
+            client = self.scheduler if address is None else stack.enter_context(_client(dask, address))
+            running, held = dask.as_completed(loop=client.loop), dict[str, _HandedOut[_Item]]()
+            stack.callback(_cancel, client, held)
+
+            def hand_out(item: _Item, losses: int = 0) -> None:
+                future = client.submit(_attempt_alone, run, item, pure=False)
+                held[future.key] = _HandedOut(item, future, losses)
+                running.add(future)
+
+            for item in items:
+                hand_out(item)
+            for future in running:
+                item, _, losses = held.pop(future.key)
+                result = _result_of(future)
+                if not isinstance(result, _Lost):
+                    yield item, result
+                elif client.status != "running":
+                    raise StudyError("the Dask scheduler was lost", remedy="Run again: what is finished is kept.")
+                elif losses + 1 < self.attempts:
+                    hand_out(item, losses + 1)
+                else:
+                    yield item, Failure(f"Its result was lost on the cluster {self.attempts} times.")
+
+
+class _HandedOut(NamedTuple, Generic[_Item]):
+    """What a Dask cluster works on."""
+
+    item: _Item
+    future: Any
+    losses: int
+
+
+class _Lost:
+    """A result that went down with the worker, or the cluster, that held it."""
+
+
+def _distributed() -> Any:
+    try:
+        return importlib.import_module("distributed")
+    except ModuleNotFoundError as error:
+        raise StudyError("Dask is not installed", remedy='Install it with: pip install "isiw[dask]"') from error
+
+
+def _client(dask: Any, address: str) -> Any:
+    try:
+        return dask.Client(address)
+    except (OSError, ValueError) as error:
+        raise StudyError(
+            "the Dask scheduler cannot be reached", got=address, remedy="Check its address, and that it is running."
+        ) from error
+
+
+def _cancel(client: Any, held: Mapping[str, _HandedOut[Any]]) -> None:
+    if client.status == "running":
+        client.cancel([each.future for each in held.values()])
+
+
+def _result_of(future: Any) -> Any:
+    """What a Dask future came to; what took its workers down is a failure."""
+    try:
+        error = future.exception()
+        return future.result() if error is None else Failure(_line(error))
+    except (asyncio.CancelledError, CancelledError):
+        return _Lost()
+
+
+def _attempt(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
+    try:
+        return run(item)
+    except Exception as error:  # noqa: BLE001 - one that fails must not end the others; it is reported
+        return Failure(_line(error), traceback.format_exc())
+
+
+def _numbered(run: Callable[[_Item], _Result], number: int, item: _Item, parent: int) -> tuple[int, _Result | Failure]:
+    _keep_memory()
+    _leave_with(parent)
+    return number, _attempt(run, item)
+
+
+@cache
+def _leave_with(parent: int) -> None:
+    """End this worker once its parent has died, which runs the study: nobody would fetch what it computes."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@cache
+def _keep_memory() -> None:
+    """Have this worker keep the memory that it frees.
+
+    glibc gives large blocks back to the system at once; a batch of people, which needs them again on the next trial,
+    spent a quarter of its time on getting them.
+    """
+    with suppress(AttributeError, OSError, TypeError):  # another C library has no such setting
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(_MMAP_THRESHOLD, 1 << 30)
+        mallopt(_TRIM_THRESHOLD, 1 << 30)
+
+
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # malloc.h
+
+
+_ONE_AT_A_TIME = threading.Lock()
+
+
+def _attempt_alone(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
+    """One session at a time in each worker process, however many threads it has: torch and Pyro share global state."""
+    _keep_memory()
+    with _ONE_AT_A_TIME:
+        return _attempt(run, item)
+
+
+def _line(error: BaseException) -> str:
+    return " ".join(traceback.format_exception_only(error)[-1].split())

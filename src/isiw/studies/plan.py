@@ -1,0 +1,215 @@
+"""What a study is: strategies × cohorts × people, and the units of work that it comes to.
+
+Every strategy meets the same people with the same trial noise. As TOML:
+
+    strategies = ["default", { name = "nr", label = "nr9", settings = { initial = 9 } }]
+    cohorts = ["recruitment", "gaussian"]
+    people = 200
+    seed = 10000
+    trials = 40
+    marks = [10, 20, 40]
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import Any, Final, Literal, TypeAlias, get_args
+
+import pandas as pd
+
+from isiw.catalogue import settings_of
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.studies.batch import simulate_batch
+from isiw.studies.sessions import SimulatedSession, Stopping, simulate
+from isiw.subjects import COHORTS
+from isiw.toml_files import checked, read_toml
+
+__all__ = ["Engine", "Study", "StudyStrategy", "Unit", "load_study", "run_unit", "study_from", "study_values"]
+
+Engine: TypeAlias = Literal["single", "batched"]
+
+_SPACES: Final[Mapping[str, DesignSpace]] = {"valve": VALVE_SPACE, "impact": IMPACT_SPACE}
+
+
+@dataclass(frozen=True)
+class StudyStrategy:
+    """A strategy that takes part.
+
+    Args:
+        name: a named strategy.
+        settings: its settings that differ from what the name means.
+        label: what it is called in the table; by default its name.
+
+    Raises:
+        StrategyError: an unknown name.
+        ConfigError: a setting that it does not have, or cannot have.
+        InvalidValueError: a label that cannot be part of a file's name.
+    """
+
+    name: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        family, meant = settings_of(self.name)
+        chosen = checked(family, {**meant, **self.settings}, f"the settings of {self.name}")
+        object.__setattr__(self, "settings", {name: getattr(chosen, name) for name in self.settings})
+        object.__setattr__(self, "label", self.label or self.name)
+        if not re.fullmatch(r"[\w.+-]+", self.label):
+            raise InvalidValueError(
+                "a label is part of a file's name", got=self.label, expected="letters, digits, and any of _ . + -"
+            )
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What is run, and kept, as a whole: one session, or one batch of people.
+
+    Args:
+        key: its name in the study; the same whenever and wherever it runs.
+        sessions: one a person.
+        engine: what runs them.
+        device: torch device of the batched engine.
+    """
+
+    key: str
+    sessions: tuple[SimulatedSession, ...]
+    engine: Engine = "single"
+    device: str = "cpu"
+
+
+def run_unit(unit: Unit) -> pd.DataFrame:
+    """The rows of a unit; columns as in `isiw.studies.sessions.examine`, and its key as `unit`."""
+    rows = simulate_batch(unit.sessions, unit.device) if unit.engine == "batched" else simulate(*unit.sessions)
+    return rows.assign(unit=unit.key)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study.
+
+    Args:
+        strategies: who takes part.
+        cohorts: named cohorts.
+        people: how many people of each.
+        seed: seed of the people, their trial noise and the strategies; 0–999 are for work.
+        trials: how many trials a session has at most.
+        marks: after which trials the estimate is recorded; by default each fifth and the last.
+        space: the design space.
+        stopping: whether a strategy's stopping rule is `"ignored"`, or it is `"noted"` when it fires (an estimate
+            after each trial), or `"ends"` the session.
+        engine: `"single"`, one session at a time, or `"batched"`, people side by side.
+        batch: how many people side by side.
+        device: torch device of the batched engine, for the models that have one.
+
+    Raises:
+        InvalidValueError: a number or a word that cannot be, or a label given twice.
+    """
+
+    strategies: tuple[StudyStrategy, ...]
+    cohorts: tuple[str, ...]
+    people: int = 20
+    seed: int = 0
+    trials: int = 40
+    marks: tuple[int, ...] = ()
+    space: DesignSpace = VALVE_SPACE
+    stopping: Stopping = "noted"
+    engine: Engine = "single"
+    batch: int = 25
+    device: str = "cpu"
+
+    def __post_init__(self) -> None:
+        for name in ("strategies", "cohorts", "marks"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        if not self.marks:
+            object.__setattr__(self, "marks", (*range(5, self.trials, 5), self.trials))
+        for name, least in (("people", 1), ("seed", 0), ("trials", 1), ("batch", 1)):
+            if getattr(self, name) < least:
+                raise InvalidValueError(f"{name} is too small", got=getattr(self, name), expected=f"at least {least}")
+        if list(self.marks) != sorted(set(self.marks)) or not 1 <= self.marks[0] <= self.marks[-1] <= self.trials:
+            raise InvalidValueError("marks ascend from 1 to the number of trials", got=self.marks)
+        for name, known in (("stopping", get_args(Stopping)), ("engine", get_args(Engine))):
+            if getattr(self, name) not in known:
+                raise InvalidValueError(f"{name} is unknown", got=getattr(self, name), expected=" or ".join(known))
+        if unknown := sorted(set(self.cohorts) - set(COHORTS)):
+            raise InvalidValueError("unknown cohorts", got=unknown, expected=", ".join(COHORTS))
+        labels = [strategy.label for strategy in self.strategies]
+        if (
+            not labels
+            or not self.cohorts
+            or len(set(labels)) < len(labels)
+            or len(set(self.cohorts)) < len(self.cohorts)
+        ):
+            raise InvalidValueError(
+                "a study needs strategies and cohorts, each once",
+                got=(labels, list(self.cohorts)),
+                remedy="Give the same strategy with other settings another label.",
+            )
+
+    def units(self) -> list[Unit]:
+        """All of its work; the first people of each strategy and cohort come first, so that all grow together."""
+        size = self.batch if self.engine == "batched" else 1
+        return [
+            self._unit(strategy, cohort, range(first, min(first + size, self.people)))
+            for first, cohort, strategy in product(range(0, self.people, size), self.cohorts, self.strategies)
+        ]
+
+    def _unit(self, strategy: StudyStrategy, cohort: str, people: range) -> Unit:
+        last = f"-{people[-1]:05d}" if self.engine == "batched" else ""
+        sessions = tuple(
+            SimulatedSession(
+                strategy.name,
+                cohort,
+                person,
+                self.seed,
+                self.trials,
+                self.marks,
+                self.space,
+                settings=tuple(strategy.settings.items()),
+                label=strategy.label,
+                stopping=self.stopping,
+            )
+            for person in people
+        )
+        return Unit(f"{strategy.label}.{cohort}.{people[0]:05d}{last}", sessions, self.engine, self.device)
+
+
+def load_study(path: str | Path) -> Study:
+    """Read a study from a TOML file.
+
+    Raises:
+        ConfigError: it cannot be read, or has an unknown key or a bad value; the message names file, key and value.
+    """
+    return study_from(read_toml(path), str(path))
+
+
+def study_from(values: Mapping[str, Any], source: str) -> Study:
+    """A study from TOML values, in which a strategy may be its name alone, and a space `"valve"` or `"impact"`.
+
+    Args:
+        values: the values.
+        source: where they are from, for the message.
+
+    Raises:
+        ConfigError: an unknown key or a bad value.
+    """
+    plain = dict(values)
+    if isinstance(plain.get("strategies"), list):
+        plain["strategies"] = [_strategy_values(strategy) for strategy in plain["strategies"]]
+    if isinstance(plain.get("space"), str):
+        plain["space"] = _SPACES.get(plain["space"], plain["space"])
+    return checked(Study, plain, source)
+
+
+def _strategy_values(strategy: Any) -> Any:
+    return {"name": strategy} if isinstance(strategy, str) else strategy
+
+
+def study_values(study: Study) -> dict[str, Any]:
+    """A study as TOML values; `study_from` makes the same study of them."""
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(study).items()}

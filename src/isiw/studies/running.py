@@ -1,0 +1,159 @@
+"""Running a study into its folder, going on with it, and running one of its units once more."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.errors import StudyError
+from isiw.studies.execution import Executor, Failure, Processes
+from isiw.studies.plan import Study, Unit, run_unit
+from isiw.studies.sessions import TIMES, SimulatedSession, simulate
+from isiw.studies.store import Store, begin_store
+
+__all__ = ["Replay", "conduct", "paired_sessions", "replay", "run_study", "unit_of_row"]
+
+
+def conduct(
+    study: Study,
+    folder: str | Path,
+    executor: Executor | None = None,
+    *,
+    retry: bool = False,
+    on_done: Callable[[Unit, pd.DataFrame | Failure], None] = lambda _unit, _result: None,
+) -> Store:
+    """Run what is left of a study.
+
+    Args:
+        study: the study.
+        folder: where its parts are kept; what is finished there already is not run again.
+        executor: where the work is done; by default in this process.
+        retry: run the units that failed once more.
+        on_done: called after each unit, once it is kept.
+
+    Raises:
+        StudyError: the folder is another study's, or the executor is lost.
+    """
+    store = begin_store(study, folder)
+    # Closed at once where it is interrupted, so that no worker goes on in vain.
+    with closing((executor or Processes()).results(run_unit, store.left(retry=retry))) as results:
+        for unit, result in results:
+            store.keep(unit, result)
+            on_done(unit, result)
+    return store
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """A unit that was run once more.
+
+    Args:
+        kept: its rows in the study.
+        again: its rows now.
+        differing: the columns that differ; those that measure time never count.
+    """
+
+    kept: pd.DataFrame
+    again: pd.DataFrame
+    differing: tuple[str, ...]
+
+
+def replay(store: Store, key: str, person: int | None = None) -> Replay:
+    """Run a unit of a study once more, here and alone.
+
+    Args:
+        store: the study.
+        key: the unit; a batch runs as a whole, because its people share the draws of the model.
+        person: compare the rows of this person only.
+
+    Raises:
+        StudyError: there is no such unit, it is not finished, or the person is not in it.
+    """
+    unit, rows = store.unit(key), store.rows()
+    kept = rows[rows["unit"] == key] if len(rows) else rows
+    if not len(kept):
+        raise StudyError("the unit is not finished", got=key, remedy="Go on with the study, and see its errors.")
+    again = run_unit(unit)
+    if person is not None:
+        kept, again = (table[table["person"] == person] for table in (kept, again))
+    if not len(kept):
+        raise StudyError("the person is not in the unit", got=person)
+    kept, again = kept.reset_index(drop=True), again.reset_index(drop=True)
+    columns = [name for name in kept.columns if name not in TIMES]
+    return Replay(kept, again, tuple(name for name in columns if not _same(kept, again, name)))
+
+
+def unit_of_row(store: Store, row: int) -> tuple[str, int]:
+    """The unit and the person of a row of a study.
+
+    Args:
+        store: the study.
+        row: its number in `store.rows()`.
+
+    Raises:
+        StudyError: there is no such row.
+    """
+    rows = store.rows()
+    if not 0 <= row < len(rows):
+        raise StudyError("the study has no such row", got=row, expected=f"0 to {len(rows) - 1}")
+    return str(rows["unit"].iloc[row]), int(rows["person"].iloc[row])
+
+
+def _same(kept: pd.DataFrame, again: pd.DataFrame, name: str) -> bool:
+    same = (kept[name] == again[name]) | (kept[name].isna() & again[name].isna())
+    return bool(same.all())
+
+
+def run_study(
+    sessions: Sequence[SimulatedSession],
+    *,
+    workers: int = 1,
+    run: Callable[[SimulatedSession], pd.DataFrame] = simulate,
+    on_done: Callable[[SimulatedSession], None] = lambda _session: None,
+) -> pd.DataFrame:
+    """Run sessions to one table, without a folder.
+
+    Args:
+        sessions: the sessions.
+        workers: how many processes; 1 runs them here.
+        run: runs one session; importable where it is to run in another process.
+        on_done: called after each session, for progress.
+
+    Returns:
+        One row a mark of each session, sorted; columns as in `isiw.studies.sessions.examine`.
+
+    Raises:
+        InvalidValueError: fewer than one worker.
+        StudyError: a session failed.
+    """
+    tables = []
+    for session, result in Processes(workers).results(run, sessions):
+        if isinstance(result, Failure):
+            raise StudyError(f"a session failed: {result.error}", got=session, remedy=result.details)
+        tables.append(result)
+        on_done(session)
+    keys = ["strategy", "cohort", "person", "trial"]
+    return pd.concat(tables, ignore_index=True).sort_values(keys, ignore_index=True)
+
+
+def paired_sessions(
+    strategies: Iterable[str],
+    cohorts: Iterable[str],
+    people: int,
+    *,
+    seed: int,
+    trials: int,
+    marks: tuple[int, ...],
+    space: DesignSpace = VALVE_SPACE,
+) -> list[SimulatedSession]:
+    """Every strategy with the same people of every cohort."""
+    return [
+        SimulatedSession(strategy, name, person, seed, trials, marks, space)
+        for strategy, name, person in itertools.product(strategies, cohorts, range(people))
+    ]

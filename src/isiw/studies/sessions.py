@@ -1,0 +1,271 @@
+"""Simulated sessions: one person and a strategy, or some people side by side, to rows of a table.
+
+Every strategy meets the same people with the same trial noise, so that differences can be read pairwise.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol, TypeAlias, get_args
+
+import pandas as pd
+import torch
+
+from isiw.asking import Choice
+from isiw.asktell import Strategy
+from isiw.catalogue import make_strategy
+from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.metrics import covers, f1
+from isiw.stopping import StopDecision, StoppingRule, stimuli_left
+from isiw.subjects import Response, SimulatedSubject, cohort
+from isiw.window import Window, WindowEstimate
+
+__all__ = ["TIMES", "Crowd", "Judgement", "Player", "SimulatedSession", "Stopping", "examine", "play", "simulate"]
+
+TIMES = ("ask_ms", "tell_ms")
+"""Columns that differ each time a session is run."""
+
+Stopping: TypeAlias = Literal["ignored", "noted", "ends"]
+Judgement: TypeAlias = WindowEstimate | Window | None
+
+
+class Player(Protocol):
+    """What proposes ISIs in a simulated session: a strategy, or a benchmark's yardstick."""
+
+    def ask(self) -> float:
+        """The next ISI [ms]."""
+
+    def tell(self, isi_ms: float | None, mep_mv: float | None = None, *, isi_sd_ms: float = 0.0) -> None:
+        """Learn from one trial."""
+
+    def estimate(self) -> Judgement:
+        """What is believed about the window now."""
+
+
+class Crowd(Protocol):
+    """What proposes ISIs to some people side by side."""
+
+    @property
+    def stopping(self) -> StoppingRule | None:
+        """The rule that says when to stop with each; None where there is none."""
+
+    def ask(self) -> Sequence[Choice]:
+        """What is asked of each person next."""
+
+    def tell(self, responses: Sequence[Response]) -> None:
+        """Learn from one trial of each person."""
+
+    def count_mistrial(self, person: int) -> None:
+        """Count a pair of stimuli that was delivered in vain."""
+
+    def estimate(self, person: int) -> Judgement:
+        """What is believed about the window of a person."""
+
+    def decision(self, person: int) -> StopDecision:
+        """Whether to stop with a person; asked only where there is a rule."""
+
+    def trouble(self) -> bool | None:
+        """Whether the last fit failed; None where it cannot be said for each person."""
+
+
+@dataclass(frozen=True)
+class SimulatedSession:
+    """One session of a study.
+
+    Args:
+        strategy: a named strategy.
+        cohort: a named cohort.
+        person: which person of it, from 0.
+        seed: seed of the cohort; trial noise and strategy use `seed + person`.
+        trials: how many trials to run at most.
+        marks: after which trials the estimate is recorded.
+        space: the design space.
+        settings: settings of the strategy, as (name, value) pairs.
+        label: what the strategy is called in the table; by default its name.
+        stopping: whether the strategy's stopping rule is `"ignored"`, or it is `"noted"` when it fires, or `"ends"` the
+            session.
+
+    Raises:
+        InvalidValueError: no trial, a person that cannot be, or another word for stopping.
+    """
+
+    strategy: str
+    cohort: str
+    person: int
+    seed: int
+    trials: int
+    marks: tuple[int, ...]
+    space: DesignSpace = VALVE_SPACE
+    settings: tuple[tuple[str, Any], ...] = field(default=())
+    label: str = ""
+    stopping: Stopping = "ignored"
+
+    def __post_init__(self) -> None:
+        if self.trials < 1 or self.person < 0:
+            raise InvalidValueError("a session needs a trial and a person", got=(self.trials, self.person))
+        if self.stopping not in get_args(Stopping):
+            raise InvalidValueError("stopping is unknown", got=self.stopping, expected=", ".join(get_args(Stopping)))
+
+    def subject(self) -> SimulatedSubject:
+        """The simulated person."""
+        return cohort(self.cohort, self.person + 1, self.seed)[self.person]
+
+    def player(self) -> Strategy:
+        """The strategy before its first trial."""
+        return make_strategy(self.strategy, self.space, self.seed + self.person, **dict(self.settings))
+
+
+def simulate(session: SimulatedSession) -> pd.DataFrame:
+    """Run one session with its named strategy; columns as in `examine`."""
+    torch.set_num_threads(1)
+    return play(session, session.player())
+
+
+def play(session: SimulatedSession, player: Player) -> pd.DataFrame:
+    """Run one session with any player; columns as in `examine`."""
+    return examine([session], _Alone(player))
+
+
+def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
+    """Run sessions of equally many trials side by side.
+
+    Args:
+        sessions: one a person.
+        crowd: proposes the ISIs.
+
+    Returns:
+        One row a mark of each session: strategy (its label), cohort, person, seed, trial (the mark); how many pairs had
+        been delivered by then, mistrials among them; F1; whether there is and was reported a window, its edges [ms],
+        its probability, whether the 90 % intervals cover start and end (NaN where there are none); how many asks were
+        fallbacks and how many fits failed (NaN where a batch cannot say whose); after how many pairs the stopping rule
+        fired (NaN where it has not), why, and whether that was before the budget was used up (NaN where the rule is
+        ignored); the time that the last ask and the last tell took for each person [ms]. After the end of a session its
+        last estimate stays.
+    """
+    people = [_Person(session, number, crowd) for number, session in enumerate(sessions)]
+    for trial in range(1, sessions[0].trials + 1):
+        began_s = time.perf_counter()
+        choices = crowd.ask()
+        asked_s = time.perf_counter()
+        responses = [person.respond(choice) for person, choice in zip(people, choices, strict=True)]
+        answered_s = time.perf_counter()
+        crowd.tell(responses)
+        told_s = time.perf_counter()
+        spent_ms = [1e3 * spent_s / len(people) for spent_s in (asked_s - began_s, told_s - answered_s)]
+        for person, choice in zip(people, choices, strict=True):
+            person.note(trial, choice, dict(zip(TIMES, spent_ms, strict=True)))
+        if all(person.ended for person in people):
+            break
+    return pd.DataFrame([row for person in people for row in person.rows])
+
+
+class _Person:
+    """One person in a running session, and what is noted about it."""
+
+    def __init__(self, session: SimulatedSession, number: int, crowd: Crowd) -> None:
+        subject = session.subject()
+        self.session, self.number, self.crowd = session, number, crowd
+        self.truth = subject.window(session.space)
+        self.responder = subject.begin(session.seed + session.person)
+        self.rows: list[dict[str, Any]] = []
+        self.mistrials = self.fallbacks = 0
+        self.troubles = 0.0
+        converged = math.nan if session.stopping == "ignored" else 0.0
+        self.stop: dict[str, Any] = {"stop_trial": math.nan, "stop_reason": "", "converged": converged}
+
+    @property
+    def ended(self) -> bool:
+        return self.session.stopping == "ends" and not math.isnan(self.stop["stop_trial"])
+
+    def respond(self, choice: Choice) -> Response:
+        """Deliver the pair, again where the realised ISI is beyond the space: a session asks the same once more."""
+        space = self.session.space
+        while True:
+            response = self.responder.respond(choice.isi_ms, space.reference)
+            if response.isi_ms is not None and space.admits(response.isi_ms):
+                return response
+            self.mistrials += not self.ended
+            self.crowd.count_mistrial(self.number)
+
+    def note(self, trial: int, choice: Choice, spent_ms: dict[str, float]) -> None:
+        if self.ended:
+            return
+        trouble = self.crowd.trouble()
+        self.fallbacks += choice.fallback is not None
+        self.troubles += math.nan if trouble is None else trouble
+        delivered = trial + self.mistrials
+        if self.session.stopping != "ignored" and math.isnan(self.stop["stop_trial"]):
+            self._note_stop(delivered)
+        if marks := [mark for mark in self.session.marks if mark == trial or (self.ended and mark > trial)]:
+            row = self._row(delivered) | spent_ms
+            self.rows += [row | {"trial": mark} for mark in marks]
+
+    def _note_stop(self, delivered: int) -> None:
+        rule = self.crowd.stopping
+        if rule is not None and (decision := self.crowd.decision(self.number)).stop:
+            left = stimuli_left(rule, delivered)
+            self.stop = {"stop_trial": float(delivered), "stop_reason": decision.reason, "converged": float(left != 0)}
+
+    def _row(self, delivered: int) -> dict[str, Any]:
+        session = self.session
+        who = {"strategy": session.label or session.strategy, "cohort": session.cohort, "person": session.person}
+        counts = {"seed": session.seed, "trial": 0, "delivered": delivered, "mistrials": self.mistrials}
+        judged = _judged(self.crowd.estimate(self.number), self.truth, session.space)
+        return who | counts | judged | {"fallbacks": self.fallbacks, "troubles": self.troubles} | self.stop
+
+
+@dataclass(frozen=True)
+class _Alone:
+    """A player as a crowd of one."""
+
+    player: Player
+
+    @property
+    def stopping(self) -> StoppingRule | None:
+        return self.player.stopping if isinstance(self.player, Strategy) else None
+
+    def ask(self) -> list[Choice]:
+        isi_ms = self.player.ask()
+        return [Choice(isi_ms, self.player.fallback_reason if isinstance(self.player, Strategy) else None)]
+
+    def tell(self, responses: Sequence[Response]) -> None:
+        (told,) = responses
+        self.player.tell(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
+
+    def count_mistrial(self, person: int) -> None:
+        del person
+        if isinstance(self.player, Strategy):
+            self.player.count_mistrial()
+
+    def estimate(self, person: int) -> Judgement:
+        del person
+        return self.player.estimate()
+
+    def decision(self, person: int) -> StopDecision:
+        del person
+        if not isinstance(self.player, Strategy):
+            return StopDecision(stop=False, reason="The player has no stopping rule.")
+        return self.player.decision()
+
+    def trouble(self) -> bool:
+        return isinstance(self.player, Strategy) and self.player.trouble is not None
+
+
+def _judged(estimate: Judgement, truth: Window | None, space: DesignSpace) -> dict[str, Any]:
+    posterior = estimate if isinstance(estimate, WindowEstimate) else None
+    reported = posterior.window if posterior is not None else estimate
+    covered = None if posterior is None or truth is None else covers(posterior, truth, space)
+    return {
+        "f1": f1(estimate, truth, space),
+        "true_window": truth is not None,
+        "reported_window": reported is not None,
+        "start_ms": math.nan if reported is None else reported.start_ms,
+        "end_ms": math.nan if reported is None else reported.end_ms,
+        "probability": math.nan if posterior is None or posterior.probability is None else posterior.probability,
+        "start_covered": math.nan if covered is None else float(covered[0]),
+        "end_covered": math.nan if covered is None else float(covered[1]),
+    }

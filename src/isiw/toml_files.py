@@ -1,0 +1,88 @@
+"""TOML files, read and checked: what is wrong is told by file, key and value, with the way out."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar, cast, get_args, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
+from pydantic_core import ErrorDetails
+
+from isiw.errors import ConfigError, IsiwError
+
+__all__ = ["checked", "read_toml"]
+
+_T = TypeVar("_T")
+
+_UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """The values of a TOML file.
+
+    Raises:
+        ConfigError: it cannot be read, or is not TOML.
+    """
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(
+            f"the configuration cannot be read: {error.strerror}", got=str(path), remedy="Check the path."
+        ) from error
+    except ValueError as error:  # not TOML, or not UTF-8
+        raise ConfigError(f"{path} is not valid TOML: {error}", remedy="Mend the line that it names.") from error
+
+
+def checked(kind: type[_T], values: Mapping[str, Any], source: str) -> _T:
+    """Values as an instance of a pydantic model or a dataclass.
+
+    Args:
+        kind: the model or dataclass.
+        values: its fields, as TOML has them.
+        source: where they are from, for the message.
+
+    Raises:
+        ConfigError: an unknown key or a bad value; the message names source, key and value.
+    """
+    try:
+        return cast("_T", dict(_strict(kind).model_validate({"values": values}))["values"])
+    except ValidationError as error:
+        found = error.errors()
+        # A key that was misspelt is reported before the one that is missing because of it.
+        raise _explained(kind, next((e for e in found if e["type"] in _UNKNOWN), found[0]), source) from error
+
+
+def _strict(kind: type) -> type[BaseModel]:
+    """A model around the kind: dataclasses take from it that unknown keys are an error."""
+    return create_model("Strict", __config__=ConfigDict(extra="forbid"), values=(kind, ...))
+
+
+def _explained(kind: Any, error: ErrorDetails, source: str) -> ConfigError:
+    _, *path = error["loc"]
+    key = ".".join(str(part) for part in path)
+    if error["type"] in _UNKNOWN:
+        known = _known_keys(kind, path[:-1])
+        close = difflib.get_close_matches(str(path[-1]), known, n=1)
+        return ConfigError(
+            f"{source}: the key {key} is unknown",
+            got=error["input"],
+            expected=f"one of {', '.join(known)}",
+            remedy=f"{f'Did you mean {close[0]}? ' if close else ''}Correct it or remove it.",
+        )
+    if error["type"] == "missing":
+        return ConfigError(f"{source}: the key {key} is missing", remedy="Add it.")
+    what, remedy = f"{source}: the value of {key} cannot be used", "Correct it, or remove the key for its default."
+    own = error.get("ctx", {}).get("error")
+    if isinstance(own, IsiwError):
+        return ConfigError(f"{what}: {own.what}", got=own.got, expected=own.expected, remedy=own.remedy or remedy)
+    return ConfigError(what, got=error["input"], expected=error["msg"].removeprefix("Input should be "), remedy=remedy)
+
+
+def _known_keys(kind: Any, section: Sequence[int | str]) -> list[str]:
+    for name in section:
+        kind = get_args(kind)[0] if isinstance(name, int) else get_type_hints(kind)[name]
+    return sorted(f.name for f in fields(kind)) if is_dataclass(kind) else sorted(kind.model_fields)

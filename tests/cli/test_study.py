@@ -1,0 +1,103 @@
+"""isiw study: run, replay, summary."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from isiw.cli import app
+from isiw.studies import Failure, open_store
+from isiw.studies.store import Store
+from studies.tiny import TOML
+
+
+def study(*arguments: object):
+    return CliRunner().invoke(app, ["study", *map(str, arguments)])
+
+
+@pytest.fixture
+def plan(tmp_path):
+    path = tmp_path / "tiny.toml"
+    path.write_text(TOML.replace("people = 12", "people = 2"))
+    return path
+
+
+@pytest.fixture
+def folder(plan):
+    assert study("run", plan, "--workers", 1).exit_code == 0
+    return plan.with_name("tiny.study")
+
+
+def test_run_puts_the_results_beside_the_file_and_says_what_is_there(plan):
+    result = study("run", plan, "--workers", 1)
+    assert result.exit_code == 0, result.output
+    assert "4/4" in result.output
+    assert "4 sessions are in" in result.output
+    assert "0 units are left" in result.output
+    assert len(open_store(plan.with_name("tiny.study")).rows()) == 8
+
+
+def test_run_of_a_folder_goes_on_with_it(folder):
+    (folder / "parts" / "even.gaussian.00001.parquet").unlink()
+    result = study("run", folder, "--workers", 1)
+    assert result.exit_code == 0, result.output
+    assert "1/1" in result.output
+    assert len(open_store(folder).rows()) == 8
+
+
+def test_run_of_another_study_into_the_folder_is_refused(plan, folder):
+    plan.write_text(TOML)
+    result = study("run", plan)
+    assert result.exit_code == 1
+    assert "people was 2, now 12" in result.output
+    assert study("run", plan, "--out", folder.with_name("other"), "--workers", 0).exit_code == 1
+
+
+def test_replay_says_that_a_unit_is_identical(folder):
+    result = study("replay", folder, "even.gaussian.00001")
+    assert result.exit_code == 0, result.output
+    assert "even.gaussian.00001 is identical: 2 rows." in result.output
+
+
+def test_replay_of_a_row_finds_its_unit_and_what_differs_is_exit_code_1(folder):
+    path = folder / "parts" / "even.gaussian.00001.parquet"
+    pd.read_parquet(path).assign(f1=-1.0).to_parquet(path)
+    result = study("replay", folder, 3)
+    assert result.exit_code == 1
+    assert "even.gaussian.00001 is not what it was: f1 differ" in result.output
+
+
+def test_summary_prints_the_table_and_writes_it_with_a_figure(folder):
+    result = study("summary", folder)
+    assert result.exit_code == 0, result.output
+    table = pd.read_csv(folder / "summary.csv")
+    assert table[["cohort", "strategy", "trial", "people"]].to_numpy().tolist() == [
+        ["gaussian", "even", 2, 2],
+        ["gaussian", "even", 4, 2],
+        ["gaussian", "incremental", 2, 2],
+        ["gaussian", "incremental", 4, 2],
+    ]
+    assert f"{table['f1'].iloc[0]:.3f}" in result.output
+    assert (folder / "summary.png").stat().st_size > 5000
+
+
+def test_sessions_that_failed_are_told_by_their_error(folder):
+    store: Store = open_store(folder)
+    for unit in store.study.units()[:2]:
+        (folder / "parts" / f"{unit.key}.parquet").unlink()
+        store.keep(unit, Failure("RuntimeError: stuck"))
+    result = study("summary", folder)
+    assert "2 sessions failed:" in result.output
+    assert "even: RuntimeError: stuck (1 sessions)" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [(["run", "nowhere.toml"], "cannot be read"), (["summary", "nowhere"], "cannot be read")],
+)
+def test_an_error_is_a_message_and_exit_code_1(arguments, message):
+    result = study(*arguments)
+    assert result.exit_code == 1
+    assert result.output.startswith("error: ")
+    assert message in result.output

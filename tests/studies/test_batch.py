@@ -1,0 +1,141 @@
+"""People side by side follow the law of one at a time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+
+from isiw.asktell import Strategy
+from isiw.catalogue import make_strategy
+from isiw.stopping import EdgeVariance
+from isiw.studies import SimulatedSession, simulate
+from isiw.studies.batch import simulate_batch
+from isiw.subjects import Responder
+from studies.tiny import FEW, timeless
+
+EVERY = ("default", "even", "random", "gp-straddle", "nr", "svmr", "gpr", "pf", "incremental")
+SETTINGS = {"default": FEW, "even": FEW, "random": FEW, "pf": {"particles": 4}}
+
+
+def sessions(strategy, people=3, *, first=0, trials=6, cohort="recruitment", stopping="noted", **settings):
+    chosen = tuple((SETTINGS.get(strategy, {}) | settings).items())
+    one = SimulatedSession(strategy, cohort, first, 5, trials, (2, trials), settings=chosen, stopping=stopping)
+    return [replace(one, person=first + number) for number in range(people)]
+
+
+def one_at_a_time(batch):
+    return pd.concat([simulate(session) for session in batch], ignore_index=True)
+
+
+@pytest.mark.parametrize("strategy", EVERY)
+def test_a_batch_of_one_is_that_session(strategy):
+    batch = sessions(strategy, 1, first=2, trials=9)
+    pd.testing.assert_frame_equal(timeless(simulate_batch(batch)), timeless(one_at_a_time(batch)))
+
+
+@pytest.mark.parametrize(
+    ("strategy", "trials"),
+    # NR draws to choose what to ask after its six initial ISIs; PF when a generation is complete.
+    [("incremental", 30), ("nr", 6)],
+)
+def test_where_nothing_is_drawn_a_batch_is_its_sessions(strategy, trials):
+    batch = sessions(strategy, 4, trials=trials, cohort="jitter")
+    together, apart = (timeless(rows) for rows in (simulate_batch(batch), one_at_a_time(batch)))
+    assert (together["mistrials"] == apart["mistrials"]).all()
+    pd.testing.assert_frame_equal(
+        together.drop(columns="troubles"), apart.drop(columns="troubles"), check_dtype=False, rtol=1e-6
+    )
+
+
+def test_each_person_is_asked_by_a_draw_of_its_own_where_the_acquisition_function_draws(monkeypatch):
+    asked, usual = {}, Responder.respond
+
+    def respond(responder, isi_ms, reference):
+        asked.setdefault(responder.subject.hit_delay_ms, []).append(isi_ms)
+        return usual(responder, isi_ms, reference)
+
+    monkeypatch.setattr(Responder, "respond", respond)
+    simulate_batch(sessions("random", 3, trials=4, cohort="gaussian"))
+    together = list(asked.values())
+    asked.clear()
+    one_at_a_time(sessions("random", 3, trials=4, cohort="gaussian"))
+    assert together == list(asked.values())
+    assert len(set(map(tuple, together))) == 3
+
+
+def test_a_batch_is_the_same_again_and_other_people_change_it():
+    rows = [timeless(simulate_batch(sessions("default", people))) for people in (3, 3, 2)]
+    pd.testing.assert_frame_equal(rows[0], rows[1])
+    assert not rows[0][rows[0]["person"] < 2].equals(rows[2])
+
+
+def test_a_session_that_ends_keeps_its_last_estimate():
+    batch = sessions("incremental", 2, trials=40, stopping="ends", max_trials=25)
+    rows = simulate_batch([replace(session, marks=(10, 30, 40)) for session in batch])
+    assert rows["delivered"].tolist() == [10, 25, 25] * 2
+    assert rows["stop_trial"].isna().tolist() == [True, False, False] * 2
+    assert (rows["converged"] == 0).all()
+    assert rows["stop_reason"].iloc[-1] == "The budget of 25 stimuli is used up."
+
+
+def test_each_person_stops_by_its_own_rule():
+    batch = sessions("nr", 4, trials=30, stopping="ends", cohort="gaussian", stop_variance_ms2=400.0)
+    rows = simulate_batch(batch)
+    last = rows[rows["trial"] == 30]
+    assert len(last) == 4
+    assert len(set(last["stop_trial"])) > 1
+    assert (last["delivered"] == last["stop_trial"]).all()
+    assert last["stop_reason"].str.startswith("The window has settled").all()
+
+
+@dataclass(frozen=True)
+class NaNForOne:
+    """Scores nothing for the second person."""
+
+    needs: tuple[type, ...] = ()
+
+    def __call__(self, posterior, isi_ms):
+        scores = torch.zeros((posterior.told.people, len(isi_ms)))
+        scores[:, 7] = 1.0
+        scores[1:2] = math.nan
+        return scores
+
+
+def test_a_person_without_a_finite_score_falls_back_alone(monkeypatch):
+    def player(session):
+        usual = make_strategy("nr", session.space, session.seed)
+        return Strategy(session.space, usual.model, NaNForOne(), EdgeVariance(), seed=session.seed)
+
+    monkeypatch.setattr(SimulatedSession, "player", player)
+    rows = simulate_batch(sessions("nr", 3, trials=5))
+    assert rows[rows["trial"] == 5]["fallbacks"].tolist() == [0, 5, 0]
+
+
+def test_a_device_reaches_the_models_that_have_one_and_no_others():
+    with pytest.raises((RuntimeError, AssertionError, NotImplementedError)):
+        simulate_batch(sessions("default", 2), device="xla")
+    assert len(simulate_batch(sessions("nr", 2, trials=2), device="xla")) == 2 * 2
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU")
+def test_a_batch_on_a_gpu_finds_windows_as_well():
+    rows = simulate_batch(sessions("default", 8, trials=20, cohort="gaussian", particles=500), device="cuda")
+    assert rows[rows["trial"] == 20]["f1"].mean() > 0.7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("strategy", "trials"), [("default", 15), ("nr", 20), ("pf", 40)])
+def test_the_mean_f1_of_a_batch_is_that_of_one_at_a_time(strategy, trials):
+    # The same people with the same noise, other draws of the model: paired, so that people do not blur the difference.
+    batch = sessions(strategy, 40, trials=trials, cohort="gaussian", stopping="ignored")
+    together, apart = (
+        rows[rows["trial"] == trials]["f1"].to_numpy() for rows in (simulate_batch(batch), one_at_a_time(batch))
+    )
+    difference = together - apart
+    assert difference.any()
+    assert abs(difference.mean()) < 3 * difference.std(ddof=1) / np.sqrt(len(difference))

@@ -1,0 +1,37 @@
+"""What docs/studies.md shows works as it stands there."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from isiw.studies.plan import study_from
+
+TEXT = (Path(__file__).parents[2] / "docs" / "studies.md").read_text(encoding="utf-8")
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
+
+
+def test_the_study_is_valid():
+    (block,) = blocks("toml")
+    study = study_from(tomllib.loads(block), "docs")
+    assert len(study.units()) == 3 * 2 * 100
+    assert study.units()[1].key == "nr.recruitment.00000"
+
+
+def test_the_example_in_python_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    exec(compile(blocks("python")[0], "studies.md", "exec"), {"__name__": "docs"})  # noqa: S102 - the point of the test
+    printed = capsys.readouterr().out
+    assert "pf" in printed
+    assert len(list((tmp_path / "small.study" / "parts").iterdir())) == 8
+
+
+def test_every_column_of_a_row_is_explained(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": "docs"}
+    exec(compile(blocks("python")[0], "studies.md", "exec"), names)  # noqa: S102 - as above
+    assert [name for name in names["rows"].columns if f"`{name}`" not in TEXT] == []

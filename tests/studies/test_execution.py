@@ -1,0 +1,78 @@
+"""Where work is done: nothing that one item does ends the others."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import pytest
+
+from isiw.errors import InvalidValueError, StudyError
+from isiw.studies.execution import DaskCluster, Failure, Processes, _attempt_alone
+from studies.tiny import double, double_or_die, double_or_die_once
+
+posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_what_raises_is_a_failure_among_the_results(workers):
+    results = dict(Processes(workers).results(double, range(6)))
+    failure = results.pop(3)
+    assert results == {0: 0, 1: 2, 2: 4, 4: 8, 5: 10}
+    assert failure.error == "ValueError: three is too many"
+    assert "in double" in failure.details
+
+
+@posix
+def test_what_takes_its_worker_down_again_and_again_is_given_up_and_the_others_finish():
+    results = dict(Processes(2, attempts=2).results(double_or_die, range(6)))
+    failure = results.pop(3)
+    assert results == {0: 0, 1: 2, 2: 4, 4: 8, 5: 10}
+    assert isinstance(failure, Failure)
+    assert "Its worker died 2 times" in failure.error
+
+
+@posix
+def test_what_runs_while_a_worker_dies_is_run_again(tmp_path):
+    items = [(number, tmp_path / "witness") for number in range(6)]
+    results = [(item[0], result) for item, result in Processes(2).results(double_or_die_once, items)]
+    assert sorted(results) == [(number, 2 * number) for number in range(6)]
+
+
+def test_stopping_early_leaves_the_rest_undone():
+    results = Processes(2).results(double, range(100))
+    next(results)
+    results.close()
+    assert list(results) == []
+
+
+@pytest.mark.parametrize("wrong", [{"workers": 0}, {"attempts": 0}])
+def test_no_worker_or_attempt_is_refused(wrong):
+    with pytest.raises(InvalidValueError, match="at least one"):
+        Processes(**wrong)
+
+
+def test_a_worker_of_many_threads_runs_one_session_at_a_time():
+    inside, most = [], []
+
+    def run(item):
+        inside.append(item)
+        most.append(len(inside))
+        threading.Event().wait(0.01)
+        inside.remove(item)
+
+    threads = [threading.Thread(target=_attempt_alone, args=(run, item)) for item in range(5)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert most == [1] * 5
+
+
+def test_without_dask_the_message_says_how_to_get_it(monkeypatch):
+    def missing(name):
+        raise ModuleNotFoundError(name)
+
+    monkeypatch.setattr("isiw.studies.execution.importlib.import_module", missing)
+    with pytest.raises(StudyError, match=r"isiw\[dask\]"):
+        list(DaskCluster("tcp://127.0.0.1:1").results(double, [1]))

@@ -1,0 +1,93 @@
+"""What a study is, from Python and from TOML."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+import tomli_w
+
+from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.errors import ConfigError, InvalidValueError, StrategyError
+from isiw.studies import Study, StudyStrategy, load_study
+from isiw.studies.plan import study_from, study_values
+from studies.tiny import TOML, tiny
+
+
+def people_by_strategy(study):
+    return [(session.label, session.cohort, session.person) for unit in study.units() for session in unit.sessions]
+
+
+def test_every_strategy_meets_the_same_people_with_the_same_seed():
+    sessions = [session for unit in tiny().units() for session in unit.sessions]
+    met = {(s.label, s.cohort, s.person, s.seed) for s in sessions}
+    assert len(sessions) == len(met) == 2 * 2 * 3
+    assert {m[1:] for m in met if m[0] == "even"} == {m[1:] for m in met if m[0] == "incremental"}
+
+
+def test_batches_hold_the_same_sessions_as_units_of_their_own():
+    single, batched = tiny(), tiny(engine="batched", batch=2)
+    assert sorted(people_by_strategy(single)) == sorted(people_by_strategy(batched))
+    assert [len(unit.sessions) for unit in batched.units()] == [2] * 4 + [1] * 4
+    assert batched.units()[0].key == "even.gaussian.00000-00001"
+
+
+def test_more_people_leave_the_keys_of_the_others_alone():
+    few, many = ({unit.key: unit for unit in tiny(people=n).units()} for n in (3, 5))
+    assert few.items() <= many.items()
+    assert len(many) == 2 * 2 * 5
+
+
+def test_a_study_from_toml_has_defaults_and_short_forms(tmp_path):
+    (tmp_path / "study.toml").write_text(TOML + 'space = "impact"\n')
+    study = load_study(tmp_path / "study.toml")
+    assert study.strategies == (StudyStrategy("even", {"particles": 40}), StudyStrategy("incremental"))
+    assert study.space == IMPACT_SPACE
+    assert (study.people, study.marks, study.engine, study.batch) == (12, (2, 4), "single", 25)
+    assert study_from({"strategies": ["even"], "cohorts": ["wide"]}, "here").space == VALVE_SPACE
+
+
+def test_marks_are_each_fifth_trial_and_the_last_by_default():
+    assert tiny(trials=12, marks=()).marks == (5, 10, 12)
+    assert tiny(trials=3, marks=()).marks == (3,)
+
+
+def test_toml_values_make_the_same_study_again():
+    study = tiny(strategies=(StudyStrategy("pf", {"stop_sd_ms": 30, "floor": "zeroed"}, "mine"),), space=IMPACT_SPACE)
+    assert study_from(tomllib.loads(tomli_w.dumps(study_values(study))), "again") == study
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (TOML + "peple = 3", r"study.toml: the key peple is unknown.*Did you mean people"),
+        (TOML.replace("people = 12", "people = 0"), r"people is too small; got 0"),
+        (TOML.replace('"ignored"', '"never"'), r"the value of stopping cannot be used; got 'never'"),
+        (TOML.replace("[2, 4]", "[4, 2]"), r"marks ascend"),
+        (TOML.replace("[2, 4]", "[2, 5]"), r"marks ascend"),
+        (TOML.replace('"gaussian"', '"gausian"'), r"unknown cohorts; got \['gausian'\]; expected gaussian"),
+        (TOML.replace('"incremental"', '"even"'), r"each once.*another label"),
+        (TOML.replace("[{", "[ ] # "), r"a study needs strategies"),
+        (TOML.replace("particles", "partikels"), r"the settings of even: the key partikels is unknown"),
+        (TOML.replace("= 40", "= 1"), r"the settings of even: .*particles must be a whole number; got 1"),
+        (TOML.replace("= 40", '= "many"'), r"the settings of even: the value of particles cannot be used; got 'many'"),
+        (TOML.replace("settings =", "setings ="), r"strategies.0.setings is unknown.*Did you mean settings"),
+        (TOML + 'space = "head"', r"the value of space cannot be used; got 'head'"),
+        (TOML.replace('name = "even"', 'label = "a/b", name = "even"'), r"a label is part of a file's name; got 'a/b'"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_told_with_the_way_out(tmp_path, text, message):
+    (tmp_path / "study.toml").write_text(text)
+    with pytest.raises(ConfigError, match=message):
+        load_study(tmp_path / "study.toml")
+
+
+def test_an_unknown_strategy_is_told_with_the_known_ones(tmp_path):
+    (tmp_path / "study.toml").write_text(TOML.replace("incremental", "incrementel"))
+    with pytest.raises(StrategyError, match="unknown strategy; got 'incrementel'; expected default"):
+        load_study(tmp_path / "study.toml")
+
+
+def test_from_python_what_cannot_be_is_refused_as_well():
+    with pytest.raises(InvalidValueError, match="engine is unknown"):
+        Study((StudyStrategy("even"),), ("wide",), engine="fast")

@@ -1,0 +1,211 @@
+"""A study in its folder: whatever ends it, what is finished is kept."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import psutil
+import pytest
+
+from isiw.errors import ConfigError, StudyError
+from isiw.studies import Processes, Study, begin_store, conduct, load_study, open_store, replay, unit_of_row
+from isiw.studies import plan as plan_module
+from studies.tiny import TOML, timeless, tiny
+
+posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+
+
+def keys_run(study: Study, folder: Path, **how: object) -> list[str]:
+    """The keys of the units that a run of the study had to run."""
+    keys: list[str] = []
+    conduct(study, folder, on_done=lambda unit, _result: keys.append(unit.key), **how)
+    return keys
+
+
+@pytest.fixture
+def crash(monkeypatch):
+    """Makes the sessions of one strategy raise."""
+    usual = plan_module.simulate
+
+    def simulate(session):
+        if session.strategy == "incremental" and session.cohort == "nonresponder":
+            raise RuntimeError("the sweep\nis stuck")
+        return usual(session)
+
+    monkeypatch.setattr(plan_module, "simulate", simulate)
+    return monkeypatch
+
+
+def test_a_study_has_one_row_a_mark_of_every_person_and_says_whose(tmp_path):
+    rows = conduct(tiny(), tmp_path / "s").rows()
+    assert len(rows) == 2 * 2 * 3 * 2
+    assert rows["unit"].iloc[0] == "even.gaussian.00000"
+    assert rows.columns[:5].tolist() == ["strategy", "cohort", "person", "seed", "trial"]
+    assert open_store(tmp_path / "s").rows().equals(rows)
+
+
+def test_a_finished_study_has_nothing_left_to_run(tmp_path):
+    assert len(keys_run(tiny(), tmp_path)) == 12
+    assert keys_run(tiny(), tmp_path) == []
+
+
+def test_a_study_goes_on_with_what_is_missing_and_writes_over_what_was_cut_off(tmp_path):
+    whole = timeless(conduct(tiny(), tmp_path / "whole").rows())
+    conduct(tiny(), tmp_path / "cut")
+    lost = tmp_path / "cut" / "parts" / "even.gaussian.00001.parquet"
+    lost.rename(lost.with_name(f"{lost.name}.part")).write_bytes(b"half of a pa")
+    assert len(open_store(tmp_path / "cut").rows()) == len(whole) - 2
+    assert keys_run(tiny(), tmp_path / "cut") == ["even.gaussian.00001"]
+    pd.testing.assert_frame_equal(timeless(open_store(tmp_path / "cut").rows()), whole)
+    assert not list((tmp_path / "cut").rglob("*.part"))
+
+
+def test_a_folder_of_another_study_is_refused_with_what_differs(tmp_path):
+    begin_store(tiny(), tmp_path)
+    with pytest.raises(StudyError, match=r"people was 3, now 4. Choose another folder, or .*isiw study run"):
+        begin_store(tiny(people=4), tmp_path)
+
+
+def test_a_folder_of_another_version_is_refused(tmp_path):
+    begin_store(tiny(), tmp_path)
+    path = tmp_path / "study.toml"
+    path.write_text(path.read_text().replace('isiw = "', 'isiw = "9.'))
+    with pytest.raises(StudyError, match="another version of isiw; got '9"):
+        begin_store(tiny(), tmp_path)
+
+
+def test_a_folder_without_a_study_is_an_error(tmp_path):
+    with pytest.raises(ConfigError, match="cannot be read"):
+        open_store(tmp_path)
+
+
+def test_a_strategy_that_crashes_is_reported_and_the_study_finishes(tmp_path, crash):
+    store = conduct(tiny(), tmp_path)
+    errors = store.errors()
+    assert errors["person"].tolist() == [0, 1, 2]
+    assert set(errors["strategy"]) == {"incremental"}
+    assert set(errors["error"]) == {"RuntimeError: the sweep is stuck"}
+    assert "in simulate" in errors["details"].iloc[0]
+    assert len(store.rows()) == (12 - 3) * 2
+    assert keys_run(tiny(), tmp_path) == []
+    crash.undo()
+    assert len(keys_run(tiny(), tmp_path, retry=True)) == 3
+    assert len(store.errors()) == 0
+    assert len(store.rows()) == 12 * 2
+
+
+@pytest.mark.parametrize("engine", ["single", "batched"])
+def test_a_replay_gives_identical_rows(tmp_path, engine):
+    store = conduct(tiny(engine=engine, batch=2), tmp_path)
+    for unit in store.study.units()[::3]:
+        again = replay(store, unit.key)
+        assert again.differing == ()
+        assert len(again.kept) == len(again.again) == 2 * len(unit.sessions)
+
+
+def test_a_replay_of_one_person_of_a_batch_compares_that_person(tmp_path):
+    store = conduct(tiny(engine="batched", batch=2), tmp_path)
+    key, person = unit_of_row(store, 3)
+    assert (key, person) == ("even.gaussian.00000-00001", 1)
+    assert set(replay(store, key, person).again["person"]) == {1}
+    with pytest.raises(StudyError, match="not in the unit; got 2"):
+        replay(store, key, 2)
+
+
+def test_a_replay_says_which_columns_differ(tmp_path):
+    store = conduct(tiny(), tmp_path)
+    path = tmp_path / "parts" / "even.gaussian.00001.parquet"
+    rows = pd.read_parquet(path)
+    rows.assign(f1=rows["f1"] + 0.1, ask_ms=0.0).to_parquet(path)
+    assert replay(store, "even.gaussian.00001").differing == ("f1",)
+
+
+@pytest.mark.usefixtures("crash")
+def test_what_cannot_be_replayed_is_told(tmp_path):
+    store = conduct(tiny(), tmp_path)
+    with pytest.raises(StudyError, match="no such unit; got 'odd'"):
+        replay(store, "odd")
+    with pytest.raises(StudyError, match="not finished"):
+        replay(store, "incremental.nonresponder.00001")
+    with pytest.raises(StudyError, match="no such row; got 99; expected 0 to"):
+        unit_of_row(store, 99)
+
+
+def workers_of(process: psutil.Process) -> list[psutil.Process]:
+    """The processes that joblib has started for it."""
+    return [child for child in process.children() if any("LokyProcess" in part for part in child.cmdline())]
+
+
+@posix
+def test_the_death_of_a_worker_in_mid_study_loses_no_row(tmp_path):
+    study, killed, keys = tiny(people=6), [], []
+
+    def on_done(unit, _result):
+        keys.append(unit.key)
+        if len(keys) == 4:
+            victim = workers_of(psutil.Process())[0]
+            victim.kill()
+            killed.append(victim.pid)
+
+    store = conduct(study, tmp_path / "killed", Processes(2), on_done=on_done)
+    assert killed
+    assert sorted(keys) == sorted(unit.key for unit in study.units())
+    assert len(store.errors()) == 0
+    pd.testing.assert_frame_equal(timeless(store.rows()), timeless(conduct(study, tmp_path / "whole").rows()))
+
+
+COMMAND = [sys.executable, "-c", "from isiw.cli import app; app()"]
+
+
+@pytest.fixture
+def started(tmp_path):
+    """A study that runs in another process, some of it finished; its workers must not outlive it."""
+    (tmp_path / "tiny.toml").write_text(TOML.replace("people = 12", "people = 40"))
+    parts = tmp_path / "tiny.study" / "parts"
+    command = [*COMMAND, "study", "run", str(tmp_path / "tiny.toml"), "--workers", "2"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:  # noqa: S603
+        while len(list(parts.glob("*.parquet"))) < 5:
+            assert process.poll() is None
+            time.sleep(0.01)
+        workers = workers_of(psutil.Process(process.pid))
+        assert len(workers) == 2
+        yield process
+        assert psutil.wait_procs(workers, timeout=10)[1] == []
+
+
+def finished_to_the_end(folder: Path) -> pd.DataFrame:
+    """The rows of a study that was ended early, once it has gone on; what was there must not have been run again."""
+    store = open_store(folder)
+    before, left = store.rows(), [unit.key for unit in store.left()]
+    assert len(before) >= 2 * 5
+    assert len(before) // 2 + len(left) == len(store.study.units())
+    assert left
+    assert keys_run(store.study, folder) == left
+    after = store.rows()
+    pd.testing.assert_frame_equal(after[~after["unit"].isin(left)].reset_index(drop=True), before)
+    return after
+
+
+@posix
+def test_the_death_of_the_main_process_in_mid_study_loses_no_row(tmp_path, started):
+    started.kill()
+    started.wait(timeout=10)
+    rows = finished_to_the_end(tmp_path / "tiny.study")
+    whole = conduct(load_study(tmp_path / "tiny.toml"), tmp_path / "whole").rows()
+    pd.testing.assert_frame_equal(timeless(rows), timeless(whole))
+
+
+@posix
+def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path, started):
+    os.killpg(started.pid, signal.SIGINT)  # a terminal tells the workers, too
+    _, errors = started.communicate(timeout=30)
+    assert started.returncode == 130
+    assert f"go on with: isiw study run {tmp_path / 'tiny.study'}" in errors
+    assert "Traceback" not in errors
+    finished_to_the_end(tmp_path / "tiny.study")

@@ -1,0 +1,47 @@
+"""What is wrong with a TOML file is told by file, key and value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+
+from isiw.errors import ConfigError
+from isiw.toml_files import checked, read_toml
+
+
+@dataclass(frozen=True)
+class Part:
+    name: str
+
+
+@dataclass(frozen=True)
+class Whole:
+    parts: tuple[Part, ...]
+    people: int = 3
+
+
+def test_values_become_the_dataclass():
+    assert checked(Whole, {"parts": [{"name": "a"}], "people": 4}, "f.toml") == Whole((Part("a"),), 4)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"parts": [], "peple": 3}, r"f.toml: the key peple is unknown; got 3; .*Did you mean people"),
+        ({"parts": [{"nam": "a"}]}, r"the key parts.0.nam is unknown.*Did you mean name"),
+        ({"parts": [], "people": "many"}, r"the value of people cannot be used; got 'many'"),
+        ({"people": 3}, r"the key parts is missing"),
+    ],
+)
+def test_what_is_wrong_is_named(values, message):
+    with pytest.raises(ConfigError, match=message):
+        checked(Whole, values, "f.toml")
+
+
+def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path):
+    (tmp_path / "broken.toml").write_text("people = = 3")
+    with pytest.raises(ConfigError, match=r"broken\.toml is not valid TOML"):
+        read_toml(tmp_path / "broken.toml")
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_toml(tmp_path / "nowhere.toml")
