@@ -2,7 +2,8 @@
 
     python benchmarks/acquisition.py --out benchmarks/results/acquisition
 
-writes a table (Markdown), the raw rows with versions, command and seeds (JSON), and a figure (PNG). Reported people
+writes a table (Markdown), its figures with versions, command and seeds (JSON), and a picture (PNG). Sessions run side
+by side, and are kept in a folder as they finish: the same command goes on where it was interrupted. Reported people
 come from seed 10,000 on; seeds below 1,000 are for work.
 """
 
@@ -12,7 +13,7 @@ import json
 import platform
 import shlex
 import sys
-from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -24,28 +25,34 @@ import typer
 from rich.progress import Progress
 
 import isiw
-from isiw.design import IMPACT_SPACE, VALVE_SPACE
-from isiw.studies import SimulatedSession, paired_sessions, run_study, simulate
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.metrics import trials_to_lasting
+from isiw.studies import Processes, Study, StudyStrategy, conduct, paired_sessions, run_study
 from isiw.subjects import COHORTS
 from oracle import ORACLE_COHORTS, simulate_oracle
 
 MARKS = (5, 10, 12, 15, 20, 25, 30, 40, 60, 80)
+LASTING = (0.8, 0.9, 0.95)
 SPACES = {"valve": VALVE_SPACE, "impact": IMPACT_SPACE}
-
-
-def run_session(session: SimulatedSession) -> pd.DataFrame:
-    """Run one session with the oracle or a named strategy."""
-    return simulate_oracle(session) if session.strategy == "oracle" else simulate(session)
+KEYS = ["cohort", "strategy", "trial"]
 
 
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
-    """One row a strategy, cohort and trial: mean F1 with its standard error, coverage, and rates of "no window"."""
-    groups = rows.groupby(["cohort", "strategy", "trial"])
+    """One row a cohort, strategy and trial.
+
+    Mean F1 with its standard error; how much it is below the oracle's on the same people, with the standard error of
+    that; coverage of the 90 % intervals of both edges; share called "no window"; median times.
+    """
+    oracle = rows[rows["strategy"] == "oracle"].set_index(["cohort", "person", "trial"])["f1"]
+    behind = oracle.reindex(pd.MultiIndex.from_frame(rows[["cohort", "person", "trial"]])).to_numpy() - rows["f1"]
+    groups = rows.assign(behind=behind).groupby(KEYS)
     return pd.DataFrame(
         {
             "people": groups.size(),
             "f1": groups["f1"].mean(),
             "f1_se": groups["f1"].sem(),
+            "behind_oracle": groups["behind"].mean(),
+            "behind_se": groups["behind"].sem(),
             "start_coverage": groups["start_covered"].mean(),
             "end_coverage": groups["end_covered"].mean(),
             "called_none": 1.0 - groups["reported_window"].mean(),
@@ -53,6 +60,42 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
             "tell_ms": groups["tell_ms"].median(),
         }
     ).reset_index()
+
+
+def decisions(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row a cohort, strategy and trial: share of the people without a window given one, and of those with, none."""
+    keys = [*KEYS, "noise"]
+    table = rows[rows["strategy"] != "oracle"].copy()
+    # Of the silent people every second has recruitment noise.
+    kinds = np.where(table["person"] % 2 == 0, "kind", "recruitment")
+    table["noise"] = np.where(table["cohort"] == "nonresponder", kinds, "")
+    table["false_window"] = table["reported_window"].where(~table["true_window"]).astype(float)
+    table["false_none"] = (~table["reported_window"]).where(table["true_window"]).astype(float)
+    return table.groupby(keys)[["false_window", "false_none"]].mean().reset_index()
+
+
+def at_stopping(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row a cohort and strategy: how often, when and with what its stopping rule ended the session."""
+    last = rows[rows["trial"] == rows.groupby(KEYS[:2])["trial"].transform("max")]
+    stopped = last[last["converged"] == 1.0]
+    groups = stopped.groupby(KEYS[:2])
+    table = groups[["stop_trial", "stop_f1", "stop_start_covered", "stop_end_covered"]].mean()
+    return table.assign(stopped=groups.size() / last.groupby(KEYS[:2]).size()).reset_index()
+
+
+def lasting(table: pd.DataFrame) -> pd.DataFrame:
+    """One row a cohort and strategy: the first trial from which mean F1 stays above each criterion, of those marked."""
+
+    def first(group: pd.DataFrame, criterion: float) -> float:
+        mark = trials_to_lasting(group["f1"], criterion)
+        return float("nan") if mark is None else float(group["trial"].iloc[mark - 1])
+
+    groups = table.sort_values(KEYS).groupby(KEYS[:2])
+    return (
+        pd.DataFrame({f"F1 {c}": {name: first(group, c) for name, group in groups} for c in LASTING})
+        .rename_axis(KEYS[:2])
+        .reset_index()
+    )
 
 
 def figure(table: pd.DataFrame) -> matplotlib.figure.Figure:
@@ -70,53 +113,110 @@ def figure(table: pd.DataFrame) -> matplotlib.figure.Figure:
     return picture
 
 
-def write(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
-    """Table, rows and figure."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    table = summary(rows)
+def markdown(table: pd.DataFrame) -> str:
+    """A table."""
     lines = [" | ".join(table.columns), " | ".join("---" for _ in table.columns)]
     lines += [" | ".join(f"{v:.3f}" if isinstance(v, float) else str(v) for v in row) for row in table.to_numpy()]
+    return "\n".join(f"| {line} |" for line in lines)
+
+
+def write(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
+    """Tables and picture."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    table = summary(rows)
+    tables = {
+        "F1 by trial": table,
+        "Trials to a lasting F1 (among the marked trials)": lasting(table),
+        "False decisions": decisions(rows),
+        "At the stopping rule": at_stopping(rows),
+    }
     header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
-    body = "\n".join(f"| {line} |" for line in lines)
-    out.with_suffix(".md").write_text(f"{header}\n\n{body}\n")
-    records = json.loads(table.to_json(orient="records", double_precision=6))
-    out.with_suffix(".json").write_text(json.dumps({"facts": facts, "summary": records}, indent=1))
+    parts = [f"## {title}\n\n{markdown(part)}\n" for title, part in tables.items()]
+    out.with_suffix(".md").write_text("\n".join([header, "", *parts]))
+    records = {title: json.loads(part.to_json(orient="records", double_precision=6)) for title, part in tables.items()}
+    out.with_suffix(".json").write_text(json.dumps({"facts": facts, **records}, indent=1))
     figure(table).savefig(out.with_suffix(".png"), dpi=110)
 
 
-def main(  # noqa: PLR0913 - a command's options are its arguments
-    strategies: Annotated[str, typer.Option(help="Named strategies, comma-separated.")] = "default",
+def strategy_of(text: str) -> StudyStrategy:
+    """`NAME`, or `NAME:ACQUISITION` for the same model with another acquisition function."""
+    name, _, acquisition = text.partition(":")
+    settings = {"acquisition": acquisition} if acquisition else {}
+    return StudyStrategy(name, settings, label=f"{name}+{acquisition}" if acquisition else name)
+
+
+def run(study: Study, folder: Path, workers: int, progress: Progress) -> pd.DataFrame:
+    """All rows of a study; what its folder holds already is not run again."""
+    units = study.units()
+    names = ", ".join(strategy.label for strategy in study.strategies)
+    bar = progress.add_task(f"{names}: {len(units)} batches", total=len(units))
+    store = conduct(study, folder, Processes(workers), on_done=lambda _u, _r: progress.advance(bar))
+    if len(failed := store.errors()):
+        raise SystemExit(f"{len(failed)} sessions failed: {failed['error'].iloc[0]}")
+    progress.update(bar, completed=len(units))
+    return store.rows()
+
+
+def run_oracle(study: Study, workers: int, progress: Progress) -> pd.DataFrame:
+    """The oracle on the same people, in those cohorts whose profiles it knows; their amplitudes as they are."""
+    cohorts = [name for name in study.cohorts if name in ORACLE_COHORTS]
+    plan = {"seed": study.seed, "trials": study.trials, "marks": study.marks, "space": study.space}
+    sessions = paired_sessions(["oracle"], cohorts, study.people, **plan)
+    if not sessions:
+        return pd.DataFrame()
+    bar = progress.add_task("oracle", total=len(sessions))
+    return run_study(sessions, workers=workers, run=simulate_oracle, on_done=lambda _s: progress.advance(bar))
+
+
+def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
+    strategies: Annotated[str, typer.Option(help="Comma-separated; NAME or NAME:ACQUISITION.")] = "default",
+    others: Annotated[str, typer.Option(help="The same, with the first --other-people only.")] = "",
     cohorts: Annotated[str, typer.Option(help="Cohorts, comma-separated.")] = ",".join(COHORTS),
     people: Annotated[int, typer.Option(help="People a cohort.")] = 200,
+    other_people: Annotated[int, typer.Option(help="People a cohort for the others.")] = 50,
     trials: Annotated[int, typer.Option(help="Trials a session.")] = 60,
     seed: Annotated[int, typer.Option(help="Seed of the cohorts.")] = 10_000,
-    space: Annotated[str, typer.Option(help="valve or impact.")] = "valve",
+    space: Annotated[str, typer.Option(help="valve or impact, or the high end of a range from the valve [ms].")] = (
+        "valve"
+    ),
+    amplitude: Annotated[float, typer.Option(help="Factor on all amplitudes.")] = 1.0,
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("acquisition"),
     *,
+    stopping: Annotated[bool, typer.Option(help="Note when the stopping rule fires: an estimate a trial.")] = True,
     quick: Annotated[bool, typer.Option(help="Three cohorts, few people: under two minutes.")] = False,
 ) -> None:
     """Compare strategies on paired simulated people."""
     names = cohorts.split(",")
     if quick:
-        names, people, trials = ["gaussian", "recruitment", "nonresponder"], 6, 20
-    marks = tuple(mark for mark in MARKS if mark <= trials)
-    plan = {"seed": seed, "trials": trials, "marks": marks, "space": SPACES[space]}
-    sessions = paired_sessions(strategies.split(","), names, people, **plan)
-    sessions += paired_sessions(["oracle"], [name for name in names if name in ORACLE_COHORTS], people, **plan)
-    rows = with_progress(sessions, workers)
+        names, people, other_people, trials = ["gaussian", "recruitment", "nonresponder"], 10, 10, 20
+    study = Study(
+        strategies=tuple(strategy_of(text) for text in strategies.split(",")),
+        cohorts=tuple(names),
+        people=people,
+        seed=seed,
+        trials=trials,
+        marks=tuple(mark for mark in MARKS if mark <= trials),
+        space=SPACES[space] if space in SPACES else DesignSpace(0.0, float(space), reference="valve"),
+        amplitude=amplitude,
+        stopping="noted" if stopping else "ignored",
+        engine="batched",
+    )
+    studies = [study]
+    if others:
+        rest = tuple(strategy_of(text) for text in others.split(","))
+        studies.append(replace(study, strategies=rest, people=min(people, other_people)))
+    folder = out.with_suffix(".parts")
+    with Progress() as progress:
+        tables = [run(part, folder / str(number), workers, progress) for number, part in enumerate(studies)]
+        if amplitude == 1.0:
+            tables.append(run_oracle(study, workers, progress))
     versions = {m.__name__: m.__version__ for m in (isiw, torch, np)} | {"python": platform.python_version()}
     command = shlex.join(["python", "benchmarks/acquisition.py", *sys.argv[1:]])
-    facts = {"command": command, "versions": versions, "seed": seed, "space": space, "people": people}
+    facts = {"command": command, "versions": versions, "seed": seed, "people": people}
+    rows = pd.concat(tables, ignore_index=True)
     write(rows, facts, out)
-    print(summary(rows).to_string(index=False, float_format=lambda value: f"{value:.3f}"))
-
-
-def with_progress(sessions: Sequence[SimulatedSession], workers: int) -> pd.DataFrame:
-    """Run sessions behind a progress bar."""
-    with Progress() as progress:
-        bar = progress.add_task("sessions", total=len(sessions))
-        return run_study(sessions, workers=workers, run=run_session, on_done=lambda _s: progress.advance(bar))
+    print(out.with_suffix(".md").read_text())
 
 
 if __name__ == "__main__":

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -54,6 +56,24 @@ def test_a_person_without_a_window_is_one_in_the_table():
     rows = simulate(small(cohort="nonresponder"))
     assert not rows["true_window"].any()
     assert (rows["f1"] == (~rows["reported_window"]).astype(float)).all()
+
+
+def test_amplitudes_are_scaled_and_the_window_stays():
+    usual, scaled = small(), replace(small(), amplitude=10.0)
+    players = [Perfect(usual), Perfect(scaled)]
+    rows = [play(session, player) for session, player in zip((usual, scaled), players, strict=True)]
+    np.testing.assert_allclose([10 * mep for _, mep in players[0].told], [mep for _, mep in players[1].told])
+    assert rows[0]["f1"].tolist() == rows[1]["f1"].tolist() == [1.0, 1.0]
+
+
+def test_the_moment_of_stopping_is_kept_with_its_f1_and_coverage():
+    settings = (*SMALL, ("max_trials", 2))
+    session = replace(small(), trials=6, marks=(2, 6), stopping="noted", settings=settings)
+    early, late = simulate(session).to_dict("records")
+    # The budget is used up after two trials; what is noted then no longer changes.
+    assert early["stop_trial"] == late["stop_trial"] == 2.0
+    assert early["stop_f1"] == late["stop_f1"] == early["f1"]
+    assert early["stop_start_covered"] == late["stop_start_covered"] == early["start_covered"]
 
 
 def test_a_study_is_the_same_in_one_process_and_in_two():

@@ -106,6 +106,7 @@ class Study:
         engine: `"single"`, one session at a time, or `"batched"`, people side by side.
         batch: how many people side by side.
         device: torch device of the batched engine, for the models that have one.
+        amplitude: factor on all amplitudes of the people.
 
     Raises:
         InvalidValueError: a number or a word that cannot be, or a label given twice.
@@ -122,6 +123,7 @@ class Study:
     engine: Engine = "single"
     batch: int = 25
     device: str = "cpu"
+    amplitude: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("strategies", "cohorts", "marks"):
@@ -173,6 +175,7 @@ class Study:
                 settings=tuple(strategy.settings.items()),
                 label=strategy.label,
                 stopping=self.stopping,
+                amplitude=self.amplitude,
             )
             for person in people
         )

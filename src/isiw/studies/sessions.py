@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, TypeAlias, get_args
 
 import pandas as pd
@@ -28,6 +28,8 @@ __all__ = ["TIMES", "Crowd", "Judgement", "Player", "SimulatedSession", "Stoppin
 
 TIMES = ("ask_ms", "tell_ms")
 """Columns that differ each time a session is run."""
+
+_OF_THE_STOP = ("f1", "start_covered", "end_covered")
 
 Stopping: TypeAlias = Literal["ignored", "noted", "ends"]
 Judgement: TypeAlias = WindowEstimate | Window | None
@@ -88,9 +90,10 @@ class SimulatedSession:
         label: what the strategy is called in the table; by default its name.
         stopping: whether the strategy's stopping rule is `"ignored"`, or it is `"noted"` when it fires, or `"ends"` the
             session.
+        amplitude: factor on all of the person's amplitudes, as of another rig or muscle.
 
     Raises:
-        InvalidValueError: no trial, a person that cannot be, or another word for stopping.
+        InvalidValueError: no trial, a person or an amplitude that cannot be, or another word for stopping.
     """
 
     strategy: str
@@ -103,16 +106,20 @@ class SimulatedSession:
     settings: tuple[tuple[str, Any], ...] = field(default=())
     label: str = ""
     stopping: Stopping = "ignored"
+    amplitude: float = 1.0
 
     def __post_init__(self) -> None:
         if self.trials < 1 or self.person < 0:
             raise InvalidValueError("a session needs a trial and a person", got=(self.trials, self.person))
+        if not 0.0 < self.amplitude < math.inf:
+            raise InvalidValueError("amplitude is a factor above 0", got=self.amplitude)
         if self.stopping not in get_args(Stopping):
             raise InvalidValueError("stopping is unknown", got=self.stopping, expected=", ".join(get_args(Stopping)))
 
     def subject(self) -> SimulatedSubject:
         """The simulated person."""
-        return cohort(self.cohort, self.person + 1, self.seed)[self.person]
+        usual = cohort(self.cohort, self.person + 1, self.seed)[self.person]
+        return replace(usual, scale=self.amplitude * usual.scale)
 
     def player(self) -> Strategy:
         """The strategy before its first trial."""
@@ -142,9 +149,9 @@ def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
         been delivered by then, mistrials among them; F1; whether there is and was reported a window, its edges [ms],
         its probability, whether the 90 % intervals cover start and end (NaN where there are none); how many asks were
         fallbacks and how many fits failed (NaN where a batch cannot say whose); after how many pairs the stopping rule
-        fired (NaN where it has not), why, and whether that was before the budget was used up (NaN where the rule is
-        ignored); the time that the last ask and the last tell took for each person [ms]. After the end of a session its
-        last estimate stays.
+        fired (NaN where it has not), why, whether that was before the budget was used up (NaN where the rule is
+        ignored), and F1 and coverage at that moment, named `stop_f1` and so on; the time that the last ask and the last
+        tell took for each person [ms]. After the end of a session its last estimate stays.
     """
     people = [_Person(session, number, crowd) for number, session in enumerate(sessions)]
     for trial in range(1, sessions[0].trials + 1):
@@ -176,6 +183,7 @@ class _Person:
         self.troubles = 0.0
         converged = math.nan if session.stopping == "ignored" else 0.0
         self.stop: dict[str, Any] = {"stop_trial": math.nan, "stop_reason": "", "converged": converged}
+        self.stop |= {f"stop_{name}": math.nan for name in _OF_THE_STOP}
 
     @property
     def ended(self) -> bool:
@@ -209,6 +217,8 @@ class _Person:
         if rule is not None and (decision := self.crowd.decision(self.number)).stop:
             left = stimuli_left(rule, delivered)
             self.stop = {"stop_trial": float(delivered), "stop_reason": decision.reason, "converged": float(left != 0)}
+            judged = _judged(self.crowd.estimate(self.number), self.truth, self.session.space)
+            self.stop |= {f"stop_{name}": judged[name] for name in _OF_THE_STOP}
 
     def _row(self, delivered: int) -> dict[str, Any]:
         session = self.session
