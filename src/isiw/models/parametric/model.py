@@ -23,7 +23,7 @@ from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
 from isiw.models.parametric.program import WindowProgram
 from isiw.models.parametric.sampling import Method, sample_person
 from isiw.models.particles.evidence import History, observed
-from isiw.models.particles.sample import OUTCOMES, table_levels, table_weights
+from isiw.models.particles.sample import OUTCOMES, interpolated, table_levels
 from isiw.models.protocol import Observation, SimulatedPerson, Tensor
 from isiw.models.streams import SIMULATED, step_generator, systematic
 from isiw.models.windows import profile_grid, sampled_estimate
@@ -176,7 +176,7 @@ class WindowSample:
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP under each sample, shape (b, s, t, y)."""
-        return table_weights(self.levels(isi_ms.double()).float()) @ self._outcome_table
+        return interpolated(self._outcome_table, self.levels(isi_ms.double()).float())
 
     @cached_property
     def _outcome_table(self) -> Tensor:

@@ -15,8 +15,8 @@ from isiw.models.protocol import Observation, Tensor
 
 __all__ = ["ISI_NODES", "History", "in_pieces", "levels", "observed", "total_log_likelihood"]
 
-CHUNK_ELEMENTS = 1 << 18
-"""On a CPU the likelihood is worked through in pieces of this many nodes, which stay in its cache."""
+CHUNK_ELEMENTS = 1 << 21
+"""On a CPU the likelihood is worked through in pieces of this many nodes: few calls, and bounded memory."""
 
 ISI_NODES = ((-math.sqrt(3.0), 1 / 6), (0.0, 2 / 3), (math.sqrt(3.0), 1 / 6))
 """Nodes [SD] and weights of an uncertain ISI."""
@@ -115,7 +115,7 @@ def _by_trial(person: Person, history: History, isi_ms: Tensor) -> Tensor:
 
 
 def in_pieces(function: Callable[..., Tensor], response: Response, others: tuple[Tensor, ...], elements: int) -> Tensor:
-    """Apply a function of particles piece by piece on a CPU, where its intermediate values then stay in the cache.
+    """Apply a function of particles piece by piece on a CPU, so that its intermediate values stay small.
 
     Args:
         function: maps a response (fields (b, p)) and the others to a tensor of shape (b, p, ...).

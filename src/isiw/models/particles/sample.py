@@ -13,7 +13,7 @@ from isiw.models.particles.response import NODES, evoked_mean, log_gain, outcome
 from isiw.models.protocol import Tensor
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
 
-__all__ = ["OUTCOMES", "PersonSample", "table_levels", "table_weights"]
+__all__ = ["OUTCOMES", "PersonSample", "interpolated", "table_levels"]
 
 LEVELS = 24
 """Facilitations at which responses are worked out; what lies between is interpolated."""
@@ -27,10 +27,22 @@ def table_levels(device: torch.device) -> Tensor:
     return torch.linspace(0.0, 1.0, LEVELS, device=device).square()
 
 
-def table_weights(level: Tensor) -> Tensor:
-    """Weights of the tables' levels that interpolate at each facilitation (b, s, t), shape (b, s, t, l)."""
+def interpolated(table: Tensor, level: Tensor) -> Tensor:
+    """What lies between the rows of a table.
+
+    Args:
+        table: a row for each of `table_levels`, shape (b, s, l, y).
+        level: facilitations, shape (b, s, t).
+
+    Returns:
+        Shape (b, s, t, y).
+    """
     position = level.clamp(0.0, 1.0).sqrt() * (LEVELS - 1)
-    return (1.0 - (position.unsqueeze(-1) - torch.arange(LEVELS, device=level.device)).abs()).clamp_min(0.0)
+    below = position.floor().clamp_max(LEVELS - 2)
+    first = LEVELS * torch.arange(table.shape[0] * table.shape[1], device=level.device).view(*table.shape[:2], 1)
+    rows, row = table.reshape(-1, table.shape[-1]), (first + below.long()).flatten()
+    between = torch.lerp(rows[row], rows[row + 1], (position - below).view(-1, 1))
+    return between.view(*level.shape, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +87,8 @@ class PersonSample:
 
     def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
         """Expected MEP [mV], shape (b, s, t)."""
-        evoked = (table_weights(levels(self.person, isi_ms.unsqueeze(0))) @ self._evoked.unsqueeze(-1)).squeeze(-1)
-        return self._with_floor_mv(evoked)
+        evoked = interpolated(self._evoked.unsqueeze(-1), levels(self.person, isi_ms.unsqueeze(0)))
+        return self._with_floor_mv(evoked.squeeze(-1))
 
     def baselines_mv(self) -> Tensor:
         """Expected MEP without a tap [mV], shape (b, s)."""
@@ -106,4 +118,4 @@ class PersonSample:
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
-        return table_weights(levels(self.person, isi_ms.unsqueeze(0))) @ self._outcome_table
+        return interpolated(self._outcome_table, levels(self.person, isi_ms.unsqueeze(0)))
