@@ -1,0 +1,114 @@
+"""The headline: stimuli at equal trials and at equal F1, the default against each method, on realistic and kind noise."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from benchmarks.reduction import dissertation as text
+from benchmarks.reduction.document import Section, Table
+from benchmarks.reduction.look import COLOURS, NAMES, panels
+from benchmarks.reduction.readings import LIVE
+from benchmarks.reduction.sessions import Session
+from benchmarks.reduction.size import Size
+from isiw.metrics import trials_to_lasting
+from isiw.types import FloatArray
+
+NOISE = {"recruitment": "realistic", "gaussian": "kind"}
+MARGIN = 0.15
+
+
+def sessions(size: Size, seed: int) -> list[Session]:
+    """Live trials, counted from the valve command, on both cohorts."""
+    return [
+        Session(method, cohort, person, seed, reading=LIVE, horizon=size.horizon)
+        for cohort in NOISE
+        for method in (*text.METHODS, "default")
+        for person in range(size.people)
+    ]
+
+
+def curve(rows: pd.DataFrame, method: str) -> FloatArray:
+    """F1 by trial, a row a person, shape (people, trials)."""
+    return np.array(rows.loc[rows["method"] == method, "f1_by_trial"].tolist())
+
+
+def duel(rows: pd.DataFrame, method: str) -> dict[str, float | str | None]:
+    """The default against one method on one cohort.
+
+    Args:
+        rows: sessions of the cohort, in the same order of people.
+        method: the other method.
+    """
+    own = rows[rows["method"] == method]
+    trials, f1 = own["trials"].to_numpy(), own["f1, true"].to_numpy()
+    curves = curve(rows, "default")
+    stopped = np.minimum(trials, curves.shape[1])
+    at_stop = curves[np.arange(len(curves)), stopped - 1]
+    # The default's session may have ended before a long one of the other method: its curve ends at the horizon.
+    reached = trials_to_lasting(curves.mean(axis=0), float(f1.mean()))
+    gain = at_stop - f1
+    return {
+        "against": NAMES[method],
+        "its trials": float(trials.mean()),
+        "its F1": float(f1.mean()),
+        "default's F1 at as many": float(at_stop.mean()),
+        "gain": float(gain.mean()),
+        "± 95 %": float(1.96 * gain.std(ddof=1) / math.sqrt(len(gain))),
+        "default's trials to its F1": math.nan if reached is None else float(reached),
+        "share of its trials": math.nan if reached is None else reached / float(trials.mean()),
+    }
+
+
+def verdicts(table: pd.DataFrame, noise: str) -> list[str]:
+    """What is to hold against GPR."""
+    row = table.set_index("against").loc["GPR"]
+    reached, share = row["default's trials to its F1"], row["share of its trials"]
+    half = (
+        f"{'holds' if share <= 0.5 else 'FAILS'}: on {noise} noise the default reaches GPR's F1 ({row['its F1']:.2f}) lastingly with "
+        f"{reached:.0f} trials, {100 * share:.0f} % of GPR's {row['its trials']:.1f} (at most half)"
+    )
+    gain = row["gain"]
+    better = f"at as many trials as GPR's the default's F1 is {gain:+.2f} ± {row['± 95 %']:.2f} better on {noise} noise"
+    if noise == "realistic":
+        better = f"{'holds' if gain >= MARGIN else 'FAILS'}: {better} (at least {MARGIN})"
+    return [half, better]
+
+
+def figure(rows: pd.DataFrame) -> Figure:
+    """Mean F1 by trial, and where each method stops."""
+    picture, axes = panels(1, 2, width=4.6, height=3.3, sharey=True)
+    for one, (cohort, noise) in zip(axes[0], NOISE.items(), strict=True):
+        group = rows[rows["cohort"] == cohort]
+        for method in ("nr", "svmr", "gpr", "default"):
+            mean = curve(group, method).mean(axis=0)
+            one.plot(np.arange(1, len(mean) + 1), mean, color=COLOURS[method], label=NAMES[method])
+            own = group[group["method"] == method]
+            one.plot(own["trials"].mean(), own["f1, true"].mean(), "o", color=COLOURS[method], ms=6)
+        one.set(
+            title=f"{cohort}: {noise} noise (dots: at the stopping rule)", xlabel="trials", ylim=(0, 1), xlim=(0, None)
+        )
+        one.title.set_fontsize(9)
+    axes[0, 0].set_ylabel("mean F1 (true window)")
+    axes[0, 0].legend(fontsize=8, frameon=False)
+    return picture
+
+
+def section(rows: pd.DataFrame) -> Section:
+    """This part of the report."""
+    tables = {
+        cohort: pd.DataFrame([duel(group, method) for method in text.METHODS])
+        for cohort, group in rows.groupby("cohort")
+    }
+    shown = [Table(f"`{cohort}`, {noise} noise.", tables[cohort]) for cohort, noise in NOISE.items()]
+    horizon = curve(rows, "default").shape[1]
+    prose = (
+        f"{rows['person'].nunique()} people of each cohort, live trials over 500 ms from the valve command, F1 by the true window. At equal trials: the "
+        f"default's F1 after as many trials as each session of the other method took (at most {horizon}), paired by person. At equal F1: from which trial on the default's mean F1 stays at or "
+        "above the other method's mean at its stop. A trial is two stimuli, so the shares are those of stimuli too."
+    )
+    said = [sentence for cohort, noise in NOISE.items() for sentence in verdicts(tables[cohort], noise)]
+    return Section("4. The headline: equal trials, equal F1", prose, shown, ("headline", figure(rows)), said)

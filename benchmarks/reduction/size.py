@@ -1,0 +1,35 @@
+"""How much is run: the whole report, or a quick look at all of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+__all__ = ["FULL", "QUICK", "Size"]
+
+
+@dataclass(frozen=True)
+class Size:
+    """How many sessions each part has; sessions of `kim11` are noise seeds of its eleven people.
+
+    Args:
+        kim: sessions of `kim11` in the main comparison.
+        kim_default: how many of them the default strategy plays too, which takes far longer than all others.
+        people: people of `recruitment` and `gaussian`.
+        sweep: sessions of `kim11` for each number of initial observations or particles.
+        readings: sessions of `kim11` for each reading.
+        horizon: trials of the default's learning curve in the headline.
+        intervals: runs of interval production for each light.
+    """
+
+    kim: int
+    kim_default: int
+    people: int
+    sweep: int
+    readings: int
+    horizon: int
+    intervals: int
+
+
+FULL: Final = Size(kim=110, kim_default=55, people=200, sweep=55, readings=55, horizon=40, intervals=20)
+QUICK: Final = Size(kim=11, kim_default=11, people=6, sweep=11, readings=11, horizon=20, intervals=1)
