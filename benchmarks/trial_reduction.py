@@ -16,10 +16,12 @@ import shlex
 import sys
 import time
 from pathlib import Path
+from types import ModuleType
 from typing import Annotated
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import pandas as pd
 import typer
 
 from benchmarks.reduction import (
@@ -30,12 +32,15 @@ from benchmarks.reduction import (
     initial,
     intervals,
     online,
+    orderings,
     particles,
     reading_table,
 )
 from benchmarks.reduction.document import Section, write
 from benchmarks.reduction.parallel import frame, in_parallel, run_sessions
 from benchmarks.reduction.size import FULL, QUICK, Size
+
+Rows = dict[ModuleType, pd.DataFrame]
 
 RESULTS = Path("benchmarks/results/trial_reduction")
 PARTS = (comparison, reading_table, headline, initial, particles, gaussians)
@@ -50,10 +55,11 @@ def sections(size: Size, seed: int, workers: int) -> list[Section]:
     lights = in_parallel(intervals.produce, intervals.runs(size.intervals, seed), workers, "interval production")
     waveforms = in_parallel(online.examine, online.plan(seed), workers, "online")
     return [
-        comparison.section(rows[comparison]),
-        conventional.section_sweeps(rows[comparison]),
-        reading_table.section(rows[reading_table]),
         headline.section(rows[headline]),
+        comparison.section(rows[comparison]),
+        orderings.section(compared(rows), reading_table.summary(rows[reading_table], accelerometer=False)),
+        reading_table.section(rows[reading_table]),
+        conventional.section_sweeps(rows[comparison]),
         conventional.section_burden(rows[comparison]),
         initial.section(rows[initial]),
         particles.section(rows[particles]),
@@ -61,6 +67,16 @@ def sections(size: Size, seed: int, workers: int) -> list[Section]:
         online.section(waveforms),
         intervals.section(lights),
     ]
+
+
+def compared(rows: Rows) -> dict[str, pd.DataFrame]:
+    """The comparisons in which orderings are judged, by name."""
+    main, read = rows[comparison], rows[reading_table]
+    best = reading_table.distances(read).loc[0, "reading"]
+    names = dict.fromkeys(("people: kind noise", "observation: mean of ten", best))
+    cohorts = {f"{name}, base": main[main["cohort"] == name] for name in ("kim11", "recruitment")}
+    readings = {str(name): reading_table.rows_of(name, read) for name in names}
+    return {name: comparison.summary(group) for name, group in (cohorts | readings).items()}
 
 
 def main(

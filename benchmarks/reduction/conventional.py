@@ -14,7 +14,7 @@ from benchmarks.reduction.timing import BREAKS_OF_A_FULL_SWEEP, minutes
 
 
 def trials_inside(widths_ms: tuple[float, ...]) -> tuple[float, float]:
-    """Mean and SD (of a population) of a sweep's trials that lie in windows of these widths [ms], both ends included."""
+    """Mean and population SD of a sweep's trials inside windows of these widths [ms], both ends included."""
     trials = TRIALS_PER_ISI * (np.array(widths_ms) / STEP_MS + 1)
     return float(trials.mean()), float(trials.std())
 
@@ -74,31 +74,32 @@ def burden(rows: pd.DataFrame) -> pd.DataFrame:
 def section_sweeps(rows: pd.DataFrame) -> Section:
     """Readings of the conventional sweep."""
     mean, sd = trials_inside(text.WIDTHS_MS)
+    prose = f"""\
+The text's 272 trials (271, SD 108 in Fig. 4.18) follow from its own Table 4.1: twelve trials at each 5 ms *inside*
+the measured windows, both ends included, are {mean:.1f}, SD {sd:.1f}. What was recorded, or counted, is thus the
+window alone, with no approach to it and no silence behind it (264 and 408 of Table 5.3 are 22 and 34 such stops),
+and nothing was recorded where the text's figures show zero. A sweep that starts at the valve command, or at the
+impact, and ends when responses have vanished needs more. Where a sweep begins is the low end of the design space;
+`incremental` needs no setting for it."""
     bare = rows[(rows["method"] == "incremental") & ~rows["accelerometer"]]
-    shown = bare.groupby("cohort")["shows a window"].mean()
-    prose = (
-        "The text's 272 (271, SD 108) trials are explained by its own Table 4.1: the trials that lie inside the measured "
-        f"windows, twelve at each 5 ms and both ends included, are {mean:.1f}, SD {sd:.1f} — so what was recorded, or counted, "
-        "is the window alone: no approach to it, and no silence behind it. (264 and 408 of Table 5.3 are 22 and 34 such stops.) "
-        "It also means that nothing was recorded outside the windows, where the text's figures show zero. A sweep that begins at the "
-        "valve command, or at the impact, and sees responses vanish needs more."
-    )
     conclusions = [
-        f"On `{name}`, {100 * share:.0f} % of sweeps show a window (three standard errors above the baseline); F1 of its "
-        f"window by the true one: {group['f1, true'].mean():.2f} above the baseline, {group['f1, of .135'].mean():.2f} by 0.135; "
-        f"correlation of measured and true profile {group['correlation, true'].mean():.2f}."
-        for (name, share), (_, group) in zip(shown.items(), bare.groupby("cohort"), strict=True)
+        f"`{name}`: {100 * group['shows a window'].mean():.0f} % of sweeps show a window (three standard errors above the "
+        f"baseline). By the true one its F1 is {group['f1, true'].mean():.2f} above the baseline and "
+        f"{group['f1, of .135'].mean():.2f} by 0.135; measured and true profile correlate by "
+        f"{group['correlation, true'].mean():.2f}."
+        for name, group in bare.groupby("cohort")
     ]
     return Section(
-        "2. The conventional sweep", prose, [Table("Trials by reading.", sweeps(rows))], conclusions=conclusions
+        "The conventional sweep", prose, [Table("Trials by reading.", sweeps(rows))], conclusions=conclusions
     )
 
 
 def section_burden(rows: pd.DataFrame) -> Section:
     """Minutes on the table."""
-    prose = (
-        f"One-second trials; two minutes of rest after every twelve; two breaks of five minutes in a conventional sweep "
-        f"({minutes(600, BREAKS_OF_A_FULL_SWEEP):.0f} minutes for its 600 trials, as in 4.2.1). That the other strategies rest as often, "
-        "and need no breaks, is assumed: the text does not say. A trial is one tap and one pulse: two stimuli."
-    )
-    return Section("5. Trials, stimuli and minutes for each person", prose, [Table("Means.", burden(rows))])
+    full = minutes(600, BREAKS_OF_A_FULL_SWEEP)
+    prose = f"""\
+One-second trials and two minutes of rest after every twelve; a conventional sweep has two long breaks besides, of
+five minutes in the text's words and ten in its sum, which is followed: {full:.0f} minutes for its 600 trials
+(4.2.1). That the other strategies rest as often, and need no long breaks, is assumed: the text does not say. A
+trial is one tap and one pulse, two stimuli."""
+    return Section("Trials, stimuli and minutes for each person", prose, [Table("Means.", burden(rows))])

@@ -25,6 +25,11 @@ PEOPLE: Final = (4, 7)
 SETTINGS: Final[dict[str, dict[str, Any]]] = {"nr": {"initial": 7}, "default": {}, "incremental": {}}
 """The text's regression had seven initial observations."""
 
+PROSE = """\
+The simulated tapping robot in open loop, with waveforms, ISIs from 0 to 320 ms from the impact; two people of
+`kim11`. NR begins with seven ISIs, as online in the text. Conventional: the sweep from the impact, on waveforms as
+well, until the window was passed."""
+
 
 @dataclass(frozen=True)
 class Online:
@@ -143,13 +148,9 @@ def figure(results: list[dict[str, Any]]) -> Figure:
 
 def section(results: list[dict[str, Any]]) -> Section:
     """This part of the report."""
-    prose = (
-        "The simulated tapping robot in open loop, with waveforms, ISIs from 0 to 320 ms from the impact; two people of `kim11`. "
-        "NR begins with seven ISIs, as online in the text. Conventional: the sweep from the impact, on waveforms as well, until the window was passed."
-    )
     return Section(
         "9. Online, on waveforms (Table 5.3)",
-        prose,
+        PROSE,
         [Table("Table 5.3.", summary(results))],
         ("online", figure(results)),
     )

@@ -23,7 +23,7 @@ class Reading:
             of the same person.
         outside: whether ISIs outside the measured window answer as they were "recorded", or with "zero", as the text's
             figures have it.
-        floor: what becomes of the floor; None is each method's own default (the particle filter: raw, others: subtracted).
+        floor: what becomes of the floor; None is each method's own default (PF: raw, the others: subtracted).
         edges: whether both edges must settle, or either.
         last: of how many values.
         acquisition: what chooses the next ISI of a regression.
@@ -69,24 +69,31 @@ BASE: Final = Reading()
 LIVE: Final = Reading(observation="live")
 """No recorded data set: each trial is a new one of the person."""
 
-READINGS: Final[dict[str, Reading]] = {
-    "base": BASE,
-    "observation: mean of ten": replace(BASE, observation="mean"),
-    "observation: live trial": LIVE,
-    "outside the window: zero": replace(BASE, outside="zero"),
-    "floor: zeroed": replace(BASE, floor="zeroed"),
-    "floor: raw": replace(BASE, floor="raw"),
-    "edges: either": replace(BASE, edges="either"),
-    "last: six values": replace(BASE, last=6),
-    "acquisition: edge variance": replace(BASE, acquisition="edge-variance"),
-    "acquisition: straddle": replace(BASE, acquisition="straddle"),
-    "acquisition: upper bound": replace(BASE, acquisition="ucb"),
-    "acquisition: expected improvement": replace(BASE, acquisition="log-ei"),
-    "pseudo-code: either edge, six": replace(BASE, edges="either", last=6),
-    "zero outside, mean of ten": replace(BASE, outside="zero", observation="mean"),
-    "zero outside, six": replace(BASE, outside="zero", last=6),
-    "zero outside, edge variance": replace(BASE, outside="zero", acquisition="edge-variance"),
-    "zeroed, edge variance": replace(BASE, floor="zeroed", acquisition="edge-variance"),
-    "zeroed, mean of ten": replace(BASE, floor="zeroed", observation="mean"),
+READINGS: Final[dict[str, tuple[Reading, str]]] = {
+    "base": (BASE, "kim11"),
+    "observation: mean of ten": (replace(BASE, observation="mean"), "kim11"),
+    "observation: live trial": (LIVE, "kim11"),
+    "outside the window: zero": (replace(BASE, outside="zero"), "kim11"),
+    "floor: zeroed": (replace(BASE, floor="zeroed"), "kim11"),
+    "floor: raw": (replace(BASE, floor="raw"), "kim11"),
+    "edges: either": (replace(BASE, edges="either"), "kim11"),
+    "last: six values": (replace(BASE, last=6), "kim11"),
+    "pseudo-code: either edge, six": (replace(BASE, edges="either", last=6), "kim11"),
+    "acquisition: edge variance": (replace(BASE, acquisition="edge-variance"), "kim11"),
+    "acquisition: straddle": (replace(BASE, acquisition="straddle"), "kim11"),
+    "acquisition: upper bound": (replace(BASE, acquisition="ucb"), "kim11"),
+    "acquisition: expected improvement": (replace(BASE, acquisition="log-ei"), "kim11"),
+    "range end: hit + 500": (replace(BASE, range_end="hit"), "kim11"),
+    "people: kind noise": (BASE, "gaussian"),
+    "mean of ten, zero outside": (replace(BASE, observation="mean", outside="zero"), "kim11"),
+    "mean of ten, six": (replace(BASE, observation="mean", last=6), "kim11"),
+    "mean of ten, kind noise": (replace(BASE, observation="mean"), "gaussian"),
+    "zero outside, edge variance": (replace(BASE, outside="zero", acquisition="edge-variance"), "kim11"),
+    "zero outside, kind noise": (replace(BASE, outside="zero"), "gaussian"),
+    "zeroed, kind noise": (replace(BASE, floor="zeroed"), "gaussian"),
+    "six, kind noise": (replace(BASE, last=6), "gaussian"),
+    "either edge, kind noise": (replace(BASE, edges="either"), "gaussian"),
+    "edge variance, kind noise": (replace(BASE, acquisition="edge-variance"), "gaussian"),
 }
-"""One factor at a time around the base, then combinations."""
+"""Readings and the cohort they are tried on: one factor at a time around the base, then combinations. The noise of the
+people is no reading of the text, but it is as little known."""

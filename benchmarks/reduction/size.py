@@ -15,9 +15,10 @@ class Size:
     Args:
         kim: sessions of `kim11` in the main comparison.
         kim_default: how many of them the default strategy plays too, which takes far longer than all others.
-        people: people of `recruitment` and `gaussian`.
-        sweep: sessions of `kim11` for each number of initial observations or particles.
-        readings: sessions of `kim11` for each reading.
+        people: people of `recruitment`, and of `gaussian` in the headline.
+        people_default: how many of them the default plays too in the main comparison.
+        sweep: sessions for each number of initial observations or particles.
+        readings: sessions for each reading.
         horizon: trials of the default's learning curve in the headline.
         intervals: runs of interval production for each light.
     """
@@ -25,11 +26,14 @@ class Size:
     kim: int
     kim_default: int
     people: int
+    people_default: int
     sweep: int
     readings: int
     horizon: int
     intervals: int
 
 
-FULL: Final = Size(kim=110, kim_default=55, people=200, sweep=55, readings=55, horizon=40, intervals=20)
-QUICK: Final = Size(kim=11, kim_default=11, people=6, sweep=11, readings=11, horizon=20, intervals=1)
+FULL: Final = Size(
+    kim=110, kim_default=55, people=200, people_default=100, sweep=44, readings=33, horizon=40, intervals=20
+)
+QUICK: Final = Size(kim=11, kim_default=4, people=5, people_default=3, sweep=3, readings=3, horizon=15, intervals=1)

@@ -9,10 +9,11 @@ __all__ = ["BREAKS_OF_A_FULL_SWEEP", "minutes"]
 TRIAL_S: Final = 1.0
 BLOCK: Final = 12
 REST_S: Final = 120.0
-BREAK_S: Final = 300.0
+BREAK_S: Final = 600.0
+"""The text has breaks of five minutes, but its sum of 130 minutes has ten (4.2.1)."""
 
 BREAKS_OF_A_FULL_SWEEP: Final = 2
-"""Five-minute breaks of a conventional sweep (4.2.1)."""
+"""Long breaks of a conventional sweep (4.2.1)."""
 
 
 def minutes(trials: float, breaks: int = 0) -> float:
@@ -20,7 +21,7 @@ def minutes(trials: float, breaks: int = 0) -> float:
 
     Args:
         trials: how many.
-        breaks: of five minutes.
+        breaks: of ten minutes.
     """
     seconds = trials * TRIAL_S + trials // BLOCK * REST_S + breaks * BREAK_S
     return seconds / 60.0
