@@ -83,8 +83,8 @@ impact, and ends when responses have vanished needs more. Where a sweep begins i
 `incremental` needs no setting for it."""
     bare = rows[(rows["method"] == "incremental") & ~rows["accelerometer"]]
     conclusions = [
-        f"`{name}`: {100 * group['shows a window'].mean():.0f} % of sweeps show a window (three standard errors above the "
-        f"baseline). By the true one its F1 is {group['f1, true'].mean():.2f} above the baseline and "
+        f"`{name}`: {100 * group['shows a window'].mean():.0f} % of sweeps show a window (three standard errors above "
+        f"the baseline). By the true one its F1 is {group['f1, true'].mean():.2f} above the baseline and "
         f"{group['f1, of .135'].mean():.2f} by 0.135; measured and true profile correlate by "
         f"{group['correlation, true'].mean():.2f}."
         for name, group in bare.groupby("cohort")

@@ -149,7 +149,7 @@ def figure(results: list[dict[str, Any]]) -> Figure:
 def section(results: list[dict[str, Any]]) -> Section:
     """This part of the report."""
     return Section(
-        "9. Online, on waveforms (Table 5.3)",
+        "Online, on waveforms (Table 5.3)",
         PROSE,
         [Table("Table 5.3.", summary(results))],
         ("online", figure(results)),
