@@ -53,7 +53,7 @@ def sections(size: Size, seed: int, workers: int) -> list[Section]:
     outcomes = run_sessions((session for plan in plans.values() for session in plan), workers)
     rows = {part: frame(plan, outcomes) for part, plan in plans.items()}
     lights = in_parallel(intervals.produce, intervals.runs(size.intervals, seed), workers, "interval production")
-    waveforms = in_parallel(online.examine, online.plan(seed), workers, "online")
+    waveforms = in_parallel(online.examine, online.plan(size.online, seed), workers, "online")
     return [
         headline.section(rows[headline]),
         comparison.section(rows[comparison]),

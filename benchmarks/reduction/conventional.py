@@ -64,7 +64,7 @@ def burden(rows: pd.DataFrame) -> pd.DataFrame:
                     "accelerometer": WORDS[bool(accelerometer)],
                     "strategy": NAMES[method],
                     "trials": trials.mean(),
-                    "stimuli": 2 * trials.mean(),
+                    "taps and pulses": 2 * trials.mean(),
                     "minutes": trials.map(lambda n, breaks=breaks: minutes(n, breaks)).mean(),
                 }
             )
@@ -101,5 +101,5 @@ def section_burden(rows: pd.DataFrame) -> Section:
 One-second trials and two minutes of rest after every twelve; a conventional sweep has two long breaks besides, of
 five minutes in the text's words and ten in its sum, which is followed: {full:.0f} minutes for its 600 trials
 (4.2.1). That the other strategies rest as often, and need no long breaks, is assumed: the text does not say. A
-trial is one tap and one pulse, two stimuli."""
+trial is one pair of stimuli, a tap and a pulse, which Table 5.3 counts as one."""
     return Section("Trials, stimuli and minutes for each person", prose, [Table("Means.", burden(rows))])

@@ -19,13 +19,17 @@ from isiw.types import FloatArray
 
 NOISE = {"recruitment": "realistic", "gaussian": "kind"}
 MARGIN = 0.15
+MARKS = (5, 10, 15, 20, 30, 40)
+LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9)
+PF_HORIZON = 300
+"""Trials of the particle filter's curve: a generation alone is thirty."""
 HALF = 0.5
 
 
 def sessions(size: Size, seed: int) -> list[Session]:
     """Live trials, counted from the valve command, on both cohorts."""
     return [
-        Session(method, cohort, person, seed, reading=LIVE, horizon=size.horizon)
+        Session(method, cohort, person, seed, reading=LIVE, horizon=PF_HORIZON if method == "pf" else size.horizon)
         for cohort in NOISE
         for method in (*text.METHODS, "default")
         for person in range(size.people)
@@ -35,6 +39,30 @@ def sessions(size: Size, seed: int) -> list[Session]:
 def curve(rows: pd.DataFrame, method: str) -> FloatArray:
     """F1 by trial, a row a person, shape (people, trials)."""
     return np.array(rows.loc[rows["method"] == method, "f1_by_trial"].tolist())
+
+
+def equal_trials(rows: pd.DataFrame) -> pd.DataFrame:
+    """Mean F1 of each method after as many trials, on each cohort."""
+    table = []
+    for (cohort, method), group in rows.groupby(["cohort", "method"], sort=False):
+        mean = curve(group, str(method)).mean(axis=0)
+        f1 = {str(mark): float(mean[mark - 1]) for mark in MARKS if mark <= len(mean)}
+        table.append({"cohort": cohort, "method": NAMES[str(method)]} | f1)
+    return pd.DataFrame(table)
+
+
+def equal_f1(rows: pd.DataFrame) -> pd.DataFrame:
+    """Trials of each method to a lasting mean F1, on each cohort; None where its curve does not reach it."""
+    table = []
+    for (cohort, method), group in rows.groupby(["cohort", "method"], sort=False):
+        mean = curve(group, str(method)).mean(axis=0)
+        trials = {f"{level:.1f}": _cell(trials_to_lasting(mean, level)) for level in LEVELS}
+        table.append({"cohort": cohort, "method": NAMES[str(method)], "of": len(mean)} | trials)
+    return pd.DataFrame(table)
+
+
+def _cell(trials: int | None) -> str:
+    return "–" if trials is None else str(trials)
 
 
 def duel(rows: pd.DataFrame, method: str) -> dict[str, float | str | None]:
@@ -49,7 +77,6 @@ def duel(rows: pd.DataFrame, method: str) -> dict[str, float | str | None]:
     curves = curve(rows, "default")
     stopped = np.minimum(trials, curves.shape[1])
     at_stop = curves[np.arange(len(curves)), stopped - 1]
-    # The default's session may have ended before a long one of the other method: its curve ends at the horizon.
     reached = trials_to_lasting(curves.mean(axis=0), float(f1.mean()))
     gain = at_stop - f1
     return {
@@ -107,11 +134,17 @@ def section(rows: pd.DataFrame) -> Section:
         cohort: pd.DataFrame([duel(group, method) for method in text.METHODS])
         for cohort, group in rows.groupby("cohort")
     }
-    shown = [Table(f"`{cohort}`, {noise} noise.", tables[cohort]) for cohort, noise in NOISE.items()]
+    shown = [
+        Table(f"`{cohort}`, {noise} noise: at each method's stop.", tables[cohort]) for cohort, noise in NOISE.items()
+    ]
+    shown += [
+        Table("Equal trials: mean F1 after so many, whatever the stopping rule says.", equal_trials(rows)),
+        Table("Equal F1: trials to a lasting mean F1, of so many that were played.", equal_f1(rows)),
+    ]
     prose = f"""\
 {rows["person"].nunique()} people of each cohort, live trials over 500 ms from the valve command, F1 by the true
 window. At equal trials: the default's F1 after as many trials as each session of the other method took (at most
 {curve(rows, "default").shape[1]}), paired by person. At equal F1: from which trial on the default's mean F1 stays
-at or above the other method's mean at its stop. A trial is two stimuli, so the shares are those of stimuli too."""
+at or above the other method's mean at its stop. A trial is one pair of stimuli."""
     said = [sentence for cohort, noise in NOISE.items() for sentence in verdicts(tables[cohort], noise)]
     return Section("The headline: equal trials, equal F1", prose, shown, ("headline", figure(rows)), said)

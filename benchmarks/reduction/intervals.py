@@ -76,9 +76,8 @@ def produce(run: Run) -> dict[str, Any]:
     for _ in range(TRIALS):
         asked.append(strategy.ask())
         strategy.tell(asked[-1], response=bool(rng.random() < light_probability(asked[-1], run.scale)))
-    band = strategy.estimate().profile(SPACE.grid_ms)
-    assert band is not None  # noqa: S101 - particles always have a profile
-    return {"scale": run.scale, "asked_ms": asked, "target_ms": float(SPACE.grid_ms[band.median_mv.argmax()])}
+    profile_mv = strategy.estimate().profile(SPACE.grid_ms).median_mv
+    return {"scale": run.scale, "asked_ms": asked, "target_ms": float(SPACE.grid_ms[profile_mv.argmax()])}
 
 
 def runs(count: int, seed: int) -> list[Run]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
 import pandas as pd
 import torch
 from matplotlib.figure import Figure
@@ -28,28 +29,31 @@ SETTINGS: Final[dict[str, dict[str, Any]]] = {"nr": {"initial": 7}, "default": {
 PROSE = """\
 The simulated tapping robot in open loop, with waveforms, ISIs from 0 to 320 ms from the impact; two people of
 `kim11`. NR begins with seven ISIs, as online in the text. Conventional: the sweep from the impact, on waveforms as
-well, until the window was passed."""
+well, until the window was passed. Means over sessions; the figure has the first."""
 
 
 @dataclass(frozen=True)
 class Online:
-    """One strategy with one person on the robot."""
+    """One strategy with one person on the robot; `session` differs in trial noise."""
 
     person: int
+    session: int
     method: str
     seed: int
 
 
-def plan(seed: int) -> list[Online]:
-    """Both people with every strategy."""
-    return [Online(person, method, seed) for person in PEOPLE for method in SETTINGS]
+def plan(sessions: int, seed: int) -> list[Online]:
+    """Both people with every strategy, so many sessions each."""
+    return [
+        Online(person, session, method, seed) for person in PEOPLE for session in range(sessions) for method in SETTINGS
+    ]
 
 
 def examine(online: Online) -> dict[str, Any]:
     """One session on waveforms until the strategy stops: its stimuli, window and profile, and the true ones."""
     torch.set_num_threads(1)
     subject = cohort("kim11", online.person + 1, online.seed)[online.person]
-    seed = online.seed + online.person
+    seed = online.seed + 11 * online.session + online.person
     strategy = isiw.make_strategy(online.method, IMPACT_SPACE, seed, **SETTINGS[online.method])
     # The robot of the waveform loop takes what it needs from a pair of sessions.
     deliver = by_waveform(subject, IMPACT_SPACE, Pair("impact", "open-loop", online.seed, online.person, seed, 0))
@@ -67,59 +71,49 @@ def examine(online: Online) -> dict[str, Any]:
     estimate, truth = strategy.estimate(), subject.window(IMPACT_SPACE)
     return {
         "person": online.person,
+        "session": online.session,
         "method": online.method,
         "trials": len(told) + mistrials,
         "mistrials": mistrials,
         "f1": isiw.metrics.f1(estimate, truth, IMPACT_SPACE),
         "told": told,
         "grid_ms": estimate.grid_ms,
-        "profile_mv": _median(estimate),
+        "profile_mv": estimate.profile(estimate.grid_ms).median_mv,
         "true_mv": subject.expected_mep_mv(IMPACT_SPACE),
     }
 
 
-def _median(estimate: isiw.WindowEstimate) -> FloatArray:
-    assert estimate.grid_ms is not None  # noqa: S101 - these strategies have profiles
-    band = estimate.profile(estimate.grid_ms)
-    assert band is not None  # noqa: S101 - as above
-    return band.median_mv
+def _at(isi_ms: FloatArray, result: dict[str, Any]) -> FloatArray:
+    """A result's profile [mV] at some ISIs."""
+    return np.interp(isi_ms, result["grid_ms"], result["profile_mv"])
 
 
-def _at(result: dict[str, Any], isi_ms: FloatArray) -> FloatArray:
-    """A result's profile at some ISIs."""
-    return (
-        isiw.WindowEstimate(None, None, grid_ms=result["grid_ms"], profile_quantiles_mv=[result["profile_mv"]] * 3)
-        .profile(isi_ms)
-        .median_mv
-    )
+def row_of(result: dict[str, Any], swept: dict[str, Any]) -> dict[str, Any]:
+    """One session beside the conventional sweep of the same person and noise seed."""
+    return {
+        "person": result["person"],
+        "method": result["method"],
+        "trials": result["trials"],
+        "mistrials": result["mistrials"],
+        "conventional": swept["trials"],
+        "share %": 100 * result["trials"] / swept["trials"],
+        "r: measured": correlation(_at(swept["grid_ms"], result), swept["profile_mv"]),
+        "r: true": correlation(_at(IMPACT_SPACE.grid_ms, result), result["true_mv"]),
+        "F1: true": result["f1"],
+    }
 
 
 def summary(results: list[dict[str, Any]]) -> pd.DataFrame:
-    """Table 5.3: stimuli and correlation with the measured and the true profile; the dissertation's beside them."""
-    table = []
-    for number, person in enumerate(PEOPLE):
-        of_person = {result["method"]: result for result in results if result["person"] == person}
-        swept = of_person["incremental"]
-        for method in ("nr", "default"):
-            result = of_person[method]
-            theirs = method == "nr"
-            table.append(
-                {
-                    "person": number + 1,
-                    "strategy": NAMES[method],
-                    "trials": result["trials"],
-                    "mistrials": result["mistrials"],
-                    "conventional": swept["trials"],
-                    "share %": 100 * result["trials"] / swept["trials"],
-                    "correlation measured": correlation(_at(result, swept["grid_ms"]), swept["profile_mv"]),
-                    "true profile": correlation(_at(result, IMPACT_SPACE.grid_ms), result["true_mv"]),
-                    "F1 true": result["f1"],
-                    "text trials": text.ONLINE["stimuli"][number] if theirs else None,
-                    "text conventional": text.ONLINE["conventional"][number] if theirs else None,
-                    "text correlation": text.ONLINE["correlation"][number] if theirs else None,
-                }
-            )
-    return pd.DataFrame(table)
+    """Table 5.3: means over sessions of stimuli and correlations; the dissertation's numbers beside them."""
+    swept = {(r["person"], r["session"]): r for r in results if r["method"] == "incremental"}
+    rows = [row_of(r, swept[r["person"], r["session"]]) for r in results if r["method"] != "incremental"]
+    table = pd.DataFrame(rows).groupby(["person", "method"], sort=False).mean().reset_index()
+    for column, name in (("stimuli", "trials"), ("conventional", "conventional"), ("correlation", "r: measured")):
+        theirs = dict(zip(PEOPLE, text.ONLINE[column], strict=True))
+        table[f"text: {name}"] = table["person"].map(theirs).where(table["method"] == "nr").astype(float)
+    return table.assign(
+        person=table["person"].map({p: n + 1 for n, p in enumerate(PEOPLE)}), method=table["method"].map(NAMES)
+    )
 
 
 def figure(results: list[dict[str, Any]]) -> Figure:
@@ -127,7 +121,7 @@ def figure(results: list[dict[str, Any]]) -> Figure:
     picture, axes = panels(1, 2, width=4.4, height=3.0)
     for one, person, number in zip(axes[0], PEOPLE, ("5.12", "5.13"), strict=True):
         for result in results:
-            if result["person"] != person:
+            if (result["person"], result["session"]) != (person, 0):
                 continue
             if result["method"] == "incremental":
                 one.plot(result["grid_ms"], result["profile_mv"], color="black", lw=0.8, label="measured")

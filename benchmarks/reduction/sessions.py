@@ -146,7 +146,7 @@ def correlation(a: FloatArray | None, b: FloatArray) -> float:
 
 
 def play(session: Session, swept: RecordedSweep) -> dict[str, Any]:
-    """Run a session; see `Outcome` for what comes back."""
+    """Run a session until its stopping rule, and to its horizon where that is later; see `run`."""
     where = searched(session, swept.subject.hit_delay_ms)
     strategy = isiw.make_strategy(
         session.method,
@@ -202,7 +202,13 @@ def recorded_person(name: str, person: int, seed: int) -> RecordedSweep:
 
 
 def run(session: Session) -> dict[str, Any]:
-    """Run one session: trials to its stopping rule, whether it converged, and how good it was then."""
+    """Run one session.
+
+    Returns:
+        Trials to its stopping rule, whether it converged, F1 by every truth and correlations then; F1 by the true
+        window after each trial of the horizon; and what only some methods have: the spread of the particles after
+        each generation, and the amplitudes of the Gaussians. Of the conventional sweep: see `conventional`.
+    """
     torch.set_num_threads(1)
     swept = recorded_person(session.cohort, session.person, session.seed)
     return conventional(session, swept) if session.method == "incremental" else play(session, swept)

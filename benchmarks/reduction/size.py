@@ -21,6 +21,7 @@ class Size:
         readings: sessions for each reading.
         horizon: trials of the default's learning curve in the headline.
         intervals: runs of interval production for each light.
+        online: sessions on waveforms with each of two people.
     """
 
     kim: int
@@ -31,9 +32,12 @@ class Size:
     readings: int
     horizon: int
     intervals: int
+    online: int
 
 
 FULL: Final = Size(
-    kim=110, kim_default=55, people=200, people_default=100, sweep=44, readings=33, horizon=40, intervals=20
+    kim=110, kim_default=55, people=200, people_default=100, sweep=44, readings=33, horizon=40, intervals=20, online=5
 )
-QUICK: Final = Size(kim=11, kim_default=4, people=5, people_default=3, sweep=3, readings=3, horizon=15, intervals=1)
+QUICK: Final = Size(
+    kim=11, kim_default=4, people=5, people_default=3, sweep=3, readings=3, horizon=15, intervals=1, online=1
+)

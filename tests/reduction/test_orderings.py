@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from benchmarks.reduction import dissertation as text
 from benchmarks.reduction.comparison import WORDS
-from benchmarks.reduction.headline import duel
+from benchmarks.reduction.headline import duel, equal_f1, equal_trials
 from benchmarks.reduction.look import NAMES
 from benchmarks.reduction.orderings import claims, outside
 from benchmarks.reduction.reading_table import distance
@@ -81,3 +81,13 @@ def test_a_duel_compares_at_each_sessions_own_trials_and_finds_the_lasting_cross
     assert row["gain"] == pytest.approx(np.mean([0.2, 0.6]) - 0.4)
     assert row["default's trials to its F1"] == 2
     assert row["share of its trials"] == pytest.approx(2 / 2.5)
+
+
+def test_curves_are_read_both_ways() -> None:
+    curves = [[0.1, 0.3, 0.7, 0.6, 0.9], [0.3, 0.5, 0.7, 0.6, 0.9]]
+    rows = pd.DataFrame({"cohort": "gaussian", "method": "nr", "f1_by_trial": curves})
+    assert equal_trials(rows).iloc[0]["5"] == pytest.approx(0.9)
+    reached = equal_f1(rows).iloc[0]
+    # The mean touches .7 at the third trial, and leaves it again.
+    assert [reached[level] for level in ("0.5", "0.6", "0.7", "0.9")] == ["3", "3", "5", "5"]
+    assert equal_f1(rows.assign(f1_by_trial=[[0.1], [0.1]])).iloc[0]["0.5"] == "–"
