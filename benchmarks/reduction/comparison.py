@@ -120,7 +120,7 @@ def figure(table: pd.DataFrame) -> Figure:
         for one, (ours, theirs, title) in zip(line, values, strict=True):
             error = rows["SD"] if ours == "trials" else None
             beside(one, rows["method"], rows[theirs], rows[ours], error)
-            one.set_title(f"{title}, {word} acc.", fontsize=9)
+            one.set_title(f"{title}, {word} acc.")
         line[0].set_yscale("log")
     axes[0, 0].legend(fontsize=7, frameon=False, loc="upper left")
     return picture

@@ -64,6 +64,8 @@ def _markdown(section: Section, out: Path) -> list[str]:
     if section.figure is not None:
         name, picture = section.figure
         path = out.with_name(f"{out.name}_{name}.png")
+        for axes in picture.axes:
+            axes.title.set_fontsize(9)
         picture.savefig(path, dpi=80)
         lines += [f"![{section.title}]({path.name})", ""]
     for table in section.tables:

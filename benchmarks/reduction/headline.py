@@ -122,7 +122,6 @@ def figure(rows: pd.DataFrame) -> Figure:
         one.set(
             title=f"{cohort}: {noise} noise (dots: at the stopping rule)", xlabel="trials", ylim=(0, 1), xlim=(0, None)
         )
-        one.title.set_fontsize(9)
     axes[0, 0].set_ylabel("mean F1 (true window)")
     axes[0, 0].legend(fontsize=8, frameon=False)
     return picture
