@@ -158,3 +158,15 @@ def test_where_no_amplitude_is_known_beforehand_it_starts_from_the_largest_mep(s
 def test_a_setting_that_cannot_be_is_refused(settings: dict[str, float]) -> None:
     with pytest.raises(InvalidValueError, match=r"peaks|width_ms|amplitude_mv|evaluations"):
         NonlinearRegression(**settings)
+
+
+def test_a_fit_of_two_gaussians_tells_their_amplitudes_largest_first() -> None:
+    isi_ms = np.linspace(0.0, 500.0, 51)
+    mep_mv = gaussians_mv(isi_ms, np.array([0.03, 150.0, 20.0, 0.08, 320.0, 25.0]))
+    curve = fit(isi_ms, mep_mv, peaks=2, amplitude_mv=0.0)
+    assert curve.amplitudes_mv == pytest.approx((0.08, 0.03), rel=0.01)
+
+
+def test_one_gaussian_needs_no_second_amplitude() -> None:
+    isi_ms = np.linspace(0.0, 500.0, 51)
+    assert fit(isi_ms, bell_mv(isi_ms)).amplitudes_mv == pytest.approx((float(bell_mv(isi_ms).max()),), rel=0.05)

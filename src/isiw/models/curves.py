@@ -71,6 +71,7 @@ class FittedCurve:
         noise_sd_mv: SD of one MEP about the curve.
         dof: degrees of freedom of that SD.
         trouble: what went wrong, and what stands in for it, as full sentences; None where nothing did.
+        amplitudes_mv: of the Gaussians that the curve is made of, largest first; empty where it is not made of any.
     """
 
     grid_ms: FloatArray
@@ -80,6 +81,7 @@ class FittedCurve:
     noise_sd_mv: float
     dof: float = math.inf
     trouble: str | None = None
+    amplitudes_mv: tuple[float, ...] = ()
 
     def confidence_mv(self, level: float) -> tuple[FloatArray, FloatArray]:
         """The interval that holds the expected MEP with this confidence [mV], each shape (t,)."""

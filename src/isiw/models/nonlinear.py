@@ -129,6 +129,7 @@ class NonlinearRegression:
             noise_sd_mv=estimate.noise_sd_mv,
             dof=estimate.dof,
             trouble=estimate.trouble,
+            amplitudes_mv=tuple(sorted(estimate.parameters[::3].tolist(), reverse=True)),
         )
 
     def _beliefs(self, space: DesignSpace, amplitude_mv: float) -> _Beliefs:

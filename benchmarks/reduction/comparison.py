@@ -1,0 +1,135 @@
+"""The methods side by side: trials, F1, correlation, convergence, with and without accelerometer (Fig. 4.23–4.26)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from benchmarks.reduction import dissertation as text
+from benchmarks.reduction.document import Section, Table
+from benchmarks.reduction.look import NAMES, beside, panels
+from benchmarks.reduction.sessions import Session
+from benchmarks.reduction.significance import paired_tests
+from benchmarks.reduction.size import Size
+
+METHODS = (*text.METHODS, "default")
+PEOPLE_OF_KIM = 11
+WORDS = {False: "without", True: "with"}
+
+PROSE = """\
+Sessions end by each method's own stopping rule (default: both 90 % intervals within 30 ms, or 80 trials, which
+count as not converged). F1 is judged by the measured window above the baseline (the text's ground truth), by the
+measured window by the 0.135 rule, and by the true one; the first two leave out people whose sweep shows no window.
+Conventional: from the range's start until the window was passed. PF has no profile: a Gaussian of SD 25 ms at its
+estimate stands in, since its rule stops at that SD, and its window of ± 75 ms is called three of them. Tests are on
+the eleven people's means over noise seeds (the text has n = 5 with accelerometer), corrected by Holm's method
+within a table."""
+
+
+def sessions(size: Size, seed: int) -> list[Session]:
+    """Every method with the same people, with and without accelerometer."""
+    people = {"kim11": (size.kim, size.kim_default), "recruitment": (size.people, size.people_default)}
+    return [
+        Session(method, cohort, person, seed, accelerometer=accelerometer)
+        for cohort, (usual, slow) in people.items()
+        for method, accelerometer in itertools.product((*METHODS, "incremental"), WORDS)
+        for person in range(slow if method == "default" else usual)
+    ]
+
+
+def summary(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row a method and accelerometer of one cohort: ours, and the dissertation's."""
+    table = []
+    for (accelerometer, word), method in itertools.product(WORDS.items(), (*METHODS, "incremental")):
+        group = rows[(rows["method"] == method) & (rows["accelerometer"] == accelerometer)]
+        if len(group):
+            table.append({"method": NAMES[method], "accelerometer": word} | _means(group) | _theirs(method, word))
+    return pd.DataFrame(table)
+
+
+def _means(group: pd.DataFrame) -> dict[str, float]:
+    return {
+        "sessions": len(group),
+        "trials": group["trials"].mean(),
+        "SD": group["trials"].std(),
+        "F1: measured, baseline": group["f1, measured, baseline"].mean(),
+        "F1: measured, .135": group["f1, measured, .135"].mean(),
+        "F1: true": group["f1, true"].mean(),
+        "r: measured": group["correlation, measured"].mean(),
+        "r: true": group["correlation, true"].mean(),
+        "converged %": 100 * group["converged"].mean(),
+    }
+
+
+def _theirs(method: str, word: str) -> dict[str, float]:
+    return {
+        "text: trials": text.TRIALS[word].get(method, math.nan),
+        "text: F1": text.F1[word].get(method, math.nan),
+        "text: r": text.CORRELATION.get(method, math.nan) if word == "without" else math.nan,
+        "text: converged %": 100 * text.CONVERGED[word].get(method, math.nan),
+    }
+
+
+def by_person(rows: pd.DataFrame, value: str) -> pd.DataFrame:
+    """Means of a value: a row for each of the eleven people, a column for each method."""
+    person = (rows["person"] % PEOPLE_OF_KIM).rename("person")
+    return rows.pivot_table(index=person, columns="method", values=value)
+
+
+def significance(rows: pd.DataFrame) -> list[Table]:
+    """Paired tests between methods, and of the accelerometer, on the eleven people of `kim11`."""
+    rows = rows[rows["method"].isin(METHODS)]
+    bare = rows[~rows["accelerometer"]]
+    titles = {
+        "correlation, measured": "Correlation with the measured profile (Fig. 4.23)",
+        "trials": "Trials (Fig. 4.24)",
+        "f1, true": "F1 by the true window (Fig. 4.25)",
+    }
+    tests = {value: paired_tests(by_person(bare, value)[list(METHODS)]) for value in titles}
+    claimed = set(map(frozenset, text.SIGNIFICANT_CORRELATIONS))
+    pairs = tests["correlation, measured"][["first", "second"]].to_numpy()
+    tests["correlation, measured"]["text"] = ["*" if frozenset(pair) in claimed else "" for pair in pairs]
+    tables = [Table(f"{titles[value]}, without accelerometer: paired t-tests.", test) for value, test in tests.items()]
+    changes = pd.concat([_change(rows, value).assign(value=value) for value in ("trials", "f1, true")])
+    return [*tables, Table("The accelerometer: paired t-tests, corrected within each value.", changes)]
+
+
+def _change(rows: pd.DataFrame, value: str) -> pd.DataFrame:
+    """Each method with against without accelerometer."""
+    values = pd.concat(
+        {word: by_person(rows[rows["accelerometer"] == flag], value) for flag, word in WORDS.items()}, axis=1
+    )
+    values.columns = [f"{method} {word}" for word, method in values.columns]
+    return paired_tests(values, [(f"{method} with", f"{method} without") for method in METHODS])
+
+
+def figure(table: pd.DataFrame) -> Figure:
+    """Fig. 4.23 to 4.26."""
+    picture, axes = panels(2, 4, width=3.1)
+    values = (
+        ("trials", "text: trials", "Fig. 4.24: trials"),
+        ("F1: true", "text: F1", "Fig. 4.25: F1 (true window)"),
+        ("r: measured", "text: r", "Fig. 4.23: correlation"),
+        ("converged %", "text: converged %", "Fig. 4.26: converged [%]"),
+    )
+    for line, word in zip(axes, WORDS.values(), strict=True):
+        rows = table[(table["accelerometer"] == word) & (table["method"] != NAMES["incremental"])]
+        for one, (ours, theirs, title) in zip(line, values, strict=True):
+            error = rows["SD"] if ours == "trials" else None
+            beside(one, rows["method"], rows[theirs], rows[ours], error)
+            one.set_title(f"{title}, {word} acc.")
+        line[0].set_yscale("log")
+    axes[0, 0].legend(fontsize=7, frameon=False, loc="upper left")
+    return picture
+
+
+def section(rows: pd.DataFrame) -> Section:
+    """This part of the report."""
+    tables = {name: summary(group) for name, group in rows.groupby("cohort")}
+    shown = [Table(f"Cohort `{name}`.", table) for name, table in tables.items()]
+    tests = significance(rows[rows["cohort"] == "kim11"])
+    picture = ("methods", figure(tables["kim11"]))
+    return Section("The methods side by side (Fig. 4.23–4.26)", PROSE, [*shown, *tests], picture)

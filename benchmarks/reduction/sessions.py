@@ -1,0 +1,241 @@
+"""One person's sessions: a method, under a reading, until its stopping rule, and judged by every truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import torch
+from scipy.stats import shapiro
+
+import isiw
+from benchmarks.reduction.readings import BASE, Reading
+from benchmarks.reduction.recorded import STEP_MS, SWEPT, TRIALS_PER_ISI, RecordedSweep, record, stops_inside
+from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.stopping import stimuli_left
+from isiw.subjects import cohort
+from isiw.types import BoolArray, FloatArray
+from isiw.window import Window, WindowEstimate
+
+NEAR_MS = 25.0
+"""How far before the true window an experimenter begins who expects it [ms]."""
+
+PF_SD_MS = 25.0
+"""SD of the Gaussian that stands for the particle filter's profile: its stopping rule's, and a third of the ± 75 ms
+of its window (4.6)."""
+
+
+@dataclass(frozen=True)
+class Session:
+    """One session of a study.
+
+    Args:
+        method: a named strategy.
+        cohort: a named cohort.
+        person: which person of it, from 0.
+        seed: of the cohort; trial noise, draws and strategy use `seed + person`.
+        reading: how the text is read.
+        accelerometer: whether ISIs count from the impact.
+        horizon: trials that are played at least, whatever the stopping rule says.
+        settings: settings of the strategy beyond the reading's, as (name, value) pairs.
+    """
+
+    method: str
+    cohort: str
+    person: int
+    seed: int
+    reading: Reading = BASE
+    accelerometer: bool = False
+    horizon: int = 0
+    settings: tuple[tuple[str, Any], ...] = field(default=())
+
+
+@dataclass(frozen=True)
+class Range:
+    """What is searched.
+
+    Args:
+        space: the ISIs, from the valve command or the impact.
+        offset_ms: what to add for an ISI from the valve command [ms].
+    """
+
+    space: DesignSpace
+    offset_ms: float
+
+    def from_valve(self, window: Window | None) -> Window | None:
+        """A window of this space, counted from the valve command."""
+        if window is None:
+            return None
+        segments = tuple((low + self.offset_ms, high + self.offset_ms) for low, high in window.segments)
+        return Window(segments[0][0], segments[-1][1], segments)
+
+
+def searched(session: Session, hit_delay_ms: float) -> Range:
+    """What a session searches: with accelerometer, from the impact on (4.4.5, 4.4.7).
+
+    Args:
+        session: the session.
+        hit_delay_ms: mean hit delay of the person [ms].
+    """
+    step_ms = VALVE_SPACE.step_ms if session.reading.observation == "live" else STEP_MS
+    if not session.accelerometer:
+        return Range(DesignSpace(0, 500, step_ms, reference="valve"), 0.0)
+    hit_ms = step_ms * round(hit_delay_ms / step_ms)
+    length_ms = 500.0 if session.reading.range_end == "hit" else 500.0 - hit_ms
+    return Range(DesignSpace(0, length_ms, step_ms, reference="impact"), hit_ms)
+
+
+def answers(session: Session, swept: RecordedSweep, offset_ms: float) -> Callable[[float], tuple[float, float]]:
+    """What answers an asked ISI: the told ISI [ms] and its MEP [mV], as the reading has them."""
+    reading = session.reading
+    if reading.observation == "live":
+        responder = swept.subject.begin(session.seed + session.person)
+        reference = "impact" if session.accelerometer else "valve"
+
+        def live(isi_ms: float) -> tuple[float, float]:
+            response = responder.respond(isi_ms, reference)
+            return isi_ms if response.isi_ms is None else response.isi_ms, response.mep_mv
+
+        return live
+    rng = np.random.default_rng([session.seed, session.person])
+    inside = known(reading, swept)
+
+    def recorded(isi_ms: float) -> tuple[float, float]:
+        stop = swept.index(isi_ms + offset_ms)
+        meps_mv = swept.kept_mv[stop]
+        mep_mv = meps_mv.mean() if reading.observation == "mean" else meps_mv[rng.integers(len(meps_mv))]
+        return isi_ms, float(mep_mv) if reading.outside == "recorded" or (stop < len(inside) and inside[stop]) else 0.0
+
+    return recorded
+
+
+def known(reading: Reading, swept: RecordedSweep) -> BoolArray:
+    """At which ISIs of `SWEPT` a reading has MEPs other than zero, shape (t,)."""
+    window = swept.windows["measured, baseline"]
+    if reading.outside == "recorded":
+        return np.ones(len(SWEPT.grid_ms), dtype=bool)
+    return np.zeros(len(SWEPT.grid_ms), dtype=bool) if window is None else window.mask(SWEPT.grid_ms)
+
+
+def profile_mv(estimate: WindowEstimate, where: Range) -> FloatArray | None:
+    """The estimated profile [mV] on `SWEPT`, or on the part of it that was searched; None where there is none.
+
+    The particle filter has no profile: a Gaussian at its estimate stands in.
+    """
+    isi_ms = SWEPT.grid_ms - where.offset_ms
+    band = estimate.profile(isi_ms)
+    if band is not None:
+        return band.median_mv
+    if estimate.spread_ms is None or estimate.window is None:
+        return None
+    centre_ms = 0.5 * (estimate.window.start_ms + estimate.window.end_ms)
+    return np.asarray(np.exp(-0.5 * ((isi_ms - centre_ms) / PF_SD_MS) ** 2))
+
+
+def correlation(a: FloatArray | None, b: FloatArray) -> float:
+    """Pearson's correlation of two profiles; NaN where one is missing, 0 where one is flat."""
+    if a is None:
+        return math.nan
+    if np.ptp(a) <= 1e-12 or np.ptp(b) <= 1e-12:
+        return 0.0
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def play(session: Session, swept: RecordedSweep) -> dict[str, Any]:
+    """Run a session until its stopping rule, and to its horizon where that is later; see `run`."""
+    where = searched(session, swept.subject.hit_delay_ms)
+    strategy = isiw.make_strategy(
+        session.method,
+        where.space,
+        session.seed + session.person,
+        **session.reading.settings(session.method) | dict(session.settings),
+    )
+    answer = answers(session, swept, where.offset_ms)
+    truth = swept.windows["true"]
+    trials, stopped, f1_by_trial, spread_ms = 0, None, [], []
+    while stopped is None or trials < session.horizon:
+        strategy.tell(*answer(strategy.ask()))
+        trials += 1
+        estimate = strategy.estimate()
+        if trials <= session.horizon:
+            f1_by_trial.append(isiw.metrics.f1(where.from_valve(estimate.window), truth, SWEPT))
+        if estimate.spread_ms is not None and not (spread_ms and spread_ms[-1] == estimate.spread_ms):
+            spread_ms.append(estimate.spread_ms)
+        if stopped is None and strategy.decision().stop:
+            left = stimuli_left(strategy.stopping, trials)
+            stopped = {"trials": trials, "converged": left is None or left > 0}
+            stopped |= judged(estimate, where, swept, session.reading)
+            stopped["amplitudes_mv"] = amplitudes_mv(strategy)
+    return stopped | {"f1_by_trial": f1_by_trial, "spread_ms": spread_ms}
+
+
+def judged(estimate: WindowEstimate, where: Range, swept: RecordedSweep, reading: Reading) -> dict[str, Any]:
+    """F1 by every truth, and correlations with the measured and the true profile.
+
+    A sweep that shows no window cannot judge: every subject of the dissertation had one.
+    """
+    window, profile = where.from_valve(estimate.window), profile_mv(estimate, where)
+    scores = {
+        f"f1, {name}": math.nan if name != "true" and truth is None else isiw.metrics.f1(window, truth, SWEPT)
+        for name, truth in swept.windows.items()
+    }
+    inside = SWEPT.grid_ms >= where.offset_ms
+    profiles = {"measured": np.where(known(reading, swept), swept.measured_mv, 0.0), "true": swept.true_mv}
+    part = None if profile is None else profile[inside]
+    return scores | {f"correlation, {name}": correlation(part, mv[inside]) for name, mv in profiles.items()}
+
+
+def amplitudes_mv(strategy: isiw.Strategy) -> tuple[float, ...]:
+    """Of the Gaussians that a regression's curve is made of [mV]; empty for other methods."""
+    curves = getattr(strategy.posterior, "curves", ())
+    return curves[0].amplitudes_mv if curves else ()
+
+
+@lru_cache(maxsize=4)
+def recorded_person(name: str, person: int, seed: int) -> RecordedSweep:
+    """A person's recorded sweep."""
+    return record(cohort(name, person + 1, seed)[person], seed + person)
+
+
+def run(session: Session) -> dict[str, Any]:
+    """Run one session.
+
+    Returns:
+        Trials to its stopping rule, whether it converged, F1 by every truth and correlations then; F1 by the true
+        window after each trial of the horizon; and what only some methods have: the spread of the particles after
+        each generation, and the amplitudes of the Gaussians. Of the conventional sweep: see `conventional`.
+    """
+    torch.set_num_threads(1)
+    swept = recorded_person(session.cohort, session.person, session.seed)
+    return conventional(session, swept) if session.method == "incremental" else play(session, swept)
+
+
+def conventional(session: Session, swept: RecordedSweep) -> dict[str, Any]:
+    """The conventional sweep itself: its trials by where it begins and ends, and its window by the true one."""
+    truth, hit_ms = swept.windows["true"], swept.subject.hit_delay_ms
+    done = swept.sweep(hit_ms if session.accelerometer else 0.0)
+    near_ms = hit_ms if truth is None else truth.start_ms - NEAR_MS
+    return {
+        "trials": done.terminated,
+        "converged": done.terminated < done.trials,
+        "whole": done.trials,
+        "near": swept.sweep(near_ms).terminated,
+        "inside measured": TRIALS_PER_ISI * stops_inside(swept.windows["measured, baseline"]),
+        "inside measured, .135": TRIALS_PER_ISI * stops_inside(swept.windows["measured, .135"]),
+        "inside true": TRIALS_PER_ISI * stops_inside(truth),
+        "shows a window": swept.windows["measured, baseline"] is not None,
+        "normal": float(shapiro(swept.measured_mv[inside_of(truth)]).pvalue) >= 0.05,
+        "normal throughout": float(shapiro(swept.measured_mv).pvalue) >= 0.05,
+        "f1, true": isiw.metrics.f1(done.window, truth, SWEPT),
+        "f1, of .135": isiw.metrics.f1(swept.windows["measured, .135"], truth, SWEPT),
+        "correlation, true": correlation(swept.measured_mv, swept.true_mv),
+    }
+
+
+def inside_of(window: Window | None) -> BoolArray:
+    """Which ISIs of `SWEPT` lie in a window; all where there is none."""
+    return np.ones(len(SWEPT.grid_ms), dtype=bool) if window is None else window.mask(SWEPT.grid_ms)

@@ -1,0 +1,37 @@
+"""Paired tests over people, with Holm's correction."""
+
+from __future__ import annotations
+
+import itertools
+
+import pandas as pd
+from scipy.stats import ttest_rel
+from statsmodels.stats.multitest import multipletests
+
+__all__ = ["paired_tests", "stars"]
+
+
+def paired_tests(values: pd.DataFrame, pairs: list[tuple[str, str]] | None = None) -> pd.DataFrame:
+    """Paired t-tests between columns, two-sided, corrected for their number by Holm's method.
+
+    Args:
+        values: one row a person, one column a condition; a person that lacks one of a pair is left out of it.
+        pairs: of columns; every pair by default.
+
+    Returns:
+        One row a pair: first, second, their mean difference, people, p after correction, and its stars.
+    """
+    rows = []
+    for first, second in pairs or itertools.combinations(values.columns, 2):
+        both = values[[first, second]].dropna()
+        p = 1.0 if (both[first] == both[second]).all() else float(ttest_rel(both[first], both[second]).pvalue)
+        difference = float((both[first] - both[second]).mean())
+        rows.append({"first": first, "second": second, "difference": difference, "people": len(both), "p": p})
+    table = pd.DataFrame(rows)
+    table["p"] = multipletests(table["p"], method="holm")[1]
+    return table.assign(stars=[stars(p) for p in table["p"]])
+
+
+def stars(p: float) -> str:
+    """The dissertation's marks: * below .05, ** below .01, *** below .001."""
+    return "*" * sum(p < level for level in (0.05, 0.01, 0.001))

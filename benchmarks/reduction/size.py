@@ -1,0 +1,63 @@
+"""How much is run: the whole report, or a quick look at all of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+__all__ = ["FULL", "QUICK", "Size"]
+
+
+@dataclass(frozen=True)
+class Size:
+    """How many sessions each part has; sessions of `kim11` are noise seeds of its eleven people.
+
+    Args:
+        kim: sessions of `kim11` in the main comparison.
+        kim_default: how many of them the default strategy plays too, which takes far longer than all others.
+        people: people of `recruitment` in the main comparison.
+        people_default: how many of them the default plays too.
+        headline: people of `recruitment` and of `gaussian` in the headline, with every method.
+        sweep: sessions for each number of initial observations or particles.
+        readings: sessions for each reading.
+        horizon: trials of the default's learning curve in the headline.
+        intervals: runs of interval production for each light.
+        online: sessions on waveforms with each of two people.
+    """
+
+    kim: int
+    kim_default: int
+    people: int
+    people_default: int
+    headline: int
+    sweep: int
+    readings: int
+    horizon: int
+    intervals: int
+    online: int
+
+
+FULL: Final = Size(
+    kim=44,
+    kim_default=11,
+    people=200,
+    people_default=22,
+    headline=60,
+    sweep=11,
+    readings=11,
+    horizon=40,
+    intervals=10,
+    online=3,
+)
+QUICK: Final = Size(
+    kim=11,
+    kim_default=4,
+    people=5,
+    people_default=3,
+    headline=5,
+    sweep=3,
+    readings=3,
+    horizon=15,
+    intervals=1,
+    online=1,
+)

@@ -1,0 +1,106 @@
+"""The dissertation's reduction of trials, reproduced, and the default strategy beside it.
+
+    python -m benchmarks.trial_reduction --quick
+    python -m benchmarks.trial_reduction
+
+writes a report (Markdown), its tables with versions, command and seed (JSON) and figures (PNG). Run it from the
+project's root. Reported people come from seed 10,000 on; seeds below 1,000 are for work.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import shlex
+import sys
+import time
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import pandas as pd
+import typer
+
+from benchmarks.reduction import (
+    comparison,
+    conventional,
+    gaussians,
+    headline,
+    initial,
+    intervals,
+    online,
+    orderings,
+    particles,
+    reading_table,
+)
+from benchmarks.reduction.document import Section, write
+from benchmarks.reduction.parallel import frame, in_parallel, run_sessions
+from benchmarks.reduction.size import FULL, QUICK, Size
+
+Rows = dict[ModuleType, pd.DataFrame]
+
+RESULTS = Path("benchmarks/results/trial_reduction")
+PARTS = (comparison, reading_table, headline, initial, particles, gaussians)
+VERSIONS = ("isiw", "numpy", "scipy", "torch", "scikit-learn", "statsmodels")
+
+
+def sections(size: Size, seed: int, workers: int) -> list[Section]:
+    """Run everything, and tell it."""
+    plans = {part: part.sessions(size, seed) for part in PARTS}
+    outcomes = run_sessions((session for plan in plans.values() for session in plan), workers)
+    rows = {part: frame(plan, outcomes) for part, plan in plans.items()}
+    lights = in_parallel(intervals.produce, intervals.runs(size.intervals, seed), workers, "interval production")
+    waveforms = in_parallel(online.examine, online.plan(size.online, seed), workers, "online")
+    return [
+        headline.section(rows[headline]),
+        comparison.section(rows[comparison]),
+        orderings.section(compared(rows), reading_table.summary(rows[reading_table], accelerometer=False)),
+        reading_table.section(rows[reading_table]),
+        conventional.section_sweeps(rows[comparison]),
+        conventional.section_burden(rows[comparison]),
+        initial.section(rows[initial]),
+        particles.section(rows[particles]),
+        gaussians.section(rows[gaussians], rows[comparison]),
+        online.section(waveforms),
+        intervals.section(lights),
+    ]
+
+
+def compared(rows: Rows) -> dict[str, pd.DataFrame]:
+    """The comparisons in which orderings are judged, by name."""
+    main, read = rows[comparison], rows[reading_table]
+    best = reading_table.distances(read).loc[0, "reading"]
+    names = dict.fromkeys(("people: kind noise", "observation: mean of ten", best))
+    cohorts = {f"{name}, base": main[main["cohort"] == name] for name in ("kim11", "recruitment")}
+    readings = {str(name): reading_table.rows_of(name, read) for name in names}
+    return {name: comparison.summary(group) for name, group in (cohorts | readings).items()}
+
+
+def main(
+    seed: Annotated[int, typer.Option(help="Seed of the cohorts.")] = 10_000,
+    workers: Annotated[int, typer.Option(help="Processes.")] = 2,
+    out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = RESULTS,
+    *,
+    quick: Annotated[bool, typer.Option(help="Few people: under three minutes on two cores.")] = False,
+) -> None:
+    """Reproduce the dissertation's reduction of trials."""
+    began_s = time.monotonic()
+    size = QUICK if quick else FULL
+    parts = sections(size, seed, workers)
+    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in VERSIONS)
+    facts = {
+        "command": f"`{shlex.join(['python', '-m', 'benchmarks.trial_reduction', *sys.argv[1:]])}`",
+        "versions": f"python {platform.python_version()}, {versions}",
+        "seed": seed,
+        "sessions": ", ".join(f"{name} {count}" for name, count in vars(size).items()),
+        "took": f"{(time.monotonic() - began_s) / 60:.1f} minutes with {workers} processes",
+    }
+    write(parts, facts, out)
+    print(out.with_suffix(".md").read_text())
+
+
+if __name__ == "__main__":
+    typer.run(main)

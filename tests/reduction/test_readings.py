@@ -1,0 +1,43 @@
+"""Readings: what each means for a method, and what cannot be read."""
+
+from __future__ import annotations
+
+import pytest
+from benchmarks.reduction.dissertation import METHODS
+from benchmarks.reduction.readings import BASE, READINGS, Reading
+
+import isiw
+from isiw.errors import InvalidValueError
+
+
+def test_every_reading_makes_every_method() -> None:
+    for reading, _ in READINGS.values():
+        for method in (*METHODS, "nr2"):
+            isiw.make_strategy(method, **reading.settings(method))
+
+
+def test_every_reading_is_tried_once() -> None:
+    assert len(set(READINGS.values())) == len(READINGS)
+
+
+def test_the_base_has_the_texts_stopping_rule() -> None:
+    assert BASE.settings("gpr") == {"stop_edges": "both", "stop_last": 5, "acquisition": "variance"}
+
+
+def test_the_particle_filter_is_touched_by_the_floor_alone() -> None:
+    assert Reading(edges="either", last=6, floor="zeroed").settings("pf") == {"floor": "zeroed"}
+
+
+def test_the_default_is_never_touched() -> None:
+    assert Reading(edges="either", floor="raw").settings("default") == {}
+
+
+@pytest.mark.parametrize("wrong", [{"observation": "median"}, {"outside": "noise"}, {"range_end": "never"}])
+def test_unknown_words_are_refused(wrong: dict[str, str]) -> None:
+    with pytest.raises(InvalidValueError, match="is unknown"):
+        Reading(**wrong)
+
+
+def test_live_trials_have_no_recorded_outside() -> None:
+    with pytest.raises(InvalidValueError, match="only a recorded sweep has an outside"):
+        Reading(observation="live", outside="zero")
