@@ -126,15 +126,15 @@ def in_pieces(function: Callable[..., Tensor], response: Response, others: tuple
     if response.log_floor.is_cuda:
         return function(response, *others)
     people, particles = response.log_floor.shape
+    together = max(1, CHUNK_ELEMENTS // max(1, elements * particles))
     step = max(1, CHUNK_ELEMENTS // max(1, elements))
     rows = []
-    for b in range(people):
-        one = slice(b, b + 1)
+    for some in (slice(first, first + together) for first in range(0, people, together)):
         pieces = [slice(first, first + step) for first in range(0, particles, step)]
         parts = [
             function(
-                Response(*(field[one, piece] for field in response)),
-                *(x[one, piece] if x.shape[1] == particles else x[one] for x in others),
+                Response(*(field[some, piece] for field in response)),
+                *(x[some, piece] if x.shape[1] == particles else x[some] for x in others),
             )
             for piece in pieces
         ]

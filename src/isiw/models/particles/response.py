@@ -265,7 +265,8 @@ def outcome_density(response: Response, level: Tensor, log_mep: Tensor) -> Tenso
     """
     log_relative = log_mep - response.log_floor.unsqueeze(-1)
     mean, inverse_sd = _components(response, level)
-    terms = _bell((mean.unsqueeze(-2) - log_relative[..., None, :, None]).mul_(inverse_sd.unsqueeze(-2)))
+    scaled, by = (mean * inverse_sd).unsqueeze(-2), inverse_sd.unsqueeze(-2)
+    terms = _bell(torch.addcmul(scaled, log_relative[..., None, :, None], by, value=-1.0))
     evoked = (terms @ (inverse_sd * node_weights(level)).unsqueeze(-1)).squeeze(-1) / math.sqrt(2 * math.pi)
     flat = Response(*(field.unsqueeze(-1) for field in response))
     return _mix(flat, level.unsqueeze(-1), log_relative.unsqueeze(-2), evoked)
