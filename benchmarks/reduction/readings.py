@@ -90,6 +90,8 @@ READINGS: Final[dict[str, tuple[Reading, str]]] = {
     "mean of ten, kind noise": (replace(BASE, observation="mean"), "gaussian"),
     "zero outside, edge variance": (replace(BASE, outside="zero", acquisition="edge-variance"), "kim11"),
     "zero outside, kind noise": (replace(BASE, outside="zero"), "gaussian"),
+    "raw, mean of ten": (replace(BASE, floor="raw", observation="mean"), "kim11"),
+    "raw, kind noise": (replace(BASE, floor="raw"), "gaussian"),
     "zeroed, kind noise": (replace(BASE, floor="zeroed"), "gaussian"),
     "six, kind noise": (replace(BASE, last=6), "gaussian"),
     "either edge, kind noise": (replace(BASE, edges="either"), "gaussian"),
