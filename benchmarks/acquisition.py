@@ -76,7 +76,7 @@ def decisions(rows: pd.DataFrame) -> pd.DataFrame:
 
 def at_stopping(rows: pd.DataFrame) -> pd.DataFrame:
     """One row a cohort and strategy: how often, when and with what its stopping rule ended the session."""
-    last = rows[rows["trial"] == rows.groupby(KEYS[:2])["trial"].transform("max")]
+    last = rows[(rows["trial"] == rows.groupby(KEYS[:2])["trial"].transform("max")) & rows["converged"].notna()]
     stopped = last[last["converged"] == 1.0]
     groups = stopped.groupby(KEYS[:2])
     table = groups[["stop_trial", "stop_f1", "stop_start_covered", "stop_end_covered"]].mean()
