@@ -77,7 +77,7 @@ def test_designs_that_do_not_look_at_the_responses_do_not() -> None:
 
 @pytest.mark.parametrize("name", PARTICLES)
 def test_a_named_strategy_is_rebuilt_from_its_recipe(name: str) -> None:
-    strategy = make_strategy(name, seed=2, prior={"p_window": 0.6, "width_ms": (90.0, 0.4)}, **FEW)
+    strategy = make_strategy(name, seed=2, prior={"p_window": 0.6, "width_ms": (90.0, 0.4, 0.0)}, **FEW)
     assert isinstance(strategy.model, ResponseModel)
     assert isinstance(strategy.acquisition, AcquisitionFunction)
     again = make_strategy(strategy.recipe.name, seed=strategy.recipe.seed, **strategy.recipe.settings)
@@ -98,7 +98,7 @@ def test_settings_reach_the_parts_they_are_meant_for() -> None:
 
 
 def test_the_prior_as_a_list_of_numbers_is_the_prior_as_a_pair() -> None:
-    pair, row = (make_strategy(prior={"width_ms": kind((90.0, 0.4))}, **FEW) for kind in (tuple, list))
+    pair, row = (make_strategy(prior={"width_ms": kind((90.0, 0.4, 0.0))}, **FEW) for kind in (tuple, list))
     assert pair.model == row.model
 
 

@@ -22,7 +22,7 @@ def test_the_python_examples_run_one_after_the_other(tmp_path, monkeypatch, caps
     for block in blocks("python"):
         exec(compile(block, "README.md", "exec"), {"__name__": "readme"})  # noqa: S102 - the point of the test
     printed = capsys.readouterr().out
-    assert "The budget of 8 stimuli is used up." in printed
+    assert "The budget of 6 stimuli is used up." in printed
     assert "nothing is missing" in printed
 
 
