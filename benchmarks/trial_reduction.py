@@ -17,10 +17,11 @@ import sys
 import time
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated
+from typing import Annotated, Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import joblib
 import pandas as pd
 import typer
 
@@ -41,19 +42,28 @@ from benchmarks.reduction.parallel import frame, in_parallel, run_sessions
 from benchmarks.reduction.size import FULL, QUICK, Size
 
 Rows = dict[ModuleType, pd.DataFrame]
+Measured = tuple[dict[str, pd.DataFrame], list[Any], list[Any]]
+"""The sessions' rows by part, interval production, and the sessions on waveforms."""
 
 RESULTS = Path("benchmarks/results/trial_reduction")
 PARTS = (comparison, reading_table, headline, initial, particles, gaussians)
 VERSIONS = ("isiw", "numpy", "scipy", "torch", "scikit-learn", "statsmodels")
 
 
-def sections(size: Size, seed: int, workers: int) -> list[Section]:
-    """Run everything, and tell it."""
+def measured(size: Size, seed: int, workers: int) -> Measured:
+    """Run everything."""
     plans = {part: part.sessions(size, seed) for part in PARTS}
     outcomes = run_sessions((session for plan in plans.values() for session in plan), workers)
-    rows = {part: frame(plan, outcomes) for part, plan in plans.items()}
+    rows = {part.__name__: frame(plan, outcomes) for part, plan in plans.items()}
     lights = in_parallel(intervals.produce, intervals.runs(size.intervals, seed), workers, "interval production")
     waveforms = in_parallel(online.examine, online.plan(size.online, seed), workers, "online")
+    return rows, lights, waveforms
+
+
+def sections(found: Measured) -> list[Section]:
+    """Tell it."""
+    named, lights, waveforms = found
+    rows = {part: named[part.__name__] for part in PARTS}
     return [
         headline.section(rows[headline]),
         comparison.section(rows[comparison]),
@@ -85,11 +95,19 @@ def main(
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = RESULTS,
     *,
     quick: Annotated[bool, typer.Option(help="Few people: under three minutes on two cores.")] = False,
+    again: Annotated[bool, typer.Option(help="Tell once more what the last run measured.")] = False,
 ) -> None:
     """Reproduce the dissertation's reduction of trials."""
     began_s = time.monotonic()
     size = QUICK if quick else FULL
-    parts = sections(size, seed, workers)
+    kept = out.with_suffix(".parts")
+    if again:
+        found = joblib.load(kept)
+    else:
+        found = measured(size, seed, workers)
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        joblib.dump(found, kept)
+    parts = sections(found)
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in VERSIONS)
     facts = {
         "command": f"`{shlex.join(['python', '-m', 'benchmarks.trial_reduction', *sys.argv[1:]])}`",

@@ -71,8 +71,10 @@ def variances(rows: pd.DataFrame) -> pd.DataFrame:
     """Mean variance of the particles [ms²] by range, number and iteration (0: before the first)."""
     table = []
     for (label, count), group in rows.groupby(["range", "particles"], sort=False):
-        spreads = np.array([spread[: GENERATIONS + 1] for spread in group["spread_ms"]])
-        mean = (spreads**2).mean(axis=0)
+        # A session that stops early keeps the spread that it stopped with.
+        spreads = [spread[: GENERATIONS + 1] for spread in group["spread_ms"]]
+        longest = max(map(len, spreads))
+        mean = (np.array([spread + spread[-1:] * (longest - len(spread)) for spread in spreads]) ** 2).mean(axis=0)
         table.append({"range": label, "particles": count} | {f"k={k}": value for k, value in enumerate(mean.tolist())})
     return pd.DataFrame(table)
 
