@@ -17,7 +17,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-import matplotlib.figure
 import numpy as np
 import pandas as pd
 import torch
@@ -27,7 +26,8 @@ from rich.progress import Progress
 import isiw
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.metrics import trials_to_lasting
-from isiw.studies import Processes, Study, StudyStrategy, conduct, paired_sessions, run_study
+from isiw.plots_studies import save_study_plot
+from isiw.studies import Processes, Study, StudyStrategy, conduct, paired_sessions, run_study, summarise
 from isiw.subjects import COHORTS
 from oracle import ORACLE_COHORTS, simulate_oracle
 
@@ -35,31 +35,27 @@ MARKS = (5, 10, 12, 15, 20, 25, 30, 40, 60, 80)
 LASTING = (0.8, 0.9, 0.95)
 SPACES = {"valve": VALVE_SPACE, "impact": IMPACT_SPACE}
 KEYS = ["cohort", "strategy", "trial"]
+MEANS = (
+    "f1",
+    "f1_se",
+    "behind_oracle",
+    "behind_se",
+    "start_coverage",
+    "end_coverage",
+    "called_none",
+    "ask_ms",
+    "tell_ms",
+)
 
 
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
-    """One row a cohort, strategy and trial.
-
-    Mean F1 with its standard error; how much it is below the oracle's on the same people, with the standard error of
-    that; coverage of the 90 % intervals of both edges; share called "no window"; median times.
-    """
+    """One row a cohort, strategy and trial: that of the study, and how much mean F1 is below the oracle's, paired."""
     oracle = rows[rows["strategy"] == "oracle"].set_index(["cohort", "person", "trial"])["f1"]
     behind = oracle.reindex(pd.MultiIndex.from_frame(rows[["cohort", "person", "trial"]])).to_numpy() - rows["f1"]
-    groups = rows.assign(behind=behind).groupby(KEYS)
-    return pd.DataFrame(
-        {
-            "people": groups.size(),
-            "f1": groups["f1"].mean(),
-            "f1_se": groups["f1"].sem(),
-            "behind_oracle": groups["behind"].mean(),
-            "behind_se": groups["behind"].sem(),
-            "start_coverage": groups["start_covered"].mean(),
-            "end_coverage": groups["end_covered"].mean(),
-            "called_none": 1.0 - groups["reported_window"].mean(),
-            "ask_ms": groups["ask_ms"].median(),
-            "tell_ms": groups["tell_ms"].median(),
-        }
-    ).reset_index()
+    groups = rows.assign(behind=behind).groupby(KEYS)["behind"]
+    paired = pd.DataFrame({"behind_oracle": groups.mean(), "behind_se": groups.sem()})
+    table = summarise(rows, errors=pd.DataFrame()).merge(paired, on=KEYS)
+    return table[[*KEYS, "people", *MEANS]]
 
 
 def decisions(rows: pd.DataFrame) -> pd.DataFrame:
@@ -98,28 +94,6 @@ def lasting(table: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def figure(table: pd.DataFrame) -> matplotlib.figure.Figure:
-    """Mean F1 by trial, a panel a cohort."""
-    names = list(table["cohort"].unique())
-    columns = min(4, len(names))
-    lines = -(-len(names) // columns)
-    picture = matplotlib.figure.Figure(figsize=(3.4 * columns, 2.8 * lines), layout="constrained")
-    for axes, name in zip(picture.subplots(lines, columns, squeeze=False).flat, names, strict=False):
-        for strategy, curve in table[table["cohort"] == name].groupby("strategy"):
-            style = {"color": "black", "linestyle": "--"} if strategy == "oracle" else {}
-            axes.errorbar(curve["trial"], curve["f1"], curve["f1_se"], label=strategy, **style)
-        axes.set(title=name, xlabel="trials", ylabel="mean F1", ylim=(0, 1))
-        axes.legend(fontsize=7)
-    return picture
-
-
-def markdown(table: pd.DataFrame) -> str:
-    """A table."""
-    lines = [" | ".join(table.columns), " | ".join("---" for _ in table.columns)]
-    lines += [" | ".join(f"{v:.3f}" if isinstance(v, float) else str(v) for v in row) for row in table.to_numpy()]
-    return "\n".join(f"| {line} |" for line in lines)
-
-
 def write(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
     """Tables and picture."""
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -131,11 +105,11 @@ def write(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
         "At the stopping rule": at_stopping(rows),
     }
     header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
-    parts = [f"## {title}\n\n{markdown(part)}\n" for title, part in tables.items()]
+    parts = [f"## {title}\n\n{part.to_markdown(index=False, floatfmt='.3f')}\n" for title, part in tables.items()]
     out.with_suffix(".md").write_text("\n".join([header, "", *parts]))
     records = {title: json.loads(part.to_json(orient="records", double_precision=6)) for title, part in tables.items()}
     out.with_suffix(".json").write_text(json.dumps({"facts": facts, **records}, indent=1))
-    figure(table).savefig(out.with_suffix(".png"), dpi=110)
+    save_study_plot(table, out.with_suffix(".png"))
 
 
 def strategy_of(text: str) -> StudyStrategy:

@@ -102,6 +102,8 @@ def main(
     size = QUICK if quick else FULL
     kept = out.with_suffix(".parts")
     if again:
+        if not kept.exists():
+            raise typer.BadParameter(f"{kept} is not there: run without --again first")
         found = joblib.load(kept)
     else:
         found = measured(size, seed, workers)

@@ -24,7 +24,8 @@ class TwoStep:
 
     The `WindowGain` of two trials, the second chosen in the light of the first. To be affordable, only the best
     candidates by their own gain are looked behind, with their outcomes in a few equally probable groups; of the second
-    trial only some candidates are scored.
+    trial only some candidates are scored. The first gain is that of the outcome itself, the second one that after its
+    group alone, which is somewhat too large the fewer groups there are.
 
     Args:
         shortlist: how many candidates are looked behind.
