@@ -83,8 +83,8 @@ def main() -> None:
     """Measure and print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--single", type=int, default=40, help="sessions one at a time")
-    parser.add_argument("--batches", type=int, default=8, help="batches")
-    parser.add_argument("--batch", type=int, default=25, help="people side by side on a CPU")
+    parser.add_argument("--batches", type=int, default=4, help="batches")
+    parser.add_argument("--batch", type=int, default=50, help="people side by side on a CPU")
     parser.add_argument("--gpu-batch", type=int, default=200, help="people side by side on a GPU")
     parser.add_argument("--workers", type=int, default=2, help="as many as there are cores, beside one")
     parser.add_argument("--seed", type=int, default=10_000)

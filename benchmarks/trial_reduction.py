@@ -89,6 +89,18 @@ def compared(rows: Rows) -> dict[str, pd.DataFrame]:
     return {name: comparison.summary(group) for name, group in (cohorts | readings).items()}
 
 
+def facts_of(size: Size, seed: int, workers: int, took_s: float) -> dict[str, object]:
+    """What a run was; telling it again does not change it."""
+    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in VERSIONS)
+    return {
+        "command": f"`{shlex.join(['python', '-m', 'benchmarks.trial_reduction', *sys.argv[1:]])}`",
+        "versions": f"python {platform.python_version()}, {versions}",
+        "seed": seed,
+        "sessions": ", ".join(f"{name} {count}" for name, count in vars(size).items()),
+        "took": f"{took_s / 60:.1f} minutes with {workers} processes",
+    }
+
+
 def main(
     seed: Annotated[int, typer.Option(help="Seed of the cohorts.")] = 10_000,
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
@@ -98,27 +110,17 @@ def main(
     again: Annotated[bool, typer.Option(help="Tell once more what the last run measured.")] = False,
 ) -> None:
     """Reproduce the dissertation's reduction of trials."""
-    began_s = time.monotonic()
-    size = QUICK if quick else FULL
     kept = out.with_suffix(".parts")
-    if again:
-        if not kept.exists():
-            raise typer.BadParameter(f"{kept} is not there: run without --again first")
-        found = joblib.load(kept)
-    else:
+    if not again:
+        began_s = time.monotonic()
+        size = QUICK if quick else FULL
         found = measured(size, seed, workers)
         kept.parent.mkdir(parents=True, exist_ok=True)
-        joblib.dump(found, kept)
-    parts = sections(found)
-    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in VERSIONS)
-    facts = {
-        "command": f"`{shlex.join(['python', '-m', 'benchmarks.trial_reduction', *sys.argv[1:]])}`",
-        "versions": f"python {platform.python_version()}, {versions}",
-        "seed": seed,
-        "sessions": ", ".join(f"{name} {count}" for name, count in vars(size).items()),
-        "took": f"{(time.monotonic() - began_s) / 60:.1f} minutes with {workers} processes",
-    }
-    write(parts, facts, out)
+        joblib.dump((found, facts_of(size, seed, workers, time.monotonic() - began_s)), kept)
+    if not kept.exists():
+        raise typer.BadParameter(f"{kept} is not there: run without --again first")
+    found, facts = joblib.load(kept)
+    write(sections(found), facts, out)
     print(out.with_suffix(".md").read_text())
 
 

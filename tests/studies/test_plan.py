@@ -43,7 +43,7 @@ def test_a_study_from_toml_has_defaults_and_short_forms(tmp_path):
     study = load_study(tmp_path / "study.toml")
     assert study.strategies == (StudyStrategy("even", {"particles": 40}), StudyStrategy("incremental"))
     assert study.space == IMPACT_SPACE
-    assert (study.people, study.marks, study.engine, study.batch) == (12, (2, 4), "single", 25)
+    assert (study.people, study.marks, study.engine, study.batch) == (12, (2, 4), "single", 50)
     assert study_from({"strategies": ["even"], "cohorts": ["wide"]}, "here").space == VALVE_SPACE
 
 

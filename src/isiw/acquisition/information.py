@@ -32,7 +32,8 @@ class _WindowPosterior(Posterior, PredictsOutcomes, SamplesWindows, Protocol):
 
 
 def _entropy(mass: Tensor) -> Tensor:
-    entropy: Tensor = -torch.special.xlogy(mass, mass).sum(-1)
+    # As `torch.special.entr`, several times as fast: what is as good as 0 adds as good as nothing.
+    entropy: Tensor = -mass.clamp_min(1e-30).log_().mul_(mass).sum(-1)
     return entropy
 
 

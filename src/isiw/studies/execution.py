@@ -7,7 +7,6 @@ down with it again and again, comes back as a `Failure` among the results: nothi
 from __future__ import annotations
 
 import asyncio
-import ctypes
 import importlib
 import os
 import threading
@@ -18,7 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
@@ -26,6 +25,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 from joblib import Parallel, delayed, parallel_config
 
 from isiw.errors import InvalidValueError, StudyError
+from isiw.studies.memory import memory_kept
 
 __all__ = ["DaskCluster", "Executor", "Failure", "Processes"]
 
@@ -132,7 +132,8 @@ class Processes:
 class DaskCluster:
     """A Dask cluster: a scheduler's address, or a `distributed.Client`, whose workers have isiw installed.
 
-    Dask itself hands out again what ran on a worker that died, as often as its setting `allowed-failures` says.
+    Dask itself hands out again what ran on a worker that died, as often as its setting `allowed-failures` says. What
+    was there each time is run once more at the end, alone, since it may be another's fault.
 
     Args:
         scheduler: the address, such as `"tcp://10.0.0.1:8786"`, or the client.
@@ -154,7 +155,7 @@ class DaskCluster:
         with ExitStack() as stack:
             address = self.scheduler if isinstance(self.scheduler, str) else None
             client = self.scheduler if address is None else stack.enter_context(_client(dask, address))
-            running, held = dask.as_completed(loop=client.loop), dict[str, _HandedOut[_Item]]()
+            running, held, suspects = dask.as_completed(loop=client.loop), dict[str, _HandedOut[_Item]](), list[_Item]()
             stack.callback(_cancel, client, held)
 
             def hand_out(item: _Item, losses: int = 0) -> None:
@@ -166,8 +167,9 @@ class DaskCluster:
                 hand_out(item)
             for future in running:
                 item, _, losses = held.pop(future.key)
-                result = _result_of(future)
-                if not isinstance(result, _Lost):
+                if future.status == "error" and isinstance(future.exception(), dask.KilledWorker):
+                    suspects.append(item)
+                elif not isinstance(result := _result_of(future), _Lost):
                     yield item, result
                 elif client.status != "running":
                     raise StudyError("the Dask scheduler was lost", remedy="Run again: what is finished is kept.")
@@ -175,6 +177,9 @@ class DaskCluster:
                     hand_out(item, losses + 1)
                 else:
                     yield item, Failure(f"Its result was lost on the cluster {self.attempts} times.")
+            for item in suspects:
+                result = _result_of(client.submit(_attempt_alone, run, item, pure=False))
+                yield item, Failure("Its result was lost on the cluster.") if isinstance(result, _Lost) else result
 
 
 class _HandedOut(NamedTuple, Generic[_Item]):
@@ -221,13 +226,13 @@ def _result_of(future: Any) -> Any:
 
 def _attempt(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
     try:
-        return run(item)
+        with memory_kept():
+            return run(item)
     except Exception as error:  # noqa: BLE001 - one that fails must not end the others; it is reported
         return Failure(_line(error), traceback.format_exc())
 
 
 def _numbered(run: Callable[[_Item], _Result], number: int, item: _Item, parent: int) -> tuple[int, _Result | Failure]:
-    _keep_memory()
     _leave_with(parent)
     return number, _attempt(run, item)
 
@@ -244,28 +249,11 @@ def _leave_with(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-@cache
-def _keep_memory() -> None:
-    """Have this worker keep the memory that it frees.
-
-    glibc gives large blocks back to the system at once; a batch of people, which needs them again on the next trial,
-    spent a quarter of its time on getting them.
-    """
-    with suppress(AttributeError, OSError, TypeError):  # another C library has no such setting
-        mallopt = ctypes.CDLL(None).mallopt
-        mallopt(_MMAP_THRESHOLD, 1 << 30)
-        mallopt(_TRIM_THRESHOLD, 1 << 30)
-
-
-_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # malloc.h
-
-
 _ONE_AT_A_TIME = threading.Lock()
 
 
 def _attempt_alone(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
     """One session at a time in each worker process, however many threads it has: torch and Pyro share global state."""
-    _keep_memory()
     with _ONE_AT_A_TIME:
         return _attempt(run, item)
 

@@ -121,7 +121,7 @@ class Study:
     space: DesignSpace = VALVE_SPACE
     stopping: Stopping = "noted"
     engine: Engine = "single"
-    batch: int = 25
+    batch: int = 50
     device: str = "cpu"
     amplitude: float = 1.0
 

@@ -24,7 +24,7 @@ from isiw.models.protocol import (
 )
 from isiw.models.streams import systematic
 from isiw.subjects import SimulatedSubject, cohort
-from isiw.window import Window
+from isiw.window import Window, WindowEstimate
 
 GRID = torch.arange(0.0, 501.0, 5.0)
 
@@ -50,6 +50,10 @@ def sampled_meps_mv(person: Person, isi_ms: float, generator: torch.Generator) -
     below = log_likelihood(person.response, level, torch.full_like(high, -torch.inf), high).exp()
     picks = torch.searchsorted(below[:, 0].contiguous(), torch.rand((len(level), 1), generator=generator))
     return ends[picks.clamp_max(len(ends) - 1)].exp()[:, 0].tolist()
+
+
+def mean_medians_ms(estimates: list[WindowEstimate]) -> np.ndarray:
+    return np.mean([np.median(estimate.edge_samples_ms, axis=0) for estimate in estimates], axis=0)
 
 
 def evenly(subject: SimulatedSubject, n: int, seed: int = 0) -> list[tuple[float, float]]:
@@ -150,11 +154,13 @@ def test_moved_particles_agree_with_plain_importance_sampling() -> None:
 
 
 def test_the_order_of_trials_matters_little() -> None:
+    # Startle and drift are the only things in the model that know the order. Averaged over six seeds.
     trials = evenly(cohort("gaussian", 3, 0)[2], 16)
-    forth, back = (after(ParticleModel(), order).estimate() for order in (trials, trials[::-1]))
-    scale = np.std(np.clip(forth.edge_samples_ms, -50, 550), axis=0)
-    gap = np.abs([forth.start_ms - back.start_ms, forth.end_ms - back.end_ms])
-    assert (gap < 0.5 * scale + 1).all()
+    forth, back = (
+        [after(ParticleModel(), order, seed).estimate() for seed in range(6)] for order in (trials, trials[::-1])
+    )
+    gap = np.abs(mean_medians_ms(forth) - mean_medians_ms(back))
+    assert (gap < 0.5 * np.std(forth[0].edge_samples_ms, axis=0)).all()
 
 
 def test_a_clear_responder_is_found_and_a_silent_person_is_not_given_a_window() -> None:
@@ -174,11 +180,9 @@ def test_the_unit_of_the_amplitude_is_learnt(factor: float) -> None:
     usual, scaled = (
         [after(ParticleModel(), data, seed).estimate() for seed in range(6)] for data in (trials, scaled_trials)
     )
-    edges = [
-        np.mean([np.median(e.edge_samples_ms, axis=0) for e in estimates], axis=0) for estimates in (usual, scaled)
-    ]
     assert min(e.probability for e in scaled) > 0.9
-    assert (np.abs(edges[0] - edges[1]) < np.std(usual[0].edge_samples_ms, axis=0)).all()
+    gap = np.abs(mean_medians_ms(usual) - mean_medians_ms(scaled))
+    assert (gap < np.std(usual[0].edge_samples_ms, axis=0)).all()
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from isiw.models.protocol import Observation, Tensor
 
 __all__ = ["ISI_NODES", "History", "in_pieces", "levels", "observed", "total_log_likelihood"]
 
-CHUNK_ELEMENTS = 1 << 21
+CHUNK_ELEMENTS = 1 << 20
 """On a CPU the likelihood is worked through in pieces of this many nodes: few calls, and bounded memory."""
 
 ISI_NODES = ((-math.sqrt(3.0), 1 / 6), (0.0, 2 / 3), (math.sqrt(3.0), 1 / 6))
@@ -85,8 +85,8 @@ def levels(person: Person, isi_ms: Tensor) -> Tensor:
         person: particles, fields of shape (b, p).
         isi_ms: ISIs [ms], shape (b or 1, n); NaN is TMS alone.
     """
-    isi = isi_ms.unsqueeze(-2)
-    return torch.where(person.present.unsqueeze(-1) & ~isi.isnan(), facilitation(person.shape, isi), 0.0)
+    level = facilitation(person.shape, isi_ms.unsqueeze(-2)).mul_(person.present.unsqueeze(-1))
+    return level.nan_to_num_(0.0)
 
 
 def total_log_likelihood(person: Person, history: History) -> Tensor:

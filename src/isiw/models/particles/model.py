@@ -38,7 +38,8 @@ class ParticleModel:
         beliefs: the prior over people.
         particles: how many particles a person has.
         thinned: how many of them represent the posterior where every candidate ISI is scored.
-        moves: sweeps of Markov chain moves after each trial.
+        moves: sweeps of Markov chain moves after each trial; up to five times as many among the first 25, whose history
+            is short and tells apart the particles most.
         max_trial_moves: sweeps times trials are at most this many, so that a tell stays fast late in a session.
         min_ess: effective sample size, as a share of the particles, below which they are resampled.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
@@ -51,8 +52,8 @@ class ParticleModel:
 
     beliefs: Prior = field(default_factory=Prior)
     particles: int = 1000
-    thinned: int = 256
-    moves: int = 3
+    thinned: int = 192
+    moves: int = 2
     max_trial_moves: int = 240
     min_ess: float = 0.5
     detection_limit_mv: float = 0.005
@@ -125,8 +126,9 @@ class ParticleModel:
         )
 
     def _sweeps(self, trials: int) -> int:
-        """As many sweeps as asked for, but fewer where the history has become long."""
-        return min(self.moves, max(1, self.max_trial_moves // max(1, trials)))
+        """More sweeps where the history is short, fewer where it has become long."""
+        early = min(5.0, max(1.0, 25 / max(1, trials)))
+        return min(int(self.moves * early), max(1, self.max_trial_moves // max(1, trials)))
 
     def _resampled(self, posterior: ParticlePosterior, generator: torch.Generator) -> ParticlePosterior:
         """Resample those people whose effective sample size has fallen; nobody else notices."""

@@ -3,8 +3,8 @@
 Given input noise z, the evoked MEP relative to the EMG floor is `ratio * sigmoid(drive + spread(z))` with log-normal
 output noise. A recruitment curve has a drive that is linear in the facilitation and noise on that drive (Goetz et al.;
 the cohorts' `recruitment`). Noise of constant CV is the same formula far below saturation, with the logarithm of the
-facilitation as the drive and log-gamma noise. The noise on the input is integrated out on equidistant nodes, whose
-error is negligible because the output noise smooths between them.
+facilitation as the drive and log-gamma noise. The noise on the input is integrated out on equidistant nodes; what lies
+between two of them, a normal variable too, is passed on to the output along the slope of the curve at the node.
 
     mep / floor = floor noise + ratio * gain_n * sigmoid(drive + spread_q) * output noise,     q = 1 ... Q, weights w_q
 
@@ -32,13 +32,16 @@ __all__ = [
     "outcome_density",
 ]
 
-NODES = 16
-NODE_REACH = 2.8
+NODES = 8
+NODE_REACH = 2.6
+BETWEEN_NODES = 0.4 * 2.0 * NODE_REACH / (NODES - 1)
+"""SD of the part of a standard normal variable that lies between the nodes."""
+
 FAR_BELOW = 15.0
 """How far below saturation the constant-CV response sits, in logits: the sigmoid is an exponential there."""
 
-GAMMA_KERNEL = 0.25
-"""Share of the log-gamma noise that the output kernel takes over from the nodes, natural log."""
+STEEPEST_ROOT = 0.2
+"""Where the log-gamma noise is steeper than at this root its slope is cut: such MEPs are lost in the floor."""
 
 OUTLIER_PROBABILITY = 0.03
 OUTLIER_LOG_RANGE = (math.log(2.0), math.log(200.0))
@@ -108,47 +111,56 @@ def log_gain(response: Response, order: Tensor) -> Tensor:
 
 
 def _nodes(like: Tensor) -> Tensor:
-    return torch.linspace(-NODE_REACH, NODE_REACH, NODES, device=like.device, dtype=like.dtype)
+    reach = NODE_REACH * math.sqrt(1.0 - BETWEEN_NODES**2)
+    return torch.linspace(-reach, reach, NODES, device=like.device, dtype=like.dtype)
 
 
 def node_weights(like: Tensor) -> Tensor:
     """Weights of the nodes of the input noise, shape (q,)."""
-    density = torch.exp(-0.5 * _nodes(like).square())
+    density = torch.exp(-0.5 * _nodes(like).square() / (1.0 - BETWEEN_NODES**2))
     return density / density.sum()
 
 
-def _log_gamma_nodes(cv: Tensor) -> Tensor:
-    """Nodes of the log of gamma noise with mean 1, less what the output kernel adds, shape (..., p, q).
+def _over_nodes(values: Tensor, axis: int = -2) -> Tensor:
+    """Expectation over the input noise: the weighted sum along the axis of the nodes."""
+    weights = node_weights(values).view(-1, *(1 for _ in range(-1 - axis)))
+    expectation: Tensor = (values * weights).sum(axis)
+    return expectation
 
-    The quantiles are Wilson and Hilferty's; they are drawn in so that nodes and kernel together have the variance of
-    the quantiles, and shifted so that the mean is 1.
+
+def _log_gamma_nodes(cv: Tensor) -> tuple[Tensor, Tensor]:
+    """Nodes of the log of gamma noise with mean 1, and its slope there, shapes (..., p, q).
+
+    The quantiles are Wilson and Hilferty's, shifted so that the mean is 1.
     """
     cv = cv.unsqueeze(-1)
-    root = (1.0 - cv.square() / 9.0 + _nodes(cv) * cv / 3.0).clamp_min(0.02)
-    log_quantiles = 3.0 * torch.log(root)
-    weights = node_weights(cv)
-    centre = (log_quantiles * weights).sum(-1, keepdim=True)
-    variance = ((log_quantiles - centre).square() * weights).sum(-1, keepdim=True)
-    nodes = centre + (log_quantiles - centre) * (1.0 - GAMMA_KERNEL**2 / variance).clamp_min(0.0).sqrt()
-    mean = (nodes.exp() * weights).sum(-1, keepdim=True)
-    return nodes - torch.log(mean) - 0.5 * GAMMA_KERNEL**2
+    root = 1.0 - cv.square() / 9.0 + _nodes(cv) * cv / 3.0
+    log_quantiles, slope = 3.0 * torch.log(root.clamp_min(0.02)), cv / root.clamp_min(STEEPEST_ROOT)
+    mean = _over_nodes(torch.exp(log_quantiles + 0.5 * (BETWEEN_NODES * slope).square()), axis=-1)
+    return log_quantiles - torch.log(mean).unsqueeze(-1), slope
 
 
 class _Curve(NamedTuple):
-    """The nodes' view of a response: evoked/floor at node q is exp(log_scale) * sigmoid(drive + spread_q)."""
+    """The nodes' view of a response: evoked/floor at node q is scale * sigmoid(drive + spread_q).
+
+    Its log varies by `output` whatever the drive, and by `between` where the sigmoid is steepest.
+    """
 
     scale: Tensor  # (..., p, 1 or t)
     spread: Tensor  # (..., p, q)
-    kernel: Tensor  # (..., p, 1)
+    between: Tensor  # variance, (..., p, q)
+    output: Tensor  # variance, (..., p, 1)
 
 
 def _curve(response: Response, gain: Tensor | float = 0.0) -> _Curve:
     recruits = (response.kind == NoiseKind.RECRUITMENT).unsqueeze(-1)
-    input_noise = response.spread.unsqueeze(-1) * _nodes(response.spread)
-    spread = torch.where(recruits, input_noise, _log_gamma_nodes(response.spread) - FAR_BELOW)
+    width = response.spread.unsqueeze(-1)
+    log_gamma, slope = _log_gamma_nodes(response.spread)
+    spread = torch.where(recruits, width * _nodes(width), log_gamma - FAR_BELOW)
+    between = (BETWEEN_NODES * torch.where(recruits, width, slope)).square()
     log_scale = response.log_ratio.unsqueeze(-1) + torch.where(recruits, 0.0, FAR_BELOW) + gain
-    kernel = torch.where(recruits, response.output_log_sd.unsqueeze(-1), GAMMA_KERNEL)
-    return _Curve(log_scale.exp(), spread, kernel)
+    output = torch.where(recruits, response.output_log_sd.unsqueeze(-1).square(), 0.0)
+    return _Curve(log_scale.exp(), spread, between, output)
 
 
 def _drive(response: Response, level: Tensor) -> Tensor:
@@ -174,34 +186,38 @@ def evoked_mean(response: Response, level: Tensor) -> Tensor:
         Shape (..., p, t).
     """
     curve = _curve(response)
-    by_node = torch.sigmoid(_drive(response, level).unsqueeze(-1) + curve.spread.unsqueeze(-2))
-    mean = curve.scale * (by_node @ node_weights(level)) * torch.exp(0.5 * curve.kernel.square())
-    return mean * _response_probability(response, level)
+    # The expectation is smooth in the input noise: nodes that have all of its variance are enough.
+    nodes = curve.spread / math.sqrt(1.0 - BETWEEN_NODES**2)
+    share = _over_nodes(torch.sigmoid(_drive(response, level).unsqueeze(-2) + nodes.unsqueeze(-1)))
+    mean = curve.scale * share * torch.exp(0.5 * curve.output)
+    constant_cv = response.log_ratio.exp().unsqueeze(-1) * level
+    recruits = (response.kind == NoiseKind.RECRUITMENT).unsqueeze(-1)
+    return torch.where(recruits, mean, constant_cv) * _response_probability(response, level)
 
 
 def _components(response: Response, level: Tensor, gain: Tensor | float = 0.0) -> tuple[Tensor, Tensor]:
-    """Mean and inverse SD of log(mep / floor) at each node, shapes (..., p, t, q)."""
+    """Mean and inverse SD of log(mep / floor) at each node, shapes (..., p, q, t)."""
     curve = _curve(response, gain)
-    drive = _drive(response, level).unsqueeze(-1) + curve.spread.unsqueeze(-2)
-    evoked = drive.sigmoid_().mul_(curve.scale.unsqueeze(-1))
+    share = (_drive(response, level).unsqueeze(-2) + curve.spread.unsqueeze(-1)).sigmoid_()
+    kernel = torch.sub(1.0, share).square_().mul_(curve.between.unsqueeze(-1)).add_(curve.output.unsqueeze(-1))
+    evoked = share.mul_(curve.scale.unsqueeze(-2))
     total = evoked.add(1.0)
-    # The variance is that of each part by its share of the total: (evoked² kernel² + floor²) / total².
-    spread = evoked.mul_(curve.kernel.unsqueeze(-1)).square_().add_(response.floor_log_sd.square()[..., None, None])
+    # The variance is that of each part by its share of the total: (evoked² kernel + floor²) / total².
+    spread = kernel.mul_(evoked).mul_(evoked).add_(response.floor_log_sd.square()[..., None, None])
     inverse_sd = spread.rsqrt_().mul_(total)
-    return total.log_(), inverse_sd
+    return evoked.log1p_(), inverse_sd
 
 
 def _bell(z: Tensor) -> Tensor:
-    """exp(-z² / 2) in place; what is as good as 0 stays a normal number, which is much faster."""
-    z = z.clamp_(-11.0, 11.0)
-    bell: Tensor = z.square_().mul_(-0.5).exp_()
+    """exp(-z² / 2) in place; what is as good as 0 stays a normal number, which is much faster, as powers of 2 are."""
+    bell: Tensor = z.clamp_(-11.0, 11.0).square_().mul_(-0.5 / math.log(2.0)).exp2_()
     return bell
 
 
 def _mix(response: Response, level: Tensor, log_relative: Tensor, evoked: Tensor) -> Tensor:
     """Density of log(mep / floor) from the density of trials that respond: missing responses and outliers added."""
     floor_sd = response.floor_log_sd.unsqueeze(-1)
-    silent = torch.exp(-0.5 * (log_relative / floor_sd).square()) / (floor_sd * math.sqrt(2 * math.pi))
+    silent = _bell(log_relative / floor_sd) / (floor_sd * math.sqrt(2 * math.pi))
     low, high = OUTLIER_LOG_RANGE
     outlier = ((log_relative > low) & (log_relative < high)).to(evoked.dtype) / (high - low) + 1e-6
     responds = _response_probability(response, level)
@@ -228,8 +244,8 @@ def log_likelihood(
     mean, inverse_sd = _components(response, level, gain)
     censored = log_mep != log_mep_high
     inside = _interval_likelihood(response, level, (low, high), mean, inverse_sd) if bool(censored.any()) else None
-    terms = _bell(mean.sub_(low.unsqueeze(-1)).mul_(inverse_sd)).mul_(inverse_sd)
-    evoked = (terms @ node_weights(level)) / math.sqrt(2 * math.pi)
+    terms = _bell(mean.sub_(low.unsqueeze(-2)).mul_(inverse_sd)).mul_(inverse_sd)
+    evoked = _over_nodes(terms) / math.sqrt(2 * math.pi)
     likelihood = torch.log(_mix(response, level, low, evoked))
     return likelihood if inside is None else torch.where(censored, inside, likelihood)
 
@@ -240,7 +256,7 @@ def _interval_likelihood(
     """Log probability that log(mep / floor) lies between two ends, shape (..., p, n)."""
 
     def below(end: Tensor) -> Tensor:
-        evoked: Tensor = torch.special.ndtr((end.unsqueeze(-1) - mean) * inverse_sd) @ node_weights(level)
+        evoked = _over_nodes(torch.special.ndtr((end.unsqueeze(-2) - mean) * inverse_sd))
         silent = torch.special.ndtr(end / response.floor_log_sd.unsqueeze(-1))
         first, last = OUTLIER_LOG_RANGE
         outlier = ((end - first) / (last - first)).clamp(0.0, 1.0)
@@ -265,9 +281,9 @@ def outcome_density(response: Response, level: Tensor, log_mep: Tensor) -> Tenso
     """
     log_relative = log_mep - response.log_floor.unsqueeze(-1)
     mean, inverse_sd = _components(response, level)
-    scaled, by = (mean * inverse_sd).unsqueeze(-2), inverse_sd.unsqueeze(-2)
-    terms = _bell(torch.addcmul(scaled, log_relative[..., None, :, None], by, value=-1.0))
-    evoked = (terms @ (inverse_sd * node_weights(level)).unsqueeze(-1)).squeeze(-1) / math.sqrt(2 * math.pi)
+    mean, inverse_sd = mean.unsqueeze(-1), inverse_sd.unsqueeze(-1)
+    terms = _bell((log_relative[..., None, None, :] - mean).mul_(inverse_sd)).mul_(inverse_sd)
+    evoked = _over_nodes(terms, axis=-3) / math.sqrt(2 * math.pi)
     flat = Response(*(field.unsqueeze(-1) for field in response))
     return _mix(flat, level.unsqueeze(-1), log_relative.unsqueeze(-2), evoked)
 
@@ -285,8 +301,9 @@ def draw_log_mep(response: Response, level: Tensor, generator: torch.Generator, 
         Shape (..., p, n).
     """
     mean, inverse_sd = _components(response, level, gain)
-    node = torch.multinomial(node_weights(level).expand(level.numel(), -1), 1, generator=generator)
-    mean, inverse_sd = (x.gather(-1, node.view(*level.shape, 1)).squeeze(-1) for x in (mean, inverse_sd))
+    node = torch.multinomial(node_weights(level), level.numel(), replacement=True, generator=generator)
+    picks = node.view(level.shape).unsqueeze(-2)
+    mean, inverse_sd = (x.gather(-2, picks).squeeze(-2) for x in (mean, inverse_sd))
     z = torch.randn(level.shape, generator=generator, device=level.device)
     chance, artefact, place = torch.rand((3, *level.shape), generator=generator, device=level.device)
     responds = chance < _response_probability(response, level)

@@ -5,6 +5,7 @@ The simulated people of `isiw.profiles` have shapes of their own; this is the mo
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -59,15 +60,20 @@ def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:
     Returns:
         Facilitation, shape (..., p, t).
     """
-    share = (isi_ms - shape.start_ms.unsqueeze(-1)) / shape.width_ms.unsqueeze(-1)
-    peak_at = torch.where(shape.kind == ShapeKind.SKEWED, 0.5 + 0.33 * shape.form, 0.5).unsqueeze(-1)
-    offset = share - peak_at
-    square = (offset / torch.where(offset < 0, peak_at, 1.0 - peak_at)).square_().clamp_(1e-12, 1e6)
+    peak_at = torch.where(shape.kind == ShapeKind.SKEWED, 0.5 + 0.33 * shape.form, 0.5)
+    rise_ms, fall_ms = peak_at * shape.width_ms, (1.0 - peak_at) * shape.width_ms
+    offset_ms = isi_ms - (shape.start_ms + rise_ms).unsqueeze(-1)
+    # Before the peak the first is positive, behind it the second.
+    offset = torch.maximum(offset_ms * (-1.0 / rise_ms).unsqueeze(-1), offset_ms * (1.0 / fall_ms).unsqueeze(-1))
+    square = offset.square_().clamp_(1e-12, 1e6)
     # Powers and second peaks are dear, and few particles have them.
     flat, double = shape.kind == ShapeKind.PLATEAU, shape.kind == ShapeKind.TWO_PEAK
     square[flat] = square[flat].pow(torch.exp(0.75 * (shape.form[flat] + 1.0)).unsqueeze(-1))
-    level = square.mul_(-2.0).exp_()
-    level[double] = _two_peaks(shape.form[double].unsqueeze(-1), share[double])
+    level = square.mul_(-2.0 / math.log(2.0)).exp2_()  # much faster than powers of e
+    share = (isi_ms.expand_as(level)[double] - shape.start_ms[double].unsqueeze(-1)) / shape.width_ms[double].unsqueeze(
+        -1
+    )
+    level[double] = _two_peaks(shape.form[double].unsqueeze(-1), share)
     return level
 
 
