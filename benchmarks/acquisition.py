@@ -148,6 +148,7 @@ def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
     cohorts: Annotated[str, typer.Option(help="Cohorts, comma-separated.")] = ",".join(COHORTS),
     people: Annotated[int, typer.Option(help="People a cohort.")] = 200,
     other_people: Annotated[int, typer.Option(help="People a cohort for the others.")] = 50,
+    oracle_people: Annotated[int, typer.Option(help="People a cohort for the oracle, at most.")] = 200,
     trials: Annotated[int, typer.Option(help="Trials a session.")] = 60,
     seed: Annotated[int, typer.Option(help="Seed of the cohorts.")] = 10_000,
     space: Annotated[str, typer.Option(help="valve or impact, or the high end of a range from the valve [ms].")] = (
@@ -184,7 +185,7 @@ def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
     with Progress() as progress:
         tables = [run(part, folder / str(number), workers, progress) for number, part in enumerate(studies)]
         if amplitude == 1.0:
-            tables.append(run_oracle(study, workers, progress))
+            tables.append(run_oracle(replace(study, people=min(people, oracle_people)), workers, progress))
     versions = {m.__name__: m.__version__ for m in (isiw, torch, np)} | {"python": platform.python_version()}
     command = shlex.join(["python", "benchmarks/acquisition.py", *sys.argv[1:]])
     facts = {"command": command, "versions": versions, "seed": seed, "people": people}
