@@ -59,14 +59,15 @@ TOLD: dict[str, dict[str, Any]] = {
 }
 
 
-def strategies(cohort: str) -> tuple[StudyStrategy, ...]:
-    """The default as it is, told the cohort's laws, and told besides that there is a window."""
-    told = TOLD[cohort]
-    return (
-        StudyStrategy("default"),
-        StudyStrategy("default", {"prior": told}, label="told-cohort"),
-        StudyStrategy("default", {"prior": told | {"p_window": 1.0}}, label="told-cohort-and-window"),
-    )
+def studies(plan: dict[str, Any]) -> dict[str, Study]:
+    """The default as it is, told a cohort's laws, and told besides that there is a window; and among silent people."""
+    planned = {}
+    for cohort, laws in TOLD.items():
+        told = StudyStrategy("default", {"prior": laws}, label=f"told-{cohort}")
+        certain = StudyStrategy("default", {"prior": laws | {"p_window": 1.0}}, label=f"told-{cohort}-and-window")
+        planned[cohort] = Study((StudyStrategy("default"), told, certain), (cohort,), **plan)
+        planned[f"{cohort}-silent"] = Study((told,), ("nonresponder",), **plan)
+    return planned
 
 
 def main(
@@ -77,20 +78,12 @@ def main(
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("limits"),
 ) -> None:
     """Tell the default ever more about simulated people."""
+    marks = tuple(mark for mark in MARKS if mark <= trials)
+    plan = {"people": people, "seed": seed, "trials": trials, "marks": marks, "stopping": "ignored"}
     tables = []
     with Progress() as progress:
-        for cohort in TOLD:
-            study = Study(
-                strategies(cohort),
-                (cohort,),
-                people=people,
-                seed=seed,
-                trials=trials,
-                marks=tuple(mark for mark in MARKS if mark <= trials),
-                stopping="ignored",
-                engine="batched",
-            )
-            tables += [run(study, out.with_suffix(".parts") / cohort, workers, progress)]
+        for name, study in studies(plan | {"engine": "batched"}).items():
+            tables += [run(study, out.with_suffix(".parts") / name, workers, progress)]
             tables += [run_oracle(study, workers, progress)]
     versions = {m.__name__: m.__version__ for m in (isiw, torch, np)} | {"python": platform.python_version()}
     command = shlex.join(["python", "benchmarks/limits.py", *sys.argv[1:]])

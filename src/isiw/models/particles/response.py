@@ -28,14 +28,14 @@ __all__ = [
     "evoked_mean",
     "log_gain",
     "log_likelihood",
-    "node_weights",
     "outcome_density",
 ]
 
 NODES = 8
 NODE_REACH = 2.6
 BETWEEN_NODES = 0.4 * 2.0 * NODE_REACH / (NODES - 1)
-"""SD of the part of a standard normal variable that lies between the nodes."""
+ON_NODES = math.sqrt(1.0 - BETWEEN_NODES**2)
+"""SDs of the two parts of a standard normal variable: the one between the nodes, and the one on them."""
 
 FAR_BELOW = 15.0
 """How far below saturation the constant-CV response sits, in logits: the sigmoid is an exponential there."""
@@ -46,7 +46,6 @@ STEEPEST_ROOT = 0.2
 OUTLIER_PROBABILITY = 0.03
 OUTLIER_LOG_RANGE = (math.log(2.0), math.log(200.0))
 """Artefacts and false positives: log-uniform between these multiples of the floor."""
-
 
 STARTUP = (0.29, 0.20)
 """What the first trials have on top of the others, natural log: measured on single trials in blocks."""
@@ -111,19 +110,18 @@ def log_gain(response: Response, order: Tensor) -> Tensor:
 
 
 def _nodes(like: Tensor) -> Tensor:
-    reach = NODE_REACH * math.sqrt(1.0 - BETWEEN_NODES**2)
+    reach = NODE_REACH * ON_NODES
     return torch.linspace(-reach, reach, NODES, device=like.device, dtype=like.dtype)
 
 
-def node_weights(like: Tensor) -> Tensor:
-    """Weights of the nodes of the input noise, shape (q,)."""
-    density = torch.exp(-0.5 * _nodes(like).square() / (1.0 - BETWEEN_NODES**2))
+def _node_weights(like: Tensor) -> Tensor:
+    density = torch.exp(-0.5 * (_nodes(like) / ON_NODES).square())
     return density / density.sum()
 
 
 def _over_nodes(values: Tensor, axis: int = -2) -> Tensor:
     """Expectation over the input noise: the weighted sum along the axis of the nodes."""
-    weights = node_weights(values).view(-1, *(1 for _ in range(-1 - axis)))
+    weights = _node_weights(values).view(-1, *(1 for _ in range(-1 - axis)))
     expectation: Tensor = (values * weights).sum(axis)
     return expectation
 
@@ -185,14 +183,13 @@ def evoked_mean(response: Response, level: Tensor) -> Tensor:
     Returns:
         Shape (..., p, t).
     """
-    curve = _curve(response)
     # The expectation is smooth in the input noise: nodes that have all of its variance are enough.
-    nodes = curve.spread / math.sqrt(1.0 - BETWEEN_NODES**2)
-    share = _over_nodes(torch.sigmoid(_drive(response, level).unsqueeze(-2) + nodes.unsqueeze(-1)))
-    mean = curve.scale * share * torch.exp(0.5 * curve.output)
-    constant_cv = response.log_ratio.exp().unsqueeze(-1) * level
+    spread = response.spread.unsqueeze(-1) * _nodes(level) / ON_NODES
+    share = _over_nodes(torch.sigmoid(_drive(response, level).unsqueeze(-2) + spread.unsqueeze(-1)))
+    recruited = share * torch.exp(0.5 * response.output_log_sd.square()).unsqueeze(-1)
     recruits = (response.kind == NoiseKind.RECRUITMENT).unsqueeze(-1)
-    return torch.where(recruits, mean, constant_cv) * _response_probability(response, level)
+    mean = response.log_ratio.exp().unsqueeze(-1) * torch.where(recruits, recruited, level)
+    return mean * _response_probability(response, level)
 
 
 def _components(response: Response, level: Tensor, gain: Tensor | float = 0.0) -> tuple[Tensor, Tensor]:
@@ -301,7 +298,7 @@ def draw_log_mep(response: Response, level: Tensor, generator: torch.Generator, 
         Shape (..., p, n).
     """
     mean, inverse_sd = _components(response, level, gain)
-    node = torch.multinomial(node_weights(level), level.numel(), replacement=True, generator=generator)
+    node = torch.multinomial(_node_weights(level), level.numel(), replacement=True, generator=generator)
     picks = node.view(level.shape).unsqueeze(-2)
     mean, inverse_sd = (x.gather(-2, picks).squeeze(-2) for x in (mean, inverse_sd))
     z = torch.randn(level.shape, generator=generator, device=level.device)
