@@ -3,7 +3,8 @@
     python benchmarks/latency.py > benchmarks/results/latency.md
 
 Each strategy examines the same simulated people of the `recruitment` cohort in the valve space. Timed are the asks and
-tells of trials 46 to 55, each ask with the tell before it; the other trials are run but not counted. Plain BoTorch is a
+tells of trials 46 to 55, each ask with the tell before it; the other trials are run but not counted. The default is
+then timed through a whole long session, and the memory told that the process has needed until then. Plain BoTorch is a
 `SingleTaskGP` fitted to all trials after each, and `qNegIntegratedPosteriorVariance` over the same candidate ISIs.
 """
 
@@ -13,6 +14,7 @@ import argparse
 import importlib.metadata
 import os
 import platform
+import resource
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -72,18 +74,25 @@ class PlainBotorch:
         self.meps_mv.append(mep_mv)
 
 
-def waits_s(make: Callable[[int], Asked], people: int, seed: int) -> Iterator[float]:
-    """Durations of a tell and the ask that follows it [s], at around 50 trials."""
+def waits_s(make: Callable[[int], Asked], people: int, seed: int, timed: range) -> Iterator[tuple[float, float]]:
+    """Durations of a tell, and of the ask that follows it [s], at some trials."""
     for number, person in enumerate(cohort("recruitment", people, seed)):
         player, responder = make(seed + number), person.begin(seed + number)
         isi_ms = player.ask()
-        for trial in range(1, TIMED_TRIALS.stop):
+        for trial in range(1, timed.stop):
             response = responder.respond(isi_ms, isiw.VALVE_SPACE.reference)
             began_s = time.perf_counter()
             player.tell(response.isi_ms, response.mep_mv)
+            told_s = time.perf_counter()
             isi_ms = player.ask()
-            if trial in TIMED_TRIALS:
-                yield time.perf_counter() - began_s
+            if trial in timed:
+                yield told_s - began_s, time.perf_counter() - told_s
+
+
+def told(taken_s: np.ndarray) -> str:
+    """Median, 99th percentile and maximum [ms], as cells of a table."""
+    middle, late, largest = 1e3 * np.percentile(taken_s, (50, 99, 100))
+    return f"{middle:.1f} | {late:.1f} | {largest:.1f}"
 
 
 def makers() -> dict[str, Callable[[int], Asked]]:
@@ -99,6 +108,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--people", type=int, default=10)
     parser.add_argument("--seed", type=int, default=10_000)
+    parser.add_argument("--through", type=int, default=200, help="trials of the long session")
+    parser.add_argument("--long-people", type=int, default=2, help="long sessions")
     parser.add_argument("--strategies", default=",".join(makers()), help="comma-separated")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
@@ -111,9 +122,15 @@ def main() -> None:
     print(f"{arguments.people} people of `recruitment`, seed {arguments.seed}; tell + ask at 46 to 55 trials [ms]\n")
     print("| strategy | median | 99th percentile | largest |\n|---|---|---|---|")
     for name in track(names, "timing", console=Console(stderr=True)):
-        taken_ms = 1e3 * np.array(list(waits_s(makers()[name], arguments.people, arguments.seed)))
-        middle, late = np.percentile(taken_ms, (50, 99))
-        print(f"| {name} | {middle:.1f} | {late:.1f} | {taken_ms.max():.1f} |", flush=True)
+        taken_s = np.array(list(waits_s(makers()[name], arguments.people, arguments.seed, TIMED_TRIALS)))
+        print(f"| {name} | {told(taken_s.sum(1))} |", flush=True)
+    through = range(1, arguments.through + 1)
+    print(f"\nThe default, {arguments.long_people} people, trials 1 to {arguments.through} [ms]\n")
+    print("| | median | 99th percentile | largest |\n|---|---|---|---|")
+    taken_s = np.array(list(waits_s(makers()["default"], arguments.long_people, arguments.seed, through)))
+    for verb, column in zip(("tell", "ask"), taken_s.T, strict=True):
+        print(f"| {verb} | {told(column)} |")
+    print(f"\nLargest resident memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
 
 
 if __name__ == "__main__":

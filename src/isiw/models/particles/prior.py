@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple, TypeAlias
 
 import torch
@@ -211,16 +212,24 @@ def start_ms(
         hit_delay_ms: mean and SD of the impact on the clock of the valve [ms].
         p_anywhere: probability that the start lies anywhere in the range instead, or up to 50 ms before it.
     """
+    cdf, knots = _start_cdf(space, after_impact_ms, hit_delay_ms, p_anywhere)
+    return _interpolate(torch.special.ndtr(z), cdf.to(z), knots.to(z))
+
+
+@lru_cache(maxsize=16)
+def _start_cdf(
+    space: DesignSpace, after_impact_ms: tuple[float, float], hit_delay_ms: tuple[float, float], p_anywhere: float
+) -> tuple[Tensor, Tensor]:
+    """Probability that a window starts before each of some knots, and the knots [ms]; see `start_ms`."""
     shift, blur = hit_delay_ms if space.reference == "valve" else (0.0, 1.0)
     low, high = (edge + shift for edge in after_impact_ms)
-    knots = torch.linspace(space.low_ms - 50.0, space.high_ms, 512, device=z.device, dtype=z.dtype)
+    knots = torch.linspace(space.low_ms - 50.0, space.high_ms, 512, dtype=torch.float64)
     edges = [torch.special.ndtr((knots - edge) / blur) * (knots - edge) for edge in (low, high)]
     bumps = [torch.exp(-0.5 * ((knots - edge) / blur) ** 2) * blur / math.sqrt(2 * math.pi) for edge in (low, high)]
     informed = (edges[0] + bumps[0] - edges[1] - bumps[1]) / (high - low)
     informed = (informed - informed[0]) / (informed[-1] - informed[0]).clamp_min(1e-6)
     anywhere = (knots - knots[0]) / (knots[-1] - knots[0])
-    cdf = (1 - p_anywhere) * informed + p_anywhere * anywhere
-    return _interpolate(torch.special.ndtr(z), cdf, knots)
+    return (1 - p_anywhere) * informed + p_anywhere * anywhere, knots
 
 
 def _interpolate(x: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
