@@ -3,8 +3,8 @@
     python benchmarks/latency.py > benchmarks/results/latency.md
 
 Each strategy examines the same simulated people of the `recruitment` cohort in the valve space. Timed are the asks and
-tells of trials 46 to 55, each ask with the tell before it; the other trials are run but not counted. The default is
-then timed through a whole long session, and the memory told that the process has needed until then. Plain BoTorch is a
+tells of trials 46 to 55, each ask with the tell before it; the other trials are run but not counted. Before
+that the default is timed through whole long sessions, and the memory told that the process needs for them. Plain BoTorch is a
 `SingleTaskGP` fitted to all trials after each, and `qNegIntegratedPosteriorVariance` over the same candidate ISIs.
 """
 
@@ -119,18 +119,18 @@ def main() -> None:
     packages = ("isiw", "torch", "botorch", "gpytorch", "pyro-ppl", "scikit-learn", "numpy")
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
     print(f"python {platform.python_version()}, {versions}; {platform.machine()}, one thread\n")
+    through = range(1, arguments.through + 1)
+    print(f"The default, {arguments.long_people} people, trials 1 to {arguments.through} [ms]\n")
+    print("| | median | 99th percentile | largest |\n|---|---|---|---|")
+    taken_s = np.array(list(waits_s(makers()["default"], arguments.long_people, arguments.seed, through)))
+    for verb, column in zip(("tell", "ask"), taken_s.T, strict=True):
+        print(f"| {verb} | {told(column)} |")
+    print(f"\nLargest resident memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB\n")
     print(f"{arguments.people} people of `recruitment`, seed {arguments.seed}; tell + ask at 46 to 55 trials [ms]\n")
     print("| strategy | median | 99th percentile | largest |\n|---|---|---|---|")
     for name in track(names, "timing", console=Console(stderr=True)):
         taken_s = np.array(list(waits_s(makers()[name], arguments.people, arguments.seed, TIMED_TRIALS)))
         print(f"| {name} | {told(taken_s.sum(1))} |", flush=True)
-    through = range(1, arguments.through + 1)
-    print(f"\nThe default, {arguments.long_people} people, trials 1 to {arguments.through} [ms]\n")
-    print("| | median | 99th percentile | largest |\n|---|---|---|---|")
-    taken_s = np.array(list(waits_s(makers()["default"], arguments.long_people, arguments.seed, through)))
-    for verb, column in zip(("tell", "ask"), taken_s.T, strict=True):
-        print(f"| {verb} | {told(column)} |")
-    print(f"\nLargest resident memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
 
 
 if __name__ == "__main__":
