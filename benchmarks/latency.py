@@ -3,8 +3,8 @@
     python benchmarks/latency.py > benchmarks/results/latency.md
 
 Each strategy examines the same simulated people of the `recruitment` cohort in the valve space. Timed are the asks and
-tells of trials 46 to 55, each ask with the tell before it; the other trials are run but not counted. Before
-that the default is timed through whole long sessions, and the memory told that the process needs for them. Plain BoTorch is a
+tells of trials 46 to 55, each ask with the tell before it; the other trials are run but not counted. Before that the
+default is timed through whole long sessions, and the memory told that the process needs for them. Plain BoTorch is a
 `SingleTaskGP` fitted to all trials after each, and `qNegIntegratedPosteriorVariance` over the same candidate ISIs.
 """
 
