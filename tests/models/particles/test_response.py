@@ -5,6 +5,7 @@ import pytest
 import torch
 from scipy.stats import kstest
 
+from isiw.models.particles import response as response_module
 from isiw.models.particles.response import (
     OUTLIER_PROBABILITY,
     NoiseKind,
@@ -121,3 +122,19 @@ def test_a_gain_is_the_gain_of_the_simulated_persons_trials(believed: Response, 
     level, gain = torch.full((1, 1, 3), 0.6), torch.full((1, 1, 3), log_gain_of_trial)
     below = log_likelihood(believed, level, torch.full_like(log_mep, -torch.inf), log_mep, gain).exp()
     assert below[0, 0].tolist() == pytest.approx([0.25, 0.5, 0.75], abs=0.05)
+
+
+@pytest.mark.parametrize("spread", [1.6, 2.8])
+@pytest.mark.parametrize("output_log_sd", [0.3, 0.5])
+def test_few_nodes_predict_what_many_do(monkeypatch: pytest.MonkeyPatch, spread: float, output_log_sd: float) -> None:
+    # Divergence [nat a trial]; the means over such responses are in the decision record on nodes and moves.
+    believed = particle(NoiseKind.RECRUITMENT, log_ratio=math.log(16.0), spread=spread, output_log_sd=output_log_sd)
+    log_mep = torch.linspace(math.log(1e-3), math.log(2.0), 400)[None, None]
+    few = outcome_density(believed, LEVELS, log_mep)
+    for name, value in {"NODES": 300, "NODE_REACH": 5.0, "BETWEEN_NODES": 0.0, "ON_NODES": 1.0}.items():
+        monkeypatch.setattr(response_module, name, value)
+    many = outcome_density(believed, LEVELS, log_mep)
+    step = (log_mep[0, 0, 1] - log_mep[0, 0, 0]).item()
+    divergence = (many * (many / few).log()).sum(-1) * step
+    assert (many.sum(-1) * step - 1).abs().max() < 0.02
+    assert divergence.max() < 0.015
