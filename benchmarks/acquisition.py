@@ -105,6 +105,13 @@ def lasting(table: pd.DataFrame) -> pd.DataFrame:
     )
 
 
+def facts_of(script: str, seed: int, people: int) -> dict[str, object]:
+    """What a run was."""
+    versions = {m.__name__: m.__version__ for m in (isiw, torch, np)} | {"python": platform.python_version()}
+    command = shlex.join(["python", script, *sys.argv[1:]])
+    return {"command": command, "versions": versions, "seed": seed, "people": people}
+
+
 def write(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
     """Tables and picture."""
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -205,11 +212,7 @@ def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
         tables = [run(part, folder / str(number), workers, progress) for number, part in enumerate(studies)]
         if amplitude == 1.0:
             tables.append(run_oracle(replace(study, people=min(people, oracle_people)), workers, progress))
-    versions = {m.__name__: m.__version__ for m in (isiw, torch, np)} | {"python": platform.python_version()}
-    command = shlex.join(["python", "benchmarks/acquisition.py", *sys.argv[1:]])
-    facts = {"command": command, "versions": versions, "seed": seed, "people": people}
-    rows = pd.concat(tables, ignore_index=True)
-    write(rows, facts, out)
+    write(pd.concat(tables, ignore_index=True), facts_of("benchmarks/acquisition.py", seed, people), out)
     print(out.with_suffix(".md").read_text())
 
 

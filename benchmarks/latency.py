@@ -15,6 +15,8 @@ import importlib.metadata
 import os
 import platform
 import resource
+import shlex
+import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -118,7 +120,8 @@ def main() -> None:
     names = arguments.strategies.split(",")
     packages = ("isiw", "torch", "botorch", "gpytorch", "pyro-ppl", "scikit-learn", "numpy")
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
-    print(f"python {platform.python_version()}, {versions}; {platform.machine()}, one thread\n")
+    print(f"- command: `{shlex.join(['python', 'benchmarks/latency.py', *sys.argv[1:]])}`")
+    print(f"- python {platform.python_version()}, {versions}; {platform.machine()}, one thread\n")
     through = range(1, arguments.through + 1)
     print(f"The default, {arguments.long_people} people, trials 1 to {arguments.through} [ms]\n")
     print("| | median | 99th percentile | largest |\n|---|---|---|---|")

@@ -9,20 +9,14 @@ same people as in `benchmarks/acquisition.py` with the same seed; what it writes
 
 from __future__ import annotations
 
-import platform
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import pandas as pd
-import torch
 import typer
 from rich.progress import Progress
 
-import isiw
-from acquisition import MARKS, run, run_oracle, write
+from acquisition import MARKS, facts_of, run, run_oracle, write
 from isiw.studies import Study, StudyStrategy
 
 # The laws of the cohorts; scales are median, SD and tail, of the logarithm where it is one. Uniform and fixed numbers
@@ -85,9 +79,7 @@ def main(
         for name, study in studies(plan | {"engine": "batched"}).items():
             tables += [run(study, out.with_suffix(".parts") / name, workers, progress)]
             tables += [run_oracle(study, workers, progress)]
-    versions = {m.__name__: m.__version__ for m in (isiw, torch, np)} | {"python": platform.python_version()}
-    command = shlex.join(["python", "benchmarks/limits.py", *sys.argv[1:]])
-    write(pd.concat(tables, ignore_index=True), {"command": command, "versions": versions, "seed": seed}, out)
+    write(pd.concat(tables, ignore_index=True), facts_of("benchmarks/limits.py", seed, people), out)
     print(out.with_suffix(".md").read_text())
 
 

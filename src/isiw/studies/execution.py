@@ -171,15 +171,16 @@ class DaskCluster:
                     suspects.append(item)
                 elif not isinstance(result := _result_of(future), _Lost):
                     yield item, result
-                elif client.status != "running":
-                    raise StudyError("the Dask scheduler was lost", remedy="Run again: what is finished is kept.")
-                elif losses + 1 < self.attempts:
+                elif _reached(client) and losses + 1 < self.attempts:
                     hand_out(item, losses + 1)
                 else:
                     yield item, Failure(f"Its result was lost on the cluster {self.attempts} times.")
             for item in suspects:
-                result = _result_of(client.submit(_attempt_alone, run, item, pure=False))
-                yield item, Failure("Its result was lost on the cluster.") if isinstance(result, _Lost) else result
+                hand_out(item)
+                held.pop((future := next(running)).key)
+                result = _result_of(future)
+                lost = isinstance(result, _Lost) and _reached(client)
+                yield item, Failure("Its result was lost on the cluster.") if lost else result
 
 
 class _HandedOut(NamedTuple, Generic[_Item]):
@@ -208,6 +209,13 @@ def _client(dask: Any, address: str) -> Any:
         raise StudyError(
             "the Dask scheduler cannot be reached", got=address, remedy="Check its address, and that it is running."
         ) from error
+
+
+def _reached(client: Any) -> bool:
+    """True; an error where the scheduler was lost, since then nothing more will come."""
+    if client.status != "running":
+        raise StudyError("the Dask scheduler was lost", remedy="Run again: what is finished is kept.")
+    return True
 
 
 def _cancel(client: Any, held: Mapping[str, _HandedOut[Any]]) -> None:

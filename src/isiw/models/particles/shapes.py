@@ -70,10 +70,8 @@ def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:
     flat, double = shape.kind == ShapeKind.PLATEAU, shape.kind == ShapeKind.TWO_PEAK
     square[flat] = square[flat].pow(torch.exp(0.75 * (shape.form[flat] + 1.0)).unsqueeze(-1))
     level = square.mul_(-2.0 / math.log(2.0)).exp2_()  # much faster than powers of e
-    share = (isi_ms.expand_as(level)[double] - shape.start_ms[double].unsqueeze(-1)) / shape.width_ms[double].unsqueeze(
-        -1
-    )
-    level[double] = _two_peaks(shape.form[double].unsqueeze(-1), share)
+    form, start_ms, width_ms = (field[double].unsqueeze(-1) for field in (shape.form, shape.start_ms, shape.width_ms))
+    level[double] = _two_peaks(form, (isi_ms.expand_as(level)[double] - start_ms) / width_ms)
     return level
 
 
