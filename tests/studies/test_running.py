@@ -160,7 +160,9 @@ def test_the_death_of_a_worker_in_mid_study_loses_no_row(tmp_path):
     pd.testing.assert_frame_equal(timeless(store.rows()), timeless(conduct(study, tmp_path / "whole").rows()))
 
 
-COMMAND = [sys.executable, "-c", "from isiw.cli import app; app()"]
+# Whoever runs the tests in the background has its children ignore Ctrl-C.
+LISTEN = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+COMMAND = [sys.executable, "-c", f"{LISTEN}; from isiw.cli import app; app()"]
 
 
 @pytest.fixture
