@@ -33,7 +33,7 @@ PEOPLE: dict[str, Any] = {
 TOLD: dict[str, dict[str, Any]] = {
     "recruitment": PEOPLE
     | {
-        "p_noise": [0.0, 0.0, 1.0],
+        "p_noise": [0.0, 0.0, 1.0, 0.0],
         "floor_mv": [0.010, 0.25, 0.0],
         "floor_log_sd": [0.18, 0.2, 0.0],
         "recruitment_ratio": [16.0, 0.43, 0.0],
@@ -44,7 +44,7 @@ TOLD: dict[str, dict[str, Any]] = {
     },
     "gaussian": PEOPLE
     | {
-        "p_noise": [1.0, 0.0, 0.0],
+        "p_noise": [1.0, 0.0, 0.0, 0.0],
         "floor_mv": [0.008, 0.3, 0.0],
         "floor_log_sd": [0.35, 0.02, 0.0],
         "gain_ratio": [7.5, 0.58, 0.0],

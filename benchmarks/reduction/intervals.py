@@ -34,7 +34,7 @@ SETTINGS: Final[dict[str, Any]] = {
         "p_window": 1.0,
         "p_anywhere": 1.0,
         "p_shape": (1.0, 0.0, 0.0, 0.0),
-        "p_noise": (0.0, 1.0, 0.0),
+        "p_noise": (0.0, 1.0, 0.0, 0.0),
         "width_ms": (40.0, 0.5, 0.0),
         "max_probability": (1.0, 1.5),
     },

@@ -17,6 +17,7 @@ from isiw.models.particles.response import (
     outcome_density,
 )
 from isiw.recruitment import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
+from isiw.types import ArrayLike, FloatArray
 
 FLOOR = EmgFloor(0.010, 0.2)
 LEVELS = torch.tensor([[[0.0, 0.2, 0.6, 1.0]]])
@@ -32,10 +33,24 @@ def particle(kind: NoiseKind, **values: float) -> Response:
         "boost": 3.6,
         "rest": -4.5,
         "max_probability": 0.55,
+        "rest_probability": 0.1,
         "drift": 0.0,
         "startup": 0.0,
     }
     return Response(torch.tensor([[kind]]), *(torch.tensor([[v]]) for v in (defaults | values).values()))
+
+
+class AllOrNone:
+    """Responses of a usual size, 0.08 mV, at 10–55 % of the trials."""
+
+    floor = FLOOR
+
+    def expected_evoked_mv(self, facilitation: ArrayLike) -> FloatArray:
+        return 0.08 * (0.1 + 0.45 * np.asarray(facilitation))
+
+    def sample_evoked_mv(self, facilitation: float, noise: TrialNoise, rng: np.random.Generator) -> float:
+        responds = rng.random() < 0.1 + 0.45 * facilitation
+        return 0.08 * rng.gamma(0.6**-2, 0.6**2) * np.exp(noise.log_gain) if responds else 0.0
 
 
 PAIRS: list[tuple[Response, ResponseCurve]] = [
@@ -46,6 +61,7 @@ PAIRS: list[tuple[Response, ResponseCurve]] = [
         particle(NoiseKind.RECRUITMENT, log_ratio=math.log(16.0), spread=2.1),
         RecruitmentResponse(FLOOR, 0.16, 0.30, 105.0, 12.0, 7.0, 0.4),
     ),
+    (particle(NoiseKind.ALL_OR_NONE), AllOrNone()),
 ]
 
 

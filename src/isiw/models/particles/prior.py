@@ -84,7 +84,8 @@ class Prior:
         p_window: probability that there is any facilitation.
         p_shape: probabilities of Gaussian, skewed, flat-topped and two-peaked profiles. Most profiles pass a normality
             test (dissertation, 4.2: 8 of 11), the others are described in its outlook (8.1).
-        p_noise: probabilities of constant-CV noise, the same with missing responses, and a noisy recruitment curve.
+        p_noise: probabilities of constant-CV noise, the same with missing responses, a noisy recruitment curve, and
+            responses that are all or none: those of a very steep curve.
         start_ms: where windows start after the impact [ms], uniform between these.
         hit_delay_ms: mean and SD of the hit delay of a person unknown [ms]; 172–188 ms measured (dissertation, 4.2).
         p_anywhere: probability that a window starts anywhere in the range instead, for stimulators unlike that one.
@@ -96,6 +97,9 @@ class Prior:
         cv: logarithmic scale of the constant CV.
         max_probability: mean and SD, in logits, of the response probability at the best ISI; often about one half
             (dissertation, Fig. 6.5).
+        switch_probability: the same where responses are all or none.
+        rest_probability: mean and SD, in logits, of the probability of such a response without a tap; 0.05–0.25 of the
+            trials at 90 % RMT are above 50 µV in the hand, next to none in the forearm.
         recruitment_ratio: logarithmic scale of the largest MEP over the floor; 0.1–0.25 mV in forearm muscles, up to
             3 mV in the hand.
         input_sd: logarithmic scale of the input noise in logits: k sigma_x, 0.3 × 5–9 % RMT in the forearm.
@@ -111,7 +115,7 @@ class Prior:
 
     p_window: float = 0.72
     p_shape: tuple[float, float, float, float] = (0.68, 0.12, 0.08, 0.12)
-    p_noise: tuple[float, float, float] = (0.4, 0.15, 0.45)
+    p_noise: tuple[float, float, float, float] = (0.38, 0.12, 0.42, 0.08)
     start_ms: tuple[float, float] = (0.0, 115.0)
     hit_delay_ms: tuple[float, float] = (180.0, 6.2)
     p_anywhere: float = 0.08
@@ -121,6 +125,8 @@ class Prior:
     gain_ratio: Scale = (7.3, 0.6, 0.04)
     cv: Scale = (0.62, 0.25, 0.02)
     max_probability: tuple[float, float] = (0.2, 0.7)
+    switch_probability: tuple[float, float] = (1.2, 0.9)
+    rest_probability: tuple[float, float] = (-3.3, 1.0)
     recruitment_ratio: Scale = (16.0, 0.42, 0.04)
     input_sd: Scale = (2.1, 0.18, 0.015)
     output_sd: Scale = (0.39, 0.18, 0.02)
@@ -145,8 +151,12 @@ class Prior:
                 raise InvalidValueError(f"{name} is no scale", got=scale, expected="a median, an SD, and a cubic tail")
         if not all(math.isfinite(value) and value > 0 for value in self.hit_delay_ms):
             raise InvalidValueError("hit_delay_ms must be positive", got=self.hit_delay_ms)
-        if not all(math.isfinite(value) and value >= 0 for value in (self.drift_sd, *self.startup)):
-            raise InvalidValueError("drift_sd and startup must not be negative", got=(self.drift_sd, self.startup))
+        sds = [probability[1] for probability in (self.max_probability, self.switch_probability, self.rest_probability)]
+        if not all(math.isfinite(value) and value >= 0 for value in (self.drift_sd, *self.startup, *sds)):
+            raise InvalidValueError(
+                "drift_sd, startup and the SDs of probabilities must not be negative",
+                got=(self.drift_sd, self.startup, *sds),
+            )
         if not self.start_ms[0] < self.start_ms[1]:
             raise InvalidValueError("start_ms is empty", got=self.start_ms, expected="earliest < latest")
 
@@ -170,7 +180,7 @@ class Prior:
         shape = Shape(
             latents.shape, self._start(z["start"], space), _log_normal(z["width"], self.width_ms), _even(z["form"])
         )
-        recruits = latents.noise == NoiseKind.RECRUITMENT
+        recruits, switches = latents.noise == NoiseKind.RECRUITMENT, latents.noise == NoiseKind.ALL_OR_NONE
         response = Response(
             kind=latents.noise,
             log_floor=_log_normal(z["log_floor"], self.floor_mv).log(),
@@ -186,7 +196,12 @@ class Prior:
             output_log_sd=_log_normal(z["output"], self.output_sd),
             boost=_log_normal(z["boost"], self.boost),
             rest=self.rest[0] + _spread(z["rest"], self.rest),
-            max_probability=torch.sigmoid(self.max_probability[0] + self.max_probability[1] * z["output"]),
+            max_probability=torch.where(
+                switches,
+                _probability(z["output"], self.switch_probability),
+                _probability(z["output"], self.max_probability),
+            ),
+            rest_probability=_probability(z["rest"], self.rest_probability),
             drift=self.drift_sd * z["drift"],
             startup=self.startup[0] + self.startup[1] * z["startup"],
         )
@@ -255,6 +270,10 @@ def _spread(z: Tensor, scale: Scale) -> Tensor:
 
 def _log_normal(z: Tensor, scale: Scale) -> Tensor:
     return scale[0] * torch.exp(_spread(z, scale))
+
+
+def _probability(z: Tensor, logit: tuple[float, float]) -> Tensor:
+    return torch.sigmoid(logit[0] + logit[1] * z)
 
 
 def _even(z: Tensor) -> Tensor:

@@ -3,7 +3,8 @@
 Given input noise z, the evoked MEP relative to the EMG floor is `ratio * sigmoid(drive + spread(z))` with log-normal
 output noise. A recruitment curve has a drive that is linear in the facilitation and noise on that drive (Goetz et al.;
 the cohorts' `recruitment`). Noise of constant CV is the same formula far below saturation, with the logarithm of the
-facilitation as the drive and log-gamma noise. The noise on the input is integrated out on equidistant nodes; what lies
+facilitation as the drive and log-gamma noise; of the same formula are responses that are all or none, whose size is
+not the ISI's, but how often they come. The noise on the input is integrated out on equidistant nodes; what lies
 between two of them, a normal variable too, is passed on to the output along the slope of the curve at the node.
 
     mep / floor = floor noise + ratio * gain_n * sigmoid(drive + spread_q) * output noise,     q = 1 ... Q, weights w_q
@@ -60,6 +61,7 @@ class NoiseKind(IntEnum):
     GAIN = 0
     MISSING = 1
     RECRUITMENT = 2
+    ALL_OR_NONE = 3
 
 
 class Response(NamedTuple):
@@ -70,12 +72,13 @@ class Response(NamedTuple):
         log_floor: natural log of the median EMG floor [mV].
         floor_log_sd: SD of the floor from trial to trial, natural log.
         log_ratio: natural log of the largest evoked MEP over the floor (recruitment), or of the expected evoked MEP at
-            the best ISI over the floor (constant CV).
+            the best ISI, if there is one, over the floor (others).
         spread: SD of the input noise in logits (recruitment), or the CV.
         output_log_sd: SD of the output noise, natural log (recruitment).
         boost: shift of the drive at the best ISI, in logits (recruitment).
         rest: drive without a tap, in logits (recruitment).
-        max_probability: probability of a response at the best ISI (missing responses).
+        max_probability: probability of a response at the best ISI (missing responses, all or none).
+        rest_probability: probability of a response without a tap (all or none).
         drift: by how much the log of evoked MEPs will have changed after many trials.
         startup: how strongly the first trials startle; 1 is `STARTUP`.
     """
@@ -89,6 +92,7 @@ class Response(NamedTuple):
     boost: Tensor
     rest: Tensor
     max_probability: Tensor
+    rest_probability: Tensor
     drift: Tensor
     startup: Tensor
 
@@ -151,7 +155,7 @@ class _Curve(NamedTuple):
 
 
 def _curve(response: Response, gain: Tensor | float = 0.0) -> _Curve:
-    recruits = (response.kind == NoiseKind.RECRUITMENT).unsqueeze(-1)
+    recruits = _is(response, NoiseKind.RECRUITMENT)
     width = response.spread.unsqueeze(-1)
     log_gamma, slope = _log_gamma_nodes(response.spread)
     spread = torch.where(recruits, width * _nodes(width), log_gamma - FAR_BELOW)
@@ -161,16 +165,27 @@ def _curve(response: Response, gain: Tensor | float = 0.0) -> _Curve:
     return _Curve(log_scale.exp(), spread, between, output)
 
 
+def _is(response: Response, kind: NoiseKind) -> Tensor:
+    """Which particles are of a kind, shape (..., p, 1)."""
+    return (response.kind == kind).unsqueeze(-1)
+
+
+def _size(response: Response, level: Tensor) -> Tensor:
+    """How large a response is, as a share of that at the best ISI, by facilitation (..., p, t)."""
+    return torch.where(_is(response, NoiseKind.ALL_OR_NONE), 1.0, level)
+
+
 def _drive(response: Response, level: Tensor) -> Tensor:
     """Drive in logits by facilitation (..., p, t)."""
-    recruits = (response.kind == NoiseKind.RECRUITMENT).unsqueeze(-1)
     linear = response.rest.unsqueeze(-1) + response.boost.unsqueeze(-1) * level
-    return torch.where(recruits, linear, torch.log(level.clamp_min(1e-9)))
+    log_size = torch.log(_size(response, level).clamp_min(1e-9))
+    return torch.where(_is(response, NoiseKind.RECRUITMENT), linear, log_size)
 
 
 def _response_probability(response: Response, level: Tensor) -> Tensor:
-    missing = (response.kind == NoiseKind.MISSING).unsqueeze(-1)
-    return torch.where(missing, response.max_probability.unsqueeze(-1) * level.sqrt(), 1.0)
+    most, least = response.max_probability.unsqueeze(-1), response.rest_probability.unsqueeze(-1)
+    now_and_then = torch.where(_is(response, NoiseKind.MISSING), most * level.sqrt(), 1.0)
+    return torch.where(_is(response, NoiseKind.ALL_OR_NONE), least + (most - least) * level, now_and_then)
 
 
 def evoked_mean(response: Response, level: Tensor) -> Tensor:
@@ -187,8 +202,8 @@ def evoked_mean(response: Response, level: Tensor) -> Tensor:
     spread = response.spread.unsqueeze(-1) * _nodes(level) / ON_NODES
     share = _over_nodes(torch.sigmoid(_drive(response, level).unsqueeze(-2) + spread.unsqueeze(-1)))
     recruited = share * torch.exp(0.5 * response.output_log_sd.square()).unsqueeze(-1)
-    recruits = (response.kind == NoiseKind.RECRUITMENT).unsqueeze(-1)
-    mean = response.log_ratio.exp().unsqueeze(-1) * torch.where(recruits, recruited, level)
+    size = torch.where(_is(response, NoiseKind.RECRUITMENT), recruited, _size(response, level))
+    mean = response.log_ratio.exp().unsqueeze(-1) * size
     return mean * _response_probability(response, level)
 
 
