@@ -127,10 +127,10 @@ class Prior:
     max_probability: tuple[float, float] = (0.2, 0.7)
     switch_probability: tuple[float, float] = (1.2, 0.9)
     rest_probability: tuple[float, float] = (-3.3, 1.0)
-    recruitment_ratio: Scale = (16.0, 0.42, 0.04)
+    recruitment_ratio: Scale = (16.0, 0.42, 0.07)
     input_sd: Scale = (2.1, 0.18, 0.015)
     output_sd: Scale = (0.39, 0.18, 0.02)
-    boost: Scale = (3.4, 0.33, 0.02)
+    boost: Scale = (3.4, 0.33, 0.05)
     rest: Scale = (-4.5, 0.38, 0.05)
     drift_sd: float = 0.3
     startup: tuple[float, float] = (0.5, 0.5)
