@@ -52,6 +52,11 @@ def sampled_meps_mv(person: Person, isi_ms: float, generator: torch.Generator) -
     return ends[picks.clamp_max(len(ends) - 1)].exp()[:, 0].tolist()
 
 
+def spread_ms(estimate: WindowEstimate) -> np.ndarray:
+    """Posterior SDs of the edges [ms]; one beyond the range is at its end."""
+    return np.std(np.clip(estimate.edge_samples_ms, 0.0, 500.0), axis=0)
+
+
 def mean_medians_ms(estimates: list[WindowEstimate]) -> np.ndarray:
     return np.mean([np.median(estimate.edge_samples_ms, axis=0) for estimate in estimates], axis=0)
 
@@ -147,7 +152,7 @@ def test_moved_particles_agree_with_plain_importance_sampling() -> None:
     assert ess > 500
     expected = reference.estimate()
     got = [after(ParticleModel(particles=1000), trials, seed).estimate() for seed in range(4)]
-    scale = np.std(np.clip(expected.edge_samples_ms, -50, 550), axis=0)
+    scale = spread_ms(expected)
     medians = np.median([np.median(e.edge_samples_ms, axis=0) for e in got], axis=0)
     assert np.abs((medians - [expected.start_ms, expected.end_ms]) / scale).max() < 0.2
     assert np.mean([e.probability for e in got]) == pytest.approx(expected.probability, abs=0.03)
@@ -160,7 +165,7 @@ def test_the_order_of_trials_matters_little() -> None:
         [after(ParticleModel(), order, seed).estimate() for seed in range(6)] for order in (trials, trials[::-1])
     )
     gap = np.abs(mean_medians_ms(forth) - mean_medians_ms(back))
-    assert (gap < 0.5 * np.std(forth[0].edge_samples_ms, axis=0)).all()
+    assert (gap < 0.5 * spread_ms(forth[0])).all()
 
 
 def test_a_clear_responder_is_found_and_a_silent_person_is_not_given_a_window() -> None:
@@ -182,7 +187,7 @@ def test_the_unit_of_the_amplitude_is_learnt(factor: float) -> None:
     )
     assert min(e.probability for e in scaled) > 0.9
     gap = np.abs(mean_medians_ms(usual) - mean_medians_ms(scaled))
-    assert (gap < np.std(usual[0].edge_samples_ms, axis=0)).all()
+    assert (gap < spread_ms(usual[0])).all()
 
 
 @pytest.mark.parametrize(
@@ -280,7 +285,8 @@ def test_a_model_that_cannot_be_is_refused(wrong) -> None:
 
 @pytest.mark.parametrize("isi_ms", [180.0, 260.0, 330.0, 450.0])
 def test_mutual_information_agrees_with_brute_force_within_its_error(isi_ms: float) -> None:
-    # 25600 MEPs drawn from the law itself, each weighed under its own sample and under all 128; three standard errors.
+    # 25600 MEPs drawn from the law itself, each weighed under its own sample and under all 128; three standard errors,
+    # and the tables' own error: with four times the outcomes and levels these scores are 0.6 to 3.2 % larger.
     posterior = after(ParticleModel(thinned=128), [(100.0, 0.01), (250.0, 0.09), (280.0, 0.12), (400.0, 0.012)])
     person = posterior._thinned.person  # noqa: SLF001 - the samples that the score is of
     draws, samples = 200, person.present.shape[1]
@@ -293,4 +299,4 @@ def test_mutual_information_agrees_with_brute_force_within_its_error(isi_ms: flo
     information = own - torch.logsumexp(each, dim=0) + math.log(samples)
     error = information.std().item() / math.sqrt(len(information))
     score = mutual_information(posterior, torch.tensor([isi_ms])).item()
-    assert score == pytest.approx(information.mean().item(), abs=3 * error)
+    assert score == pytest.approx(information.mean().item(), abs=3 * error + 0.03 * score)
