@@ -2,8 +2,8 @@
 
     python benchmarks/recorded.py --out benchmarks/results/recorded
 
-What facilitation does to recorded amplitudes is put together in five ways, of which the models know none, and silent
-people have theirs as well (`recorded_people.py`). What it writes is told as in `benchmarks/acquisition.py`.
+What facilitation does to recorded amplitudes is put together in five ways, and silent people have theirs as well
+(`recorded_people.py`). What it writes is told as in `benchmarks/acquisition.py`.
 """
 
 from __future__ import annotations

@@ -7,10 +7,10 @@ repository NeuromodulationUEF/MEPFeatX) are not part of this repository.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import pandas as pd
@@ -23,17 +23,9 @@ from isiw.types import ArrayLike, FloatArray
 
 FOLDER = Path("../shared/data/uef")
 AT_REST_MV = 0.013
-"""The forearm's recruitment curve has sixteen sweeps without a MEP, below this."""
+"""The forearm's recruitment curve has fourteen sweeps without a MEP, below this."""
 NO_FLOOR = EmgFloor(1e-6, 0.0)
 """A recorded sweep has its floor already."""
-SILENT = "silent"
-
-
-class MakesResponse(Protocol):
-    """A kind of people: one person's response from chance."""
-
-    def __call__(self, rng: np.random.Generator) -> ResponseCurve:
-        """The response."""
 
 
 @cache
@@ -157,13 +149,13 @@ def _silent(rng: np.random.Generator) -> Switched:
     return Switched(float(rng.uniform(0.05, 1.0)) * hand_mv(), share, share)
 
 
-PEOPLE: dict[str, MakesResponse] = {
+PEOPLE: dict[str, Callable[[np.random.Generator], ResponseCurve]] = {
     "switched-hand": lambda _rng: Switched(hand_mv()),
     "switched-forearm": lambda _rng: Switched(forearm_mv()[18:45]),
     "now-and-then": _now_and_then,
     "scaled": _scaled,
     "climbed": _climbed,
-    SILENT: _silent,
+    "silent": _silent,
 }
 
 
