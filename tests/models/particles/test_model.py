@@ -285,8 +285,7 @@ def test_a_model_that_cannot_be_is_refused(wrong) -> None:
 
 @pytest.mark.parametrize("isi_ms", [180.0, 260.0, 330.0, 450.0])
 def test_mutual_information_agrees_with_brute_force_within_its_error(isi_ms: float) -> None:
-    # 25600 MEPs drawn from the law itself, each weighed under its own sample and under all 128; three standard errors,
-    # and the tables' own error: with four times the outcomes and levels these scores are 0.6 to 3.2 % larger.
+    # 25600 MEPs drawn from the law itself, each weighed under its own sample and under all 128; three standard errors.
     posterior = after(ParticleModel(thinned=128), [(100.0, 0.01), (250.0, 0.09), (280.0, 0.12), (400.0, 0.012)])
     person = posterior._thinned.person  # noqa: SLF001 - the samples that the score is of
     draws, samples = 200, person.present.shape[1]
@@ -299,4 +298,4 @@ def test_mutual_information_agrees_with_brute_force_within_its_error(isi_ms: flo
     information = own - torch.logsumexp(each, dim=0) + math.log(samples)
     error = information.std().item() / math.sqrt(len(information))
     score = mutual_information(posterior, torch.tensor([isi_ms])).item()
-    assert score == pytest.approx(information.mean().item(), abs=3 * error + 0.03 * score)
+    assert score == pytest.approx(information.mean().item(), abs=3 * error)

@@ -109,7 +109,7 @@ class PersonSample:
         top = response.log_floor + torch.log1p(self._evoked.amax(-1))
         low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
         high = torch.quantile(top, 0.95, dim=-1) + 1.5
-        share = torch.linspace(0.0, 1.0, OUTCOMES, device=low.device)
+        share = (torch.arange(OUTCOMES, device=low.device) + 0.5) / OUTCOMES  # the middle of each outcome's cell
         log_mep = (low.unsqueeze(-1) + share * (high - low).unsqueeze(-1)).unsqueeze(-2)
         density = in_pieces(
             lambda r, grid: outcome_density(r, self._levels, grid), response, (log_mep,), LEVELS * OUTCOMES * NODES
