@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import signal
 import threading
 
 import pytest
 
 from isiw.errors import InvalidValueError, StudyError
 from isiw.studies.execution import DaskCluster, Failure, Processes, _attempt_alone
-from studies.tiny import double, double_or_die, double_or_die_once
+from studies.tiny import double, double_or_die, double_or_die_once, process_id
 
 posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 
@@ -37,6 +38,16 @@ def test_what_runs_while_a_worker_dies_is_run_again(tmp_path):
     items = [(number, tmp_path / "witness") for number in range(6)]
     results = [(item[0], result) for item, result in Processes(2).results(double_or_die_once, items)]
     assert sorted(results) == [(number, 2 * number) for number in range(6)]
+
+
+@posix
+def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for():
+    results = Processes(2).results(process_id, range(20))
+    _, first = next(results)
+    os.kill(first, signal.SIGINT)
+    rest = [result for _, result in results]
+    assert len(rest) == 19
+    assert first in rest
 
 
 def test_stopping_early_leaves_the_rest_undone():

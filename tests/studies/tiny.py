@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from pathlib import Path
 
 import pandas as pd
@@ -59,3 +60,9 @@ def double_or_die_once(item: tuple[int, Path]) -> int:
         witness.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return 2 * number
+
+
+def process_id(_number: int) -> int:
+    """After a moment, in which another worker has something to do, too."""
+    time.sleep(0.02)
+    return os.getpid()

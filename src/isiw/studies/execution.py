@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import importlib
 import os
+import signal
 import threading
 import time
 import traceback
@@ -241,13 +242,17 @@ def _attempt(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
 
 
 def _numbered(run: Callable[[_Item], _Result], number: int, item: _Item, parent: int) -> tuple[int, _Result | Failure]:
-    _leave_with(parent)
+    _serve(parent)
     return number, _attempt(run, item)
 
 
 @cache
-def _leave_with(parent: int) -> None:
-    """End this worker once its parent has died, which runs the study: nobody would fetch what it computes."""
+def _serve(parent: int) -> None:
+    """Make this worker end with its parent, which runs the study, and not before it.
+
+    Nobody would fetch what it computes once the parent has died; a terminal's Ctrl-C is the parent's to obey.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
         while os.getppid() == parent:
