@@ -170,7 +170,9 @@ def run_oracle(study: Study, workers: int, progress: Progress) -> pd.DataFrame:
 
 def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
     strategies: Annotated[str, typer.Option(help="Comma-separated; NAME or NAME:ACQUISITION.")] = "default",
-    others: Annotated[str, typer.Option(help="The same, with the first --other-people only.")] = "",
+    others: Annotated[str, typer.Option(help="The same, with the first --other-people only.")] = (
+        "particles-mi,gpr,nr,svmr,pf"
+    ),
     cohorts: Annotated[str, typer.Option(help="Cohorts, comma-separated.")] = ",".join(COHORTS),
     people: Annotated[int, typer.Option(help="People a cohort.")] = 200,
     other_people: Annotated[int, typer.Option(help="People a cohort for the others.")] = 50,

@@ -34,6 +34,7 @@ TOLD: dict[str, dict[str, Any]] = {
     "recruitment": PEOPLE
     | {
         "p_noise": [0.0, 0.0, 1.0, 0.0],
+        "p_hand": 0.0,
         "floor_mv": [0.010, 0.25, 0.0],
         "floor_log_sd": [0.18, 0.2, 0.0],
         "recruitment_ratio": [16.0, 0.43, 0.0],

@@ -139,7 +139,7 @@ def test_moves_without_trials_leave_the_prior_as_it_is() -> None:
     assert latents.z[0].mean(0).abs().max() < 0.05
     assert (latents.z[0].std(0) - 1).abs().max() < 0.04
     assert abs(latents.present.float().mean().item() - prior.p_window) < 0.025
-    for kinds, probabilities in ((latents.shape, prior.p_shape), (latents.noise, prior.p_noise)):
+    for kinds, probabilities in ((latents.shape, prior.p_shape), (latents.noise, prior.p_noise_of_particles)):
         shares = torch.bincount(kinds[0], minlength=len(probabilities)) / 8000
         assert (shares - torch.tensor(probabilities)).abs().max() < 0.025
 

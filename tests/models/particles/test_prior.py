@@ -1,5 +1,3 @@
-import math
-
 import pytest
 import torch
 
@@ -53,6 +51,7 @@ def test_a_prior_is_made_from_what_a_configuration_holds() -> None:
     "wrong",
     [
         {"p_window": 2.0},
+        {"p_hand": -0.1},
         {"p_anywhere": float("nan")},
         {"p_shape": (0.5, 0.5)},
         {"p_noise": (0.5, 0.3, 0.2)},
@@ -63,6 +62,8 @@ def test_a_prior_is_made_from_what_a_configuration_holds() -> None:
         {"boost": (3.0, 0.0, 0.1)},
         {"boost": (0.0, 0.3, 0.1)},
         {"rest": (-4.5, 0.4, -0.1)},
+        {"hand_rest": (-4.7, 0.0, 0.0)},
+        {"hand_ratio": (-1.0, 0.9, 0.0)},
         {"hit_delay_ms": (180.0, 0.0)},
         {"start_ms": (100.0, 5.0)},
     ],
@@ -77,13 +78,22 @@ def test_a_setting_that_the_prior_does_not_have_is_refused() -> None:
         prior_with({"p_windov": 0.5}, Prior)
 
 
-def test_most_people_are_usual_and_the_tail_reaches_the_others() -> None:
-    # Half of all lie within 0.68 SDs of the median, as without a tail; the hand's drive at rest, -6.2, and its largest
-    # MEPs, a hundred floors, are rare but there.
-    prior = Prior()
+def test_most_forearms_are_usual_and_the_tail_reaches_the_others() -> None:
+    # Half of all lie within 0.68 SDs of the median, as without a tail.
+    prior = Prior(p_hand=0.0)
     response = people(prior, VALVE_SPACE).response
-    recruits = response.kind[0] == NoiseKind.RECRUITMENT
-    rest = response.rest[0][recruits]
+    rest = response.rest[0][response.kind[0] == NoiseKind.RECRUITMENT]
     assert (rest - prior.rest[0]).abs().median().item() == pytest.approx(0.68 * prior.rest[1], rel=0.1)
-    for rare in (rest < -6.2, response.log_ratio[0][recruits] > math.log(100.0)):
-        assert 0.001 < rare.float().mean().item() < 0.03
+    assert 0.001 < (rest < -6.2).float().mean().item() < 0.03
+
+
+def test_hands_reach_from_small_meps_to_large_ones_at_threshold_and_below() -> None:
+    # A of 0.2 and 3 mV over a floor of 0.009 mV; k = 0.23 times 90 % and 100 % RMT less an x50 of 117 %.
+    response = people(Prior(p_noise=(0.0, 0.0, 1.0, 0.0), p_hand=1.0), VALVE_SPACE).response
+    largest, drives = response.log_ratio.exp(), response.rest
+    for values, (low, high) in (
+        (largest, (0.2 / 0.009, 3.0 / 0.009)),
+        (drives, (0.23 * (90 - 117), 0.23 * (100 - 117))),
+    ):
+        for rare in (values < low, values > high):
+            assert 0.02 < rare.float().mean().item() < 0.25

@@ -33,16 +33,14 @@ SHAPE_LATENTS = slice(0, 3)
 NOISE_LATENTS = slice(7, 12)
 
 _SCALES = (
-    "width_ms",
-    "floor_mv",
-    "floor_log_sd",
-    "gain_ratio",
-    "cv",
-    "recruitment_ratio",
-    "input_sd",
-    "output_sd",
-    "boost",
+    *("width_ms", "floor_mv", "floor_log_sd", "gain_ratio", "cv"),
+    *("recruitment_ratio", "input_sd", "output_sd", "boost"),
+    *("hand_ratio", "hand_input_sd", "hand_boost"),
 )
+_RESTS = ("rest", "hand_rest")
+
+HAND = len(NoiseKind)
+"""One more kind of noise for particles: that of a recruitment curve, but a hand muscle's."""
 
 
 Scale: TypeAlias = tuple[float, float, float]
@@ -58,7 +56,7 @@ class Latents(NamedTuple):
     Args:
         z: standard normal latents in the order of `LATENTS`, shape (b, p, d).
         shape: one of `ShapeKind`, shape (b, p).
-        noise: one of `NoiseKind`, shape (b, p).
+        noise: one of `NoiseKind`, or `HAND`, shape (b, p).
         present: whether there is any facilitation, shape (b, p).
     """
 
@@ -86,6 +84,7 @@ class Prior:
             test (dissertation, 4.2: 8 of 11), the others are described in its outlook (8.1).
         p_noise: probabilities of constant-CV noise, the same with missing responses, a noisy recruitment curve, and
             responses that are all or none: those of a very steep curve.
+        p_hand: probability that a recruitment curve is a hand muscle's, or another's of which as little is known.
         start_ms: where windows start after the impact [ms], uniform between these.
         hit_delay_ms: mean and SD of the hit delay of a person unknown [ms]; 172–188 ms measured (dissertation, 4.2).
         p_anywhere: probability that a window starts anywhere in the range instead, for stimulators unlike that one.
@@ -100,12 +99,15 @@ class Prior:
         switch_probability: the same where responses are all or none.
         rest_probability: mean and SD, in logits, of the probability of such a response without a tap; 0.05–0.25 of the
             trials at 90 % RMT are above 50 µV in the hand, next to none in the forearm.
-        recruitment_ratio: logarithmic scale of the largest MEP over the floor; 0.1–0.25 mV in forearm muscles, up to
-            3 mV in the hand.
+        recruitment_ratio: logarithmic scale of the largest MEP over the floor; 0.1–0.25 mV in forearm muscles.
         input_sd: logarithmic scale of the input noise in logits: k sigma_x, 0.3 × 5–9 % RMT in the forearm.
         output_sd: logarithmic scale of the output noise, natural log; 0.3–0.5.
         boost: logarithmic scale of the boost in logits: k times 5–18 % RMT.
-        rest: scale of the drive at rest in logits: k (90 % RMT − x50), −4 to −5 in the forearm, −6 in the hand.
+        rest: scale of the drive at rest in logits: k (90 % RMT − x50), −4 to −5 in the forearm.
+        hand_ratio: the largest MEP over the floor of a hand muscle; 0.2–3 mV.
+        hand_input_sd: its input noise in logits: k is 0.23.
+        hand_boost: its boost in logits.
+        hand_rest: its drive at rest in logits: −6 at 90 % RMT, −4 at 100 %.
         drift_sd: SD of what the log of evoked MEPs drifts by in the long run; about 0.26 over a session measured.
         startup: mean and SD of how strongly the first trials startle, 1 being as much as in blocks of plain TMS.
 
@@ -115,7 +117,8 @@ class Prior:
 
     p_window: float = 0.72
     p_shape: tuple[float, float, float, float] = (0.68, 0.12, 0.08, 0.12)
-    p_noise: tuple[float, float, float, float] = (0.38, 0.12, 0.42, 0.08)
+    p_noise: tuple[float, float, float, float] = (0.37, 0.11, 0.44, 0.08)
+    p_hand: float = 0.2
     start_ms: tuple[float, float] = (0.0, 115.0)
     hit_delay_ms: tuple[float, float] = (180.0, 6.2)
     p_anywhere: float = 0.08
@@ -127,16 +130,20 @@ class Prior:
     max_probability: tuple[float, float] = (0.2, 0.7)
     switch_probability: tuple[float, float] = (1.2, 0.9)
     rest_probability: tuple[float, float] = (-3.3, 1.0)
-    recruitment_ratio: Scale = (16.0, 0.42, 0.07)
+    recruitment_ratio: Scale = (16.0, 0.42, 0.04)
     input_sd: Scale = (2.1, 0.18, 0.015)
     output_sd: Scale = (0.39, 0.18, 0.02)
-    boost: Scale = (3.4, 0.33, 0.05)
+    boost: Scale = (3.4, 0.33, 0.02)
     rest: Scale = (-4.5, 0.38, 0.05)
+    hand_ratio: Scale = (90.0, 0.9, 0.0)
+    hand_input_sd: Scale = (1.8, 0.3, 0.0)
+    hand_boost: Scale = (3.6, 0.5, 0.0)
+    hand_rest: Scale = (-4.7, 1.0, 0.0)
     drift_sd: float = 0.3
     startup: tuple[float, float] = (0.5, 0.5)
 
     def __post_init__(self) -> None:
-        for name in ("p_window", "p_anywhere"):
+        for name in ("p_window", "p_hand", "p_anywhere"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise InvalidValueError(f"{name} must be a probability", got=getattr(self, name))
         for name, kinds in (("p_shape", ShapeKind), ("p_noise", NoiseKind)):
@@ -145,9 +152,9 @@ class Prior:
                 raise InvalidValueError(
                     f"{name} must hold a probability for each kind", got=shares, expected=f"{len(kinds)} that sum to 1"
                 )
-        for name in (*_SCALES, "rest"):
+        for name in (*_SCALES, *_RESTS):
             scale = getattr(self, name)
-            if not _is_scale(scale, of_logarithm=name != "rest"):
+            if not _is_scale(scale, of_logarithm=name not in _RESTS):
                 raise InvalidValueError(f"{name} is no scale", got=scale, expected="a median, an SD, and a cubic tail")
         if not all(math.isfinite(value) and value > 0 for value in self.hit_delay_ms):
             raise InvalidValueError("hit_delay_ms must be positive", got=self.hit_delay_ms)
@@ -160,12 +167,19 @@ class Prior:
         if not self.start_ms[0] < self.start_ms[1]:
             raise InvalidValueError("start_ms is empty", got=self.start_ms, expected="earliest < latest")
 
+    @property
+    def p_noise_of_particles(self) -> tuple[float, ...]:
+        """Probabilities of the kinds of `Latents.noise`: `p_noise`, with `HAND` apart from the other recruitment."""
+        shares = [*self.p_noise, self.p_noise[NoiseKind.RECRUITMENT] * self.p_hand]
+        shares[NoiseKind.RECRUITMENT] *= 1.0 - self.p_hand
+        return tuple(shares)
+
     def sample_kinds(self, size: tuple[int, ...], generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
         """Shape, noise and presence of new particles, each of `size`."""
         uniform = torch.rand((3, *size), generator=generator, device=generator.device)
         kinds = (
             torch.bucketize(u, torch.tensor(p, device=u.device).cumsum(0)[:-1])
-            for u, p in zip(uniform[:2], (self.p_shape, self.p_noise), strict=True)
+            for u, p in zip(uniform[:2], (self.p_shape, self.p_noise_of_particles), strict=True)
         )
         return next(kinds), next(kinds), uniform[2] < self.p_window
 
@@ -180,22 +194,26 @@ class Prior:
         shape = Shape(
             latents.shape, self._start(z["start"], space), _log_normal(z["width"], self.width_ms), _even(z["form"])
         )
-        recruits, switches = latents.noise == NoiseKind.RECRUITMENT, latents.noise == NoiseKind.ALL_OR_NONE
-        response = Response(
-            kind=latents.noise,
+        return Person(shape, self._response(z, latents.noise), latents.present)
+
+    def _response(self, z: dict[str, Tensor], noise: Tensor) -> Response:
+        hand, switches = noise == HAND, noise == NoiseKind.ALL_OR_NONE
+        recruits = hand | (noise == NoiseKind.RECRUITMENT)
+
+        def of_muscle(name: str, forearms: Scale, hands: Scale) -> Tensor:
+            return torch.where(hand, _log_normal(z[name], hands), _log_normal(z[name], forearms))
+
+        largest = of_muscle("log_ratio", self.recruitment_ratio, self.hand_ratio)
+        input_sd = of_muscle("spread", self.input_sd, self.hand_input_sd)
+        return Response(
+            kind=torch.where(hand, NoiseKind.RECRUITMENT, noise),
             log_floor=_log_normal(z["log_floor"], self.floor_mv).log(),
             floor_log_sd=_log_normal(z["floor_log_sd"], self.floor_log_sd),
-            log_ratio=torch.log(
-                torch.where(
-                    recruits,
-                    _log_normal(z["log_ratio"], self.recruitment_ratio),
-                    _log_normal(z["log_ratio"], self.gain_ratio),
-                )
-            ),
-            spread=torch.where(recruits, _log_normal(z["spread"], self.input_sd), _log_normal(z["spread"], self.cv)),
+            log_ratio=torch.where(recruits, largest, _log_normal(z["log_ratio"], self.gain_ratio)).log(),
+            spread=torch.where(recruits, input_sd, _log_normal(z["spread"], self.cv)),
             output_log_sd=_log_normal(z["output"], self.output_sd),
-            boost=_log_normal(z["boost"], self.boost),
-            rest=self.rest[0] + _spread(z["rest"], self.rest),
+            boost=of_muscle("boost", self.boost, self.hand_boost),
+            rest=torch.where(hand, _normal(z["rest"], self.hand_rest), _normal(z["rest"], self.rest)),
             max_probability=torch.where(
                 switches,
                 _probability(z["output"], self.switch_probability),
@@ -205,7 +223,6 @@ class Prior:
             drift=self.drift_sd * z["drift"],
             startup=self.startup[0] + self.startup[1] * z["startup"],
         )
-        return Person(shape, response, latents.present)
 
     def _start(self, z: Tensor, space: DesignSpace) -> Tensor:
         return start_ms(z, space, self.start_ms, self.hit_delay_ms, self.p_anywhere)
@@ -262,14 +279,14 @@ def _is_scale(scale: Scale, *, of_logarithm: bool) -> bool:
     return sd > 0 and tail >= 0 and (median > 0 or not of_logarithm)
 
 
-def _spread(z: Tensor, scale: Scale) -> Tensor:
-    """How far from its median a latent is."""
-    _, sd, tail = scale
-    return sd * z + tail * z**3
+def _normal(z: Tensor, scale: Scale) -> Tensor:
+    median, sd, tail = scale
+    return median + sd * z + tail * z**3
 
 
 def _log_normal(z: Tensor, scale: Scale) -> Tensor:
-    return scale[0] * torch.exp(_spread(z, scale))
+    median, sd, tail = scale
+    return torch.exp(_normal(z, (math.log(median), sd, tail)))
 
 
 def _probability(z: Tensor, logit: tuple[float, float]) -> Tensor:

@@ -19,7 +19,7 @@ LEVELS = 24
 """Facilitations at which responses are worked out; what lies between is interpolated."""
 
 OUTCOMES = 24
-"""Values of the log MEP on which predictive distributions live."""
+"""Cells of the log MEP in which predictive distributions live."""
 
 
 def table_levels(device: torch.device) -> Tensor:
@@ -109,12 +109,15 @@ class PersonSample:
         top = response.log_floor + torch.log1p(self._evoked.amax(-1))
         low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
         high = torch.quantile(top, 0.95, dim=-1) + 1.5
-        share = (torch.arange(OUTCOMES, device=low.device) + 0.5) / OUTCOMES  # the middle of each outcome's cell
-        log_mep = (low.unsqueeze(-1) + share * (high - low).unsqueeze(-1)).unsqueeze(-2)
+        # Cells are narrow where MEPs are as small as the floor, which varies little.
+        ends = torch.linspace(0.0, 1.0, OUTCOMES + 1, device=low.device).pow(1.5)
+        middle, width = 0.5 * (ends[1:] + ends[:-1]), ends.diff()
+        log_mep = (low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)).unsqueeze(-2)
         density = in_pieces(
             lambda r, grid: outcome_density(r, self._levels, grid), response, (log_mep,), LEVELS * OUTCOMES * NODES
         )
-        return density / density.sum(-1, keepdim=True)
+        mass = density * width
+        return mass / mass.sum(-1, keepdim=True)
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
