@@ -105,8 +105,8 @@ class Prior:
         boost: logarithmic scale of the boost in logits: k times 5–18 % RMT.
         rest: scale of the drive at rest in logits: k (90 % RMT − x50), −4 to −5 in the forearm.
         hand_ratio: the largest MEP over the floor of a hand muscle; 0.2–3 mV.
-        hand_input_sd: its input noise in logits: k is 0.23.
-        hand_boost: its boost in logits.
+        hand_input_sd: its input noise in logits: k sigma_x, 0.23 × 5–9 % RMT.
+        hand_boost: its boost in logits: k times 8–30 % RMT.
         hand_rest: its drive at rest in logits: −6 at 90 % RMT, −4 at 100 %.
         drift_sd: SD of what the log of evoked MEPs drifts by in the long run; about 0.26 over a session measured.
         startup: mean and SD of how strongly the first trials startle, 1 being as much as in blocks of plain TMS.
