@@ -106,7 +106,7 @@ class Prior:
         rest: scale of the drive at rest in logits: k (90 % RMT − x50), −4 to −5 in the forearm.
         hand_ratio: the largest MEP over the floor of a hand muscle; 0.2–3 mV.
         hand_input_sd: its input noise in logits: k sigma_x, 0.23 × 5–9 % RMT.
-        hand_boost: its boost in logits: k times 8–30 % RMT.
+        hand_boost: its boost in logits: k times 16 % RMT in the middle; nobody has measured it.
         hand_rest: its drive at rest in logits: −6 at 90 % RMT, −4 at 100 %.
         drift_sd: SD of what the log of evoked MEPs drifts by in the long run; about 0.26 over a session measured.
         startup: mean and SD of how strongly the first trials startle, 1 being as much as in blocks of plain TMS.
