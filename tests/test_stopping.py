@@ -76,6 +76,16 @@ def test_an_edge_that_may_lie_beyond_the_range_has_no_narrow_interval(start_ms: 
     assert "span inf and 0 ms" in decision.reason
 
 
+@pytest.mark.parametrize(("doubters", "stop"), [(1, True), (2, False), (30, False)])
+def test_a_hypothesis_that_is_still_likely_must_agree(doubters: int, *, stop: bool) -> None:
+    edges = np.array([(100.0, 200.0)] * (100 - doubters) + [(100.0, 240.0)] * doubters)
+    hypotheses = np.where(edges[:, 1] == 240, 2, 0)
+    estimate = WindowEstimate(0.95, None, edge_samples_ms=edges, hypotheses=hypotheses)
+    decision = CredibleWidth(30)(Progress(3, 3, estimate))
+    assert decision.stop == stop
+    assert f"span 0 and {0 if stop else 40} ms under every likely hypothesis" in decision.reason
+
+
 def test_without_intervals_the_edges_are_not_known() -> None:
     assert not CredibleWidth(30)(progress()).stop
 
@@ -134,6 +144,12 @@ def test_a_width_that_cannot_be_is_refused(width_ms: float) -> None:
 def test_a_level_or_probability_outside_0_to_1_is_refused(level: float, probability: float) -> None:
     with pytest.raises(InvalidValueError, match="0–1"):
         CredibleWidth(30, level, probability)
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, math.nan])
+def test_a_share_outside_0_to_1_is_refused(share: float) -> None:
+    with pytest.raises(InvalidValueError, match="0–1"):
+        CredibleWidth(30, min_share=share)
 
 
 @pytest.mark.parametrize("probability", [0, -0.1, 1.1, math.nan])

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from isiw.errors import InvalidValueError
+from isiw.types import FloatArray
 from isiw.window import EDGE_LEVEL, Window, WindowEstimate, window_from_excess
 
 GRID_MS = np.arange(0.0, 100.0, 2.0)
@@ -168,6 +169,32 @@ def test_an_edge_beyond_the_range_makes_an_infinite_interval_and_never_nan() -> 
     samples = np.array([[-math.inf, 50.0], [10.0, math.inf], [20.0, math.inf], [30.0, math.inf]])
     intervals = WindowEstimate(1.0, None, edge_samples_ms=samples).interval(0.99)
     assert intervals == ((-math.inf, 30.0), (50.0, math.inf))
+
+
+def test_the_robust_interval_is_the_hull_over_probable_hypotheses() -> None:
+    rng = np.random.default_rng(6)
+    hypotheses = rng.choice(4, 2000, p=[0.6, 0.3, 0.09, 0.01])
+    middles = np.array([[50.0, 150.0], [60.0, 140.0], [45.0, 170.0], [10.0, 490.0]])[hypotheses]
+    samples = middles + rng.uniform(-2, 2, (2000, 2))
+    estimate = WindowEstimate(1.0, None, edge_samples_ms=samples, hypotheses=hypotheses)
+    assert estimate.robust_interval() == (
+        pytest.approx((45 - 1.8, 60 + 1.8), abs=0.3),
+        pytest.approx((140 - 1.8, 170 + 1.8), abs=0.3),
+    )
+    (start_low, _), (_, end_high) = estimate.robust_interval(min_share=0.0) or ((0, 0), (0, 0))
+    assert (start_low, end_high) == (pytest.approx(8.2, abs=0.8), pytest.approx(491.8, abs=0.8))
+
+
+def test_without_hypotheses_the_robust_interval_is_the_interval() -> None:
+    estimate = WindowEstimate(1.0, None, edge_samples_ms=np.random.default_rng(7).uniform(0, 50, (300, 2)))
+    assert estimate.robust_interval(0.8) == estimate.interval(0.8)
+    assert WindowEstimate(None, Window(10, 20)).robust_interval() is None
+
+
+@pytest.mark.parametrize("samples", [None, np.zeros((3, 2))])
+def test_every_sample_has_one_hypothesis(samples: FloatArray | None) -> None:
+    with pytest.raises(InvalidValueError, match="one hypothesis"):
+        WindowEstimate(1.0, None, edge_samples_ms=samples, hypotheses=np.zeros(2, dtype=int))
 
 
 def test_edges_beyond_the_range_are_counted() -> None:

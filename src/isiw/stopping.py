@@ -92,34 +92,43 @@ class Budget:
 class CredibleWidth:
     """Stop when the credible intervals of both edges are narrow enough, and a window is likely.
 
+    Where the model weighs hypotheses (`WindowEstimate.hypotheses`), the intervals must be narrow and agree under each
+    that is still probable: sessions that stop early do so on the hypothesis that promises most (decision 10).
+
     Args:
         width_ms: the largest acceptable width of each edge's interval [ms].
         level: the credible level of the intervals.
         min_probability: the least probability of a window.
+        min_share: the least probability of a hypothesis that must be reckoned with.
 
     Raises:
-        InvalidValueError: a width that is not positive, or a level or probability outside 0–1.
+        InvalidValueError: a width that is not positive, or a level, probability or share outside 0–1.
     """
 
     width_ms: float
     level: float = 0.9
     min_probability: float = 0.9
+    min_share: float = 0.02
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.width_ms) and self.width_ms > 0):
             raise InvalidValueError("width_ms must be positive", got=self.width_ms)
-        if not (0 < self.level < 1 and 0 <= self.min_probability <= 1):
-            raise InvalidValueError("levels and probabilities lie in 0–1", got=(self.level, self.min_probability))
+        if not (0 < self.level < 1 and 0 <= self.min_probability <= 1 and 0 <= self.min_share <= 1):
+            raise InvalidValueError(
+                "levels, probabilities and shares lie in 0–1", got=(self.level, self.min_probability, self.min_share)
+            )
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
-        intervals = progress.estimate.interval(self.level)
+        intervals = progress.estimate.robust_interval(self.level, self.min_share)
         if intervals is None:
             return StopDecision(stop=False, reason="The edges have no credible intervals.")
         # An edge that lies beyond the range for certain is an answer: its interval has no width.
         widths = [0.0 if low == high else high - low for low, high in intervals]
         known = (progress.estimate.probability or 0.0) >= self.min_probability and max(widths) <= self.width_ms
         spans = f"the {self.level:.0%} intervals of start and end span {widths[0]:.0f} and {widths[1]:.0f} ms"
+        if progress.estimate.hypotheses is not None:
+            spans += " under every likely hypothesis"
         if known:
             return StopDecision(stop=True, reason=f"The window is known: {spans}.")
         return StopDecision(stop=False, reason=f"The window is not known well enough yet: {spans}.")

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.types import ArrayLike, BoolArray, FloatArray
+from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["EDGE_LEVEL", "Interval", "ProfileBand", "Window", "WindowEstimate", "window_from_excess"]
 
@@ -135,9 +135,11 @@ class WindowEstimate:
         profile_quantiles_mv: the 0.05, 0.5 and 0.95 quantiles of the expected MEP by ISI [mV], shape (3, t).
         spread_ms: SD of the ISIs that a particle search has narrowed itself down to [ms].
         split_probability: probability that the window has more than one segment, given that there is one.
+        hypotheses: which of the model's hypotheses, such as the kind of noise, each of `edge_samples_ms` belongs to,
+            shape (s,).
 
     Raises:
-        InvalidValueError: a probability outside 0–1, or a window reported against it.
+        InvalidValueError: a probability outside 0–1, a window reported against it, or not one hypothesis a sample.
     """
 
     probability: float | None
@@ -149,8 +151,14 @@ class WindowEstimate:
     profile_quantiles_mv: FloatArray | None = field(default=None, repr=False)
     spread_ms: float | None = None
     split_probability: float | None = None
+    hypotheses: IntArray | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
+        samples = () if self.edge_samples_ms is None else self.edge_samples_ms
+        if self.hypotheses is not None and len(self.hypotheses) != len(samples):
+            raise InvalidValueError(
+                "every sample of the edges has one hypothesis", got=len(self.hypotheses), expected=str(len(samples))
+            )
         if self.probability is None:
             return
         if not 0.0 <= self.probability <= 1.0:
@@ -175,10 +183,30 @@ class WindowEstimate:
             raise InvalidValueError("a credible level must lie between 0 and 1", got=level)
         if self.edge_samples_ms is None or not len(self.edge_samples_ms):
             return None
-        tail = (1.0 - level) / 2.0
-        # An order statistic never averages a finite edge with an infinite one.
-        quantiles = np.quantile(self.edge_samples_ms, [tail, 1.0 - tail], axis=0, method="nearest")
-        (start_low, end_low), (start_high, end_high) = quantiles.tolist()
+        (start_low, end_low), (start_high, end_high) = _central(self.edge_samples_ms, level).tolist()
+        return (start_low, start_high), (end_low, end_high)
+
+    def robust_interval(self, level: float = 0.9, min_share: float = 0.02) -> tuple[Interval, Interval] | None:
+        """Intervals of start and end that hold whichever hypothesis is true: the hull of those given each [ms].
+
+        Args:
+            level: the credible level, in 0–1.
+            min_share: the least probability of a hypothesis that must be reckoned with, given that there is a window.
+
+        Returns:
+            As `interval` does; the same where the method has no hypotheses.
+
+        Raises:
+            InvalidValueError: a level outside 0–1.
+        """
+        whole = self.interval(level)
+        if whole is None or self.hypotheses is None or self.edge_samples_ms is None:
+            return whole
+        kinds, counts = np.unique(self.hypotheses, return_counts=True)
+        probable = kinds[counts >= min_share * len(self.hypotheses)]
+        given = [_central(self.edge_samples_ms[self.hypotheses == kind], level) for kind in probable]
+        lows, highs = np.stack([np.transpose(whole), *given], axis=1)
+        (start_low, end_low), (start_high, end_high) = lows.min(0).tolist(), highs.max(0).tolist()
         return (start_low, start_high), (end_low, end_high)
 
     @property
@@ -203,3 +231,10 @@ class WindowEstimate:
         isi = np.atleast_1d(np.asarray(isi_ms, dtype=float))
         low, median, high = (np.interp(isi, self.grid_ms, row) for row in self.profile_quantiles_mv)
         return ProfileBand(median, low, high)
+
+
+def _central(edges_ms: FloatArray, level: float) -> FloatArray:
+    """Lower and upper quantile of start and end, shape (2, 2)."""
+    tail = (1.0 - level) / 2.0
+    # An order statistic never averages a finite edge with an infinite one.
+    return np.quantile(edges_ms, [tail, 1.0 - tail], axis=0, method="nearest")

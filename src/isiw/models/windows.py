@@ -57,15 +57,19 @@ def profile_grid(space: DesignSpace) -> Tensor:
     return torch.tensor(space.grid_ms[:: max(1, len(space.grid_ms) // PROFILE_POINTS)], dtype=torch.float32)
 
 
-def sampled_estimate(masks: Tensor, profiles_mv: Tensor, space: DesignSpace) -> WindowEstimate:
+def sampled_estimate(
+    masks: Tensor, profiles_mv: Tensor, space: DesignSpace, hypotheses: Tensor | None = None
+) -> WindowEstimate:
     """What equally weighted samples say about the window of one person.
 
     Args:
         masks: sampled windows on the space's grid as 0 or 1, all 0 where there is none, shape (s, t).
         profiles_mv: sampled profiles at the ISIs of `profile_grid` [mV], shape (any, t).
         space: the design space.
+        hypotheses: which hypothesis of the model each sampled window belongs to, shape (s,).
     """
-    present = masks[masks.any(-1)]
+    somewhere = masks.any(-1)
+    present = masks[somewhere]
     probability = len(present) / len(masks)
     edges = edge_samples(present, space)
     start, end = edges.median(0).values.tolist() if len(present) else (None, None)
@@ -79,4 +83,5 @@ def sampled_estimate(masks: Tensor, profiles_mv: Tensor, space: DesignSpace) -> 
         edge_samples_ms=edges.double().cpu().numpy(),
         profile_quantiles_mv=torch.quantile(profiles_mv, levels, dim=0).double().cpu().numpy(),
         split_probability=float(_split(present).double().mean()) if len(present) else None,
+        hypotheses=None if hypotheses is None else hypotheses[somewhere].cpu().numpy(),
     )

@@ -83,7 +83,8 @@ class PosteriorSettings(ABC):
         acquisition: what chooses the next ISI, one of `ACQUISITIONS`.
         initial_trials: how many evenly spaced ISIs to ask for first.
         max_trials: stop after this many stimuli; mistrials count.
-        stop_width_ms: stop when the 90 % credible intervals of both edges are at most this wide [ms].
+        stop_width_ms: stop when the 90 % credible intervals of both edges are at most this wide [ms], under every kind
+            of noise that is still probable where the model weighs more than one.
         stop_no_window: stop when "there is no window" is at least this probable.
 
     Raises:

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ from isiw.metrics import covers
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.evidence import History, levels, total_log_likelihood
 from isiw.models.particles.moves import Mover
-from isiw.models.particles.prior import Person, Prior
-from isiw.models.particles.response import draw_log_mep, log_gain, log_likelihood
+from isiw.models.particles.prior import LATENTS, Person, Prior
+from isiw.models.particles.response import NoiseKind, draw_log_mep, log_gain, log_likelihood
 from isiw.models.particles.sample import PersonSample
 from isiw.models.protocol import (
     Observation,
@@ -124,6 +125,22 @@ def test_an_uncertain_isi_is_integrated_out() -> None:
     # Three nodes are exact up to the fifth power of the SD; only the steepest flanks differ.
     assert (got - expected).abs().median() < 0.005
     assert (got - expected).abs().quantile(0.99) < 0.1
+
+
+def test_an_estimate_knows_the_noise_that_its_samples_suppose() -> None:
+    # Of two kinds of noise one has wide windows only, so that kind and width must go together in every sample.
+    posterior = ParticleModel(Prior(p_window=0.9, p_noise=(0.5, 0.0, 0.5, 0.0), p_hand=0.0)).prior(VALVE_SPACE, 3)
+    recruits = posterior.latents.noise == NoiseKind.RECRUITMENT
+    width = LATENTS.index("width")
+    posterior.latents.z[..., width] = torch.where(recruits, 2.5, -2.5)
+    weights = torch.linspace(-3.0, 3.0, recruits.shape[-1]).unsqueeze(0)  # every pick is another particle than its own
+    estimate = replace(posterior, log_weights=torch.log_softmax(weights, -1)).estimate()
+    edges_ms, kinds = estimate.edge_samples_ms, estimate.hypotheses
+    assert set(kinds.tolist()) == {NoiseKind.GAIN, NoiseKind.RECRUITMENT}
+    inside = np.isfinite(edges_ms).all(1)
+    widths_ms = edges_ms[inside, 1] - edges_ms[inside, 0]
+    wide = kinds[inside] == NoiseKind.RECRUITMENT
+    assert widths_ms[wide].min() > widths_ms[~wide].max()
 
 
 def test_moves_without_trials_leave_the_prior_as_it_is() -> None:

@@ -221,7 +221,8 @@ class ParticlePosterior:
         grid = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=picks.device)
         thinned = PersonSample(_each(self._thinned.person, lambda x: x[one]))
         profiles_mv = thinned.expected_mep_mv(profile_grid(self.space).to(picks.device))
-        return sampled_estimate(sample.window_masks(grid)[0], profiles_mv[0], self.space)
+        noise = _take(self.latents.noise[one], picks)
+        return sampled_estimate(sample.window_masks(grid)[0], profiles_mv[0], self.space, noise[0])
 
 
 def _take(values: Tensor, picks: Tensor) -> Tensor:
