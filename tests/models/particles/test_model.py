@@ -284,7 +284,8 @@ def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
     for isi_ms in isis_ms.tolist():
         meps_mv = sampled_meps_mv(hidden, isi_ms, generator)
         posterior = model.update(posterior, observation([isi_ms] * 200, meps_mv))
-    masks = PersonSample(hidden).window_masks(torch.tensor(VALVE_SPACE.grid_ms, dtype=torch.float32))[:, 0].numpy()
+    sample = PersonSample(hidden, VALVE_SPACE)
+    masks = sample.window_masks(torch.tensor(VALVE_SPACE.grid_ms, dtype=torch.float32))[:, 0].numpy()
     windows = [Window.from_mask(VALVE_SPACE.grid_ms, mask) for mask in masks]
     pairs = [(posterior.estimate(i), window) for i, window in enumerate(windows) if window is not None]
     covered = np.array([covers(estimate, window, VALVE_SPACE) for estimate, window in pairs])

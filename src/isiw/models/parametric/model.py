@@ -101,7 +101,7 @@ class ParametricModel:
         program = self.program(space)
         latents = torch.randn((1, 1, program.latents), generator=generator, dtype=torch.double)
         present = torch.rand((1, 1), generator=generator) < self.beliefs.p_window
-        person = WindowSample(program.unknowns(latents), present, self.likelihood)
+        person = WindowSample(program.unknowns(latents), present, self.likelihood, space)
         log_mep = draw_log_mep(
             person.unknowns, person.levels(torch.as_tensor(isi_ms, dtype=torch.double)), self.likelihood, generator
         )
@@ -148,25 +148,34 @@ class WindowSample:
         unknowns: fields of shape (b, s).
         present: whether there is any excess, shape (b, s).
         likelihood: the likelihood.
+        space: the design space, in whose range a window is looked for.
     """
 
     unknowns: Unknowns
     present: Tensor
     likelihood: Likelihood
+    space: DesignSpace
 
     def levels(self, isi_ms: Tensor) -> Tensor:
-        """Share of the largest excess at some ISIs, of shape (t,) or (b, 1, t), shape (b, s, t)."""
+        """Share of the largest excess at some ISIs, of shape (t,) or (b, 1 or s, t), shape (b, s, t)."""
         return torch.where(self.present.unsqueeze(-1), levels(self.unknowns, isi_ms), 0.0)
 
     @cached_property
+    def _highest(self) -> Tensor:
+        """Share of the largest excess that the range reaches, shape (b, s)."""
+        middle_ms = self.unknowns.start_ms + 0.5 * self.unknowns.width_ms
+        reached_ms = middle_ms.clamp(self.space.low_ms, self.space.high_ms)
+        return self.levels(reached_ms.unsqueeze(-1)).squeeze(-1)
+
+    @cached_property
     def enhances(self) -> Tensor:
-        """Whether the excess is large enough to speak of a window, shape (b, s)."""
+        """Whether the excess in the range is large enough to speak of a window, shape (b, s)."""
         least_mv = (MIN_EXCESS_OF_BASELINE * self.unknowns.baseline_mv).clamp_min(MIN_EXCESS_MV)
-        return self.present & (self.unknowns.amplitude_mv >= least_mv)
+        return self.present & (self.unknowns.amplitude_mv * self._highest >= least_mv)
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows as 0 or 1, shape (b, s, t)."""
-        inside = self.enhances.unsqueeze(-1) & (self.levels(isi_ms.double()) >= EDGE_LEVEL)
+        inside = self.enhances.unsqueeze(-1) & (self.levels(isi_ms.double()) >= EDGE_LEVEL * self._highest.unsqueeze(-1))
         return inside.to(torch.float32)
 
     def profiles_mv(self, isi_ms: Tensor) -> Tensor:
@@ -226,7 +235,7 @@ class ParametricPosterior:
     def sample(self) -> WindowSample:
         """What the samples mean."""
         unknowns = self.model.program(self.space).unknowns(self.latents)
-        return WindowSample(unknowns, self.present, self.model.likelihood)
+        return WindowSample(unknowns, self.present, self.model.likelihood, self.space)
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""

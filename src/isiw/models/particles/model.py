@@ -108,7 +108,7 @@ class ParticleModel:
         gain = log_gain(person.response, torch.arange(isis_ms.shape[-1], dtype=torch.float32, device=self.device))
         log_mep = draw_log_mep(person.response, levels(person, isis_ms), generator, gain)
         grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=torch.float32, device=self.device)
-        mask = PersonSample(person).window_masks(grid_ms)[0, 0]
+        mask = PersonSample(person, space).window_masks(grid_ms)[0, 0]
         window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
         return SimulatedPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
 
@@ -185,7 +185,7 @@ class ParticlePosterior:
     @cached_property
     def _thinned(self) -> PersonSample:
         picks = systematic(self.log_weights, self.model.thinned)
-        return PersonSample(_each(self.person, lambda x: _take(x, picks)), self.trials)
+        return PersonSample(_each(self.person, lambda x: _take(x, picks)), self.space, self.trials)
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
@@ -217,9 +217,9 @@ class ParticlePosterior:
         """The window of one person."""
         one = slice(person, person + 1)
         picks = systematic(self.log_weights[one], self.model.particles)
-        sample = PersonSample(_each(self.person, lambda x: _take(x[one], picks)))
+        sample = PersonSample(_each(self.person, lambda x: _take(x[one], picks)), self.space)
         grid = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=picks.device)
-        thinned = PersonSample(_each(self._thinned.person, lambda x: x[one]))
+        thinned = PersonSample(_each(self._thinned.person, lambda x: x[one]), self.space)
         profiles_mv = thinned.expected_mep_mv(profile_grid(self.space).to(picks.device))
         noise = _take(self.latents.noise[one], picks)
         return sampled_estimate(sample.window_masks(grid)[0], profiles_mv[0], self.space, noise[0])

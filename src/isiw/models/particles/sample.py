@@ -7,9 +7,11 @@ from functools import cached_property
 
 import torch
 
+from isiw.design import DesignSpace
 from isiw.models.particles.evidence import in_pieces, levels
 from isiw.models.particles.prior import Person
 from isiw.models.particles.response import NODES, evoked_mean, log_gain, outcome_density
+from isiw.models.particles.shapes import highest_facilitation
 from isiw.models.protocol import Tensor
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
 
@@ -51,10 +53,12 @@ class PersonSample:
 
     Args:
         person: the particles, fields of shape (b, s).
+        space: the design space, in whose range a window is looked for.
         order: how many trials came before the next one.
     """
 
     person: Person
+    space: DesignSpace
     order: int = 0
 
     @cached_property
@@ -71,7 +75,8 @@ class PersonSample:
         """Facilitation at a window's edge by the 0.135 rule; above 1 where there is no window, shape (b, s)."""
         response = self.person.response
         excess = self._evoked - self._evoked[..., :1]
-        peak = excess[..., -1]
+        highest = highest_facilitation(self.person.shape, self.space.low_ms, self.space.high_ms)
+        peak = interpolated(excess.unsqueeze(-1), highest.unsqueeze(-1))[..., 0, 0]
         least_mv = (MIN_EXCESS_OF_BASELINE * self.baselines_mv()).clamp_min(MIN_EXCESS_MV)
         enough = peak * response.log_floor.exp() >= least_mv
         share = (excess / peak.clamp_min(1e-12).unsqueeze(-1)).contiguous()

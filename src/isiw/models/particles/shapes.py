@@ -13,7 +13,7 @@ import torch
 
 from isiw.models.protocol import Tensor
 
-__all__ = ["Shape", "ShapeKind", "facilitation"]
+__all__ = ["Shape", "ShapeKind", "facilitation", "highest_facilitation"]
 
 PEAKS_AT = (0.27, 0.73)
 PEAK_SD = 1 / 7.5
@@ -60,7 +60,7 @@ def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:
     Returns:
         Facilitation, shape (..., p, t).
     """
-    peak_at = torch.where(shape.kind == ShapeKind.SKEWED, 0.5 + 0.33 * shape.form, 0.5)
+    peak_at = _peak_at(shape)
     rise_ms, fall_ms = peak_at * shape.width_ms, (1.0 - peak_at) * shape.width_ms
     offset_ms = isi_ms - (shape.start_ms + rise_ms).unsqueeze(-1)
     # Before the peak the first is positive, behind it the second.
@@ -73,6 +73,26 @@ def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:
     form, start_ms, width_ms = (field[double].unsqueeze(-1) for field in (shape.form, shape.start_ms, shape.width_ms))
     level[double] = _two_peaks(form, (isi_ms.expand_as(level)[double] - start_ms) / width_ms)
     return level
+
+
+def highest_facilitation(shape: Shape, low_ms: float, high_ms: float) -> Tensor:
+    """Largest facilitation in a range of ISIs; profiles fall off on both sides of their peaks.
+
+    Args:
+        shape: profiles, fields of shape (..., p).
+        low_ms: shortest ISI [ms].
+        high_ms: longest ISI [ms].
+
+    Returns:
+        Facilitation in 0–1, shape (..., p).
+    """
+    peaks_ms = torch.stack([shape.start_ms + at * shape.width_ms for at in (_peak_at(shape), *PEAKS_AT)], dim=-1)
+    return facilitation(shape, peaks_ms.clamp(low_ms, high_ms)).amax(-1).clamp_max(1.0)
+
+
+def _peak_at(shape: Shape) -> Tensor:
+    """Where a profile of one peak has it, as a share of the span, shape (..., p)."""
+    return torch.where(shape.kind == ShapeKind.SKEWED, 0.5 + 0.33 * shape.form, 0.5)
 
 
 def _two_peaks(form: Tensor, share: Tensor) -> Tensor:
