@@ -2,12 +2,15 @@
 
 It knows the profile's family, the response and its noise, the baseline and the hit delay; its prior over start and
 width is the cohort's. It designs by greedy mutual information on a 5 ms grid and reports the window of largest
-posterior expected F1. Outcomes are exact bin probabilities of the log MEP.
+posterior expected F1, or "no window" if that has more. Outcomes are exact bin probabilities of the log MEP. Of what
+varies from trial to trial besides (drift and start-up, hit delay, untold jitter) it knows nothing.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -17,14 +20,44 @@ from isiw.design import DesignSpace
 from isiw.profiles import PeakProfile
 from isiw.recruitment import GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.studies import SimulatedSession, play
-from isiw.subjects import SimulatedSubject
-from isiw.types import FloatArray
-from isiw.window import EDGE_LEVEL, Window
+from isiw.subjects import WIDTHS_KIM_MS, SimulatedSubject
+from isiw.types import BoolArray, FloatArray
+from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window
 
 LEVELS = np.linspace(0.0, 1.0, 61) ** 2
-STARTS_MS = np.arange(5.0, 110.1, 3.0)
-WIDTHS_MS = np.exp(np.linspace(np.log(35.0), np.log(230.0), 48))
 BINS = 72
+
+
+class Spans(NamedTuple):
+    """The windows of a cohort: any start with any width [ms], starts all as likely, widths by their shares."""
+
+    starts_ms: FloatArray
+    widths_ms: FloatArray
+    shares: FloatArray
+
+
+def _uniform(low_ms: float, high_ms: float, step_ms: float) -> FloatArray:
+    return np.linspace(low_ms, high_ms, round((high_ms - low_ms) / step_ms) + 1)
+
+
+def _usual_spans() -> Spans:
+    widths_ms = np.geomspace(40.0, 230.0, 48)
+    between_ms = np.sqrt(widths_ms[1:] * widths_ms[:-1])
+    below = norm.cdf(np.log(between_ms / 100.0) / 0.42)  # what is clipped lies at the ends
+    return Spans(_uniform(5, 110, 3), widths_ms, np.diff(below, prepend=0.0, append=1.0))
+
+
+def _even_spans(starts_ms: FloatArray, widths_ms: FloatArray) -> Spans:
+    return Spans(starts_ms, widths_ms, np.full(len(widths_ms), 1 / len(widths_ms)))
+
+
+USUAL_SPANS: Final = _usual_spans()
+OTHER_SPANS: Final[Mapping[str, Spans]] = {
+    "narrow": _even_spans(_uniform(5, 110, 3), _uniform(35, 50, 1)),
+    "wide": _even_spans(_uniform(5, 110, 3), _uniform(180, 230, 2)),
+    "kim11": _even_spans(_uniform(20, 100, 2.5), np.array(WIDTHS_KIM_MS, dtype=float)),
+}
+"""What `cohorts` says of start and width: of most cohorts, and of those that differ."""
 
 
 def _quantile_nodes(count: int) -> FloatArray:
@@ -60,12 +93,6 @@ def outcome_table(subject: SimulatedSubject) -> tuple[FloatArray, FloatArray]:
     return edges, mass / mass.sum(1, keepdims=True)
 
 
-def _prior(starts_ms: FloatArray, widths_ms: FloatArray) -> FloatArray:
-    """The cohorts' prior: uniform start, log-normal width clipped to 40-230 ms (the clipped mass is at the ends)."""
-    density = norm.pdf(np.log(widths_ms / 100.0) / 0.42)
-    return (density * ((starts_ms >= 5) & (starts_ms <= 110))) / np.sum(density)
-
-
 ORACLE_COHORTS = ("gaussian", "narrow", "wide", "low-response", "outliers", "drift", "jitter", "recruitment", "kim11")
 """Cohorts whose profile's family the oracle knows: one symmetric peak."""
 
@@ -77,15 +104,17 @@ class Oracle:
     Args:
         subject: the person, with a profile of one symmetric peak.
         space: the design space.
+        spans: the windows of the cohort that the person is of.
     """
 
     subject: SimulatedSubject
     space: DesignSpace
+    spans: Spans = USUAL_SPANS
 
     def __post_init__(self) -> None:
         if not isinstance(self.subject.profile, PeakProfile):
             raise TypeError(self.subject.profile)
-        starts, widths = (x.ravel() for x in np.meshgrid(STARTS_MS, WIDTHS_MS, indexing="ij"))
+        starts, widths = (x.ravel() for x in np.meshgrid(self.spans.starts_ms, self.spans.widths_ms, indexing="ij"))
         shift = self.subject.hit_delay_ms if self.space.reference == "valve" else 0.0
         grid = self.space.grid_ms
         middle, sd = starts + widths / 2 + shift, widths / 4
@@ -93,11 +122,17 @@ class Oracle:
         self._edges_mv, self._mass = outcome_table(self.subject)
         self._middle, self._sd = middle, sd
         self._level_at = self._levels(self.candidates_ms)
-        excess = self.subject.response.expected_evoked_mv(LEVELS) - self.subject.response.expected_evoked_mv(0.0)
-        edge_level = np.interp(EDGE_LEVEL * excess[-1], excess, LEVELS)
-        self._masks = self._facilitation(grid) >= edge_level
-        prior = _prior(starts, widths)
-        self._log_weights = np.log(prior / prior.sum())
+        self._masks = self._windows(self._facilitation(grid))
+        self._log_weights = np.log(np.tile(self.spans.shares, len(self.spans.starts_ms)) / len(self.spans.starts_ms))
+
+    def _windows(self, facilitation: FloatArray) -> BoolArray:
+        """Windows by the 0.135 rule, empty where the range reaches too little, shape of `facilitation`."""
+        response, baseline_mv = self.subject.response, self.subject.baseline_mv / self.subject.scale
+        excess_mv = response.expected_evoked_mv(LEVELS) - response.expected_evoked_mv(0.0)
+        peak_mv = np.interp(facilitation.max(-1, keepdims=True), LEVELS, excess_mv)
+        edge = np.interp(EDGE_LEVEL * peak_mv, excess_mv, LEVELS)
+        least_mv = max(MIN_EXCESS_OF_BASELINE * baseline_mv, MIN_EXCESS_MV / self.subject.scale)
+        return (facilitation >= edge) & (peak_mv >= least_mv)
 
     def _facilitation(self, isi_ms: FloatArray) -> FloatArray:
         return np.exp(-0.5 * ((isi_ms - self._middle[:, None]) / self._sd[:, None]) ** 2)
@@ -124,7 +159,7 @@ class Oracle:
         self._log_weights -= np.logaddexp.reduce(self._log_weights)
 
     def estimate(self) -> Window | None:
-        """The window of largest posterior expected F1 among the level sets of the posterior's membership."""
+        """The answer of largest posterior expected F1: a level set of the posterior's membership, or none."""
         weights = np.exp(self._log_weights)
         membership = weights @ self._masks
         cuts = np.linspace(0.1, 0.9, 17) * membership.max()
@@ -132,9 +167,12 @@ class Oracle:
         overlap = candidates.astype(np.float32) @ self._masks.T.astype(np.float32)
         sizes = candidates.sum(1)[:, None] + self._masks.sum(1)
         expected = (2 * overlap / np.maximum(sizes, 1)) @ weights
+        if weights[~self._masks.any(1)].sum() >= expected.max():
+            return None
         return Window.from_mask(self.space.grid_ms, candidates[expected.argmax()])
 
 
 def simulate_oracle(session: SimulatedSession) -> pd.DataFrame:
     """Run one session of a study with the oracle."""
-    return play(session, Oracle(session.subject(), session.space))
+    spans = OTHER_SPANS.get(session.cohort, USUAL_SPANS)
+    return play(session, Oracle(session.subject(), session.space, spans))

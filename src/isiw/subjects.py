@@ -21,7 +21,7 @@ from isiw.recruitment import EmgFloor, GainResponse, RecruitmentResponse, Respon
 from isiw.types import FloatArray, Reference
 from isiw.window import Window, window_from_excess
 
-__all__ = ["COHORTS", "Drift", "Responder", "Response", "SimulatedSubject", "cohort"]
+__all__ = ["COHORTS", "WIDTHS_KIM_MS", "Drift", "Responder", "Response", "SimulatedSubject", "cohort"]
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class Responder:
         return TrialNoise(float(self._input_z), float(log_gain))
 
 
-_WIDTHS_KIM_MS: Final = (75, 65, 80, 70, 110, 120, 220, 145, 135, 110, 60)
+WIDTHS_KIM_MS: Final = (75, 65, 80, 70, 110, 120, 220, 145, 135, 110, 60)
 """Window widths of the dissertation's eleven subjects [ms] (Table 4.1)."""
 
 
@@ -249,7 +249,7 @@ def _nonresponder(rng: np.random.Generator, *, kind: bool) -> SimulatedSubject:
 
 def _kim_subject(index: int) -> SimulatedSubject:
     rng = np.random.default_rng([zlib.crc32(b"kim11"), 4, index])
-    profile = PeakProfile(float(rng.uniform(20, 100)), _WIDTHS_KIM_MS[index])
+    profile = PeakProfile(float(rng.uniform(20, 100)), WIDTHS_KIM_MS[index])
     subject = _subject(rng, profile, _recruitment(rng, boost_pct_rmt=(6, 14)))
     return replace(subject, input_correlation=float(rng.uniform(0, 0.2)))
 
@@ -289,7 +289,7 @@ def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
     if n < 0 or seed < 0:
         raise InvalidValueError("n and seed must not be negative", got=(n, seed))
     if name == "kim11":
-        return [_kim_subject(i % len(_WIDTHS_KIM_MS)) for i in range(n)]
+        return [_kim_subject(i % len(WIDTHS_KIM_MS)) for i in range(n)]
     generators = [np.random.default_rng([zlib.crc32(name.encode()), seed, i]) for i in range(n)]
     if name == "nonresponder":
         return [_nonresponder(rng, kind=i % 2 == 0) for i, rng in enumerate(generators)]

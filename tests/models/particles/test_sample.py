@@ -23,7 +23,7 @@ def test_windows_are_those_of_the_rule_also_where_a_peak_lies_beyond_the_range(s
     sample = PersonSample(person, space)
     grid_ms = torch.tensor(space.grid_ms, dtype=torch.float32)
     masks = sample.window_masks(grid_ms)[0].numpy()
-    meps_mv, baselines_mv = sample.expected_mep_mv(grid_ms)[0].double().numpy(), sample.baselines_mv()[0].double().numpy()
+    meps_mv, baselines_mv = (x[0].double().numpy() for x in (sample.expected_mep_mv(grid_ms), sample.baselines_mv()))
     told = [Window.from_mask(space.grid_ms, mask) for mask in masks]
     ruled = [
         window_from_excess(space.grid_ms, mep_mv - baseline_mv, baseline_mv)

@@ -175,7 +175,9 @@ class WindowSample:
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows as 0 or 1, shape (b, s, t)."""
-        inside = self.enhances.unsqueeze(-1) & (self.levels(isi_ms.double()) >= EDGE_LEVEL * self._highest.unsqueeze(-1))
+        inside = self.enhances.unsqueeze(-1) & (
+            self.levels(isi_ms.double()) >= EDGE_LEVEL * self._highest.unsqueeze(-1)
+        )
         return inside.to(torch.float32)
 
     def profiles_mv(self, isi_ms: Tensor) -> Tensor:
