@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from isiw.devices.callback import CallbackDevice
-from isiw.devices.clock import VirtualClock
+from isiw.devices.clock import MonotonicClock, VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.recorded import RecordedDevice, Recordings
 from isiw.devices.replay import ReplayDevice
 from isiw.devices.simulated import SimulatedDevice
+from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError
 from isiw.subjects import cohort
 from isiw.testing import check_device
 from isiw.trials import Measurement, Status, Trial, TrialTable
@@ -51,7 +52,8 @@ def test_a_replaying_device_conforms(space):
 
 def test_a_device_of_functions_conforms(space):
     info = DeviceInfo("functions", "valve")
-    check_device(lambda: CallbackDevice(lambda s, timeout_s: Measurement(timeout_s, s.isi_ms), info), space)
+    device = CallbackDevice(lambda stimulus, timeout_s: Measurement(timeout_s, stimulus.isi_ms), info)
+    check_device(lambda: device, space, clock=VirtualClock())
 
 
 def test_a_limited_device_conforms(space):
@@ -105,6 +107,87 @@ def test_the_suite_finds_a_device_with_wrong_timing(space):
 def test_the_suite_finds_a_device_on_another_reference(space):
     with pytest.raises(AssertionError, match="reference"):
         check_device(lambda: SimulatedDevice(responder("impact"), "impact"), space)
+
+
+class Hardware:
+    """Stays armed until it is told otherwise, fails at one delivery, and remembers when it fired."""
+
+    def __init__(self, fails_at=None, clock=None):
+        self.fails_at, self.clock = fails_at, clock or VirtualClock()
+        self.armed, self.taken, self.fired_s = False, False, []
+
+    def describe(self):
+        return DeviceInfo("hardware", "valve")
+
+    def stage(self):
+        self.armed = self.taken = True
+
+    def deliver(self, stimulus, timeout_s):
+        del timeout_s
+        if not self.armed:
+            raise DeviceError("not armed")
+        self.fired_s.append(self.clock.now_s())
+        if stimulus.trial == self.fails_at:
+            raise DeviceTimeoutError("no answer")
+        return Measurement(0.1, stimulus.isi_ms)
+
+    def stop(self):
+        self.armed = False
+
+    def unstage(self):
+        self.armed = self.taken = False
+
+
+class RememberingHardware(Hardware):
+    """Has a memory."""
+
+    def resume_after(self, stimuli):
+        del stimuli
+
+
+class LateHardware(Hardware):
+    """Answers with an ISI that nobody commanded."""
+
+    def deliver(self, stimulus, timeout_s):
+        super().deliver(stimulus, timeout_s)
+        return Measurement(0.1, 1000.0)
+
+
+@pytest.mark.parametrize(
+    ("device", "error"),
+    [
+        (Hardware(fails_at=1), DeviceTimeoutError),
+        (RememberingHardware(fails_at=3), DeviceTimeoutError),
+        (LateHardware(), AssertionError),
+    ],
+)
+def test_a_device_that_fails_the_suite_is_left_disarmed(space, device, error):
+    with pytest.raises(error):
+        check_device(lambda: device, space, clock=VirtualClock())
+    assert device.fired_s
+    assert not device.armed
+    assert not device.taken
+
+
+def test_an_inter_trial_interval_passes_before_each_delivery(space):
+    device = RememberingHardware()
+    check_device(lambda: device, space, clock=device.clock)
+    assert len(device.fired_s) == 8
+    assert np.diff([0.0, *device.fired_s]).min() >= 5.0
+
+
+def test_the_suite_waits_in_real_time_for_a_device_that_is_not_simulated(space):
+    device = Hardware(clock=MonotonicClock())
+    check_device(lambda: device, space, iti_s=0.01)
+    assert np.diff(device.fired_s).min() >= 0.01
+
+
+@pytest.mark.parametrize("iti_s", [-1.0, np.nan, np.inf])
+def test_an_interval_that_nobody_can_wait_for_is_an_error(space, iti_s):
+    device = Hardware()
+    with pytest.raises(InvalidValueError, match="iti_s"):
+        check_device(lambda: device, space, iti_s=iti_s)
+    assert not device.fired_s
 
 
 def test_the_suite_finds_what_is_no_device(space):

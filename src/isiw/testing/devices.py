@@ -2,45 +2,96 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 
 from isiw.design import DesignSpace
+from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
-from isiw.errors import DeviceError
+from isiw.errors import DeviceError, InvalidValueError
 from isiw.testing.promises import require
 from isiw.trials import Measurement, Stimulus, Sweep
 
 __all__ = ["check_device"]
 
 
-def check_device(make: Callable[[], Device], space: DesignSpace, *, timeout_s: float = 30.0) -> None:
-    """Check that a device keeps the promises of `isiw.Device`. It delivers up to eleven pairs of stimuli.
+def check_device(
+    make: Callable[[], Device],
+    space: DesignSpace,
+    *,
+    timeout_s: float = 30.0,
+    iti_s: float = 5.0,
+    clock: Clock | None = None,
+) -> None:
+    """Check that a device keeps the promises of `isiw.Device`. It stimulates: put the coil on a phantom.
+
+    It delivers three pairs of stimuli, or eight where the device has a memory, and tries six more times while the
+    device is disarmed and must refuse. Whatever happens, the device is stopped and unstaged at the end.
 
     Args:
-        make: makes the device, in the same state each time; called twice where the device has a memory.
+        make: makes the device, in the same state each time; called three times where the device has a memory.
         space: ISIs that it can deliver, on its reference.
         timeout_s: how long one delivery may take [s].
+        iti_s: how long to wait before each of these deliveries [s].
+        clock: waits; a virtual one by default where the device is simulated.
 
     Raises:
         AssertionError: a promise is broken; the message says which.
+        InvalidValueError: an inter-trial interval that is negative or not finite.
     """
     device = make()
     require(isinstance(device, Device), "it has describe, stage, deliver, stop and unstage")
     _check_description(device, space)
-    _check_refusal(device, "before stage()", timeout_s)
+    pace = _Pace(timeout_s, iti_s, clock or (VirtualClock() if device.describe().simulated else MonotonicClock()))
+    with _disarmed_at_last(device):
+        _check_delivery(device, space, pace)
+    if isinstance(device, HasMemory):
+        _check_memory(make, space, pace)
+
+
+@dataclass(frozen=True)
+class _Pace:
+    """How fast deliveries may follow each other."""
+
+    timeout_s: float
+    iti_s: float
+    clock: Clock
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.iti_s) and self.iti_s >= 0):
+            raise InvalidValueError("iti_s must be finite and not negative", got=self.iti_s)
+
+    def deliver(self, device: Device, stimulus: Stimulus) -> Answer:
+        """Deliver one pair of stimuli, an inter-trial interval after whatever was delivered before."""
+        self.clock.sleep_s(self.iti_s)
+        return device.deliver(stimulus, self.timeout_s)
+
+
+@contextmanager
+def _disarmed_at_last(device: Device) -> Iterator[None]:
+    try:
+        yield
+    finally:
+        try:
+            device.stop()
+        finally:
+            device.unstage()
+
+
+def _check_delivery(device: Device, space: DesignSpace, pace: _Pace) -> None:
+    _check_refusal(device, "before stage()", pace)
     device.stage()
-    stimuli = [Stimulus(trial, isi_ms) for trial, isi_ms in enumerate((space.low_ms, None, space.high_ms))]
-    answers = [device.deliver(stimulus, timeout_s) for stimulus in stimuli]
-    for stimulus, answer in zip(stimuli, answers, strict=True):
-        _check_answer(device.describe(), stimulus, answer, space)
+    for trial, isi_ms in enumerate((space.low_ms, None, space.high_ms)):
+        stimulus = Stimulus(trial, isi_ms)
+        _check_answer(device.describe(), stimulus, pace.deliver(device, stimulus), space)
     for verb in (device.stop, device.stop, device.unstage, device.unstage):
         verb()
-        _check_refusal(device, "after stop() or unstage()", timeout_s)
+        _check_refusal(device, "after stop() or unstage()", pace)
     device.stage()
     device.stop()
-    _check_refusal(device, "after being staged again and stopped", timeout_s)
-    if isinstance(device, HasMemory):
-        _check_memory(make, space, timeout_s)
+    _check_refusal(device, "after being staged again and stopped", pace)
 
 
 def _check_description(device: Device, space: DesignSpace) -> None:
@@ -50,9 +101,9 @@ def _check_description(device: Device, space: DesignSpace) -> None:
     require(info.reference == space.reference, f"its reference is the space's, {space.reference}")
 
 
-def _check_refusal(device: Device, when: str, timeout_s: float) -> None:
+def _check_refusal(device: Device, when: str, pace: _Pace) -> None:
     try:
-        device.deliver(Stimulus(0, None), timeout_s)
+        pace.deliver(device, Stimulus(0, None))
     except DeviceError:
         return
     raise AssertionError(f"broken promise: deliver raises a DeviceError {when}")
@@ -73,22 +124,21 @@ def _check_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, space: D
         require(off_ms <= space.tolerance_ms, f"the realised ISI is near the commanded one, here {off_ms:g} ms off")
 
 
-def _check_memory(make: Callable[[], Device], space: DesignSpace, timeout_s: float) -> None:
+def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: _Pace) -> None:
     grid = space.grid_ms
     stimuli = [Stimulus(trial, float(grid[trial * (len(grid) - 1) // 3])) for trial in range(4)]
-    uninterrupted = _answers(make(), stimuli, timeout_s)
+    uninterrupted = _answers(make(), stimuli, pace)
     resumed = make()
     if isinstance(resumed, HasMemory):
         resumed.resume_after(stimuli[:3])
-    (last,) = _answers(resumed, stimuli[3:], timeout_s)
+    (last,) = _answers(resumed, stimuli[3:], pace)
     require(_same(last, uninterrupted[3]), "after resume_after it answers as if it had never been interrupted")
 
 
-def _answers(device: Device, stimuli: Sequence[Stimulus], timeout_s: float) -> list[Answer]:
-    device.stage()
-    answers = [device.deliver(stimulus, timeout_s) for stimulus in stimuli]
-    device.stop()
-    return answers
+def _answers(device: Device, stimuli: Sequence[Stimulus], pace: _Pace) -> list[Answer]:
+    with _disarmed_at_last(device):
+        device.stage()
+        return [pace.deliver(device, stimulus) for stimulus in stimuli]
 
 
 def _same(one: Answer, other: Answer) -> bool:
