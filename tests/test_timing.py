@@ -13,6 +13,7 @@ from isiw.session import Session
 from isiw.signals import TapEvents
 from isiw.timing import (
     STUDY_ISI_MS,
+    TimingStudy,
     error_table,
     event_table,
     study_preset,
@@ -93,6 +94,14 @@ def test_the_pooled_sd_leaves_the_means_of_the_sets_out():
         "shifted", study.events, study.commanded_ms, study.realised_ms + np.where(study.commanded_ms > 40, 7.0, 0.0)
     )
     assert shifted.pooled_sd_ms == pytest.approx(study.pooled_sd_ms)
+
+
+@pytest.mark.parametrize("lost", [(), (10.0,), (10.0, 20.0, 30.0)])
+def test_an_isi_of_which_every_trial_is_lost_leaves_the_pooled_sd_as_it_is(lost):
+    commanded = np.array([50.0, 50.0, 50.0, *lost])
+    realised = np.array([49.0, 50.0, 51.0, *(-1.0 for _ in lost)])
+    events = TapEvents(*(np.full(len(commanded), np.nan) for _ in range(5)))
+    assert TimingStudy("hand-made", events, commanded, realised).pooled_sd_ms == pytest.approx(1.0)
 
 
 def test_recorded_sweeps_are_studied_like_a_preset():

@@ -79,9 +79,9 @@ class TimingStudy:
 
     @property
     def pooled_sd_ms(self) -> float:
-        """SD of the ISI error, each set's mean removed (5.2.1) [ms]; NaN where there are no ISIs."""
-        table = self.error_table
-        left = table["n"].sum() - len(table)
+        """SD of the ISI error, each set's mean removed (5.2.1) [ms]; NaN where no ISI has two accepted trials."""
+        table = self.error_table[self.error_table["n"] > 1]
+        left = (table["n"] - 1).sum()
         return float(np.sqrt((table["sd_ms"] ** 2 * (table["n"] - 1)).sum() / left)) if left > 0 else float("nan")
 
 
