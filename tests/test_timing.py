@@ -117,6 +117,34 @@ def test_recorded_sweeps_are_studied_like_a_preset():
     assert study.mistrials == 0
 
 
+class TapperOnThePulsesClock(Tapper):
+    """The tapping robot, on a sweep clock that is zero at the magnetic pulse."""
+
+    def deliver(self, stimulus, timeout_s):
+        sweep = super().deliver(stimulus, timeout_s)
+        pulse_ms = sweep.t_tms_ms
+        channels = {name: replace(wave, t0_ms=wave.t0_ms - pulse_ms) for name, wave in sweep.channels.items()}
+        return replace(sweep, channels=channels, t_valve_ms=sweep.t_valve_ms - pulse_ms, t_tms_ms=0.0)
+
+
+def test_a_sweep_clock_that_begins_elsewhere_changes_nothing():
+    class Silent:
+        mep_mv = 0.0
+
+    isi_ms = [20.0, 150.0] * 5
+    studies = []
+    for kind in (Tapper, TapperOnThePulsesClock):
+        device = kind(lambda _: Silent(), "subject4", TapperSettings(trigger="impact"))
+        device.stage()
+        sweeps = [device.deliver(Stimulus(trial, isi), 1.0) for trial, isi in enumerate(isi_ms)]
+        studies.append(study_sweeps("ten taps", sweeps, isi_ms))
+    usual, other = studies
+    for name, times in usual.events.columns().items():
+        np.testing.assert_allclose(other.events.columns()[name], times, atol=1e-9, err_msg=name)
+    np.testing.assert_allclose(other.realised_ms, usual.realised_ms, atol=1e-9)
+    assert usual.event_table.loc["hit", "mean_ms"] == pytest.approx(682, abs=2.0)
+
+
 def test_a_logged_session_is_studied_like_a_preset(tmp_path, scripted_strategy):
     class Silent:
         mep_mv = 0.0

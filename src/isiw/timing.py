@@ -52,7 +52,7 @@ class TimingStudy:
 
     Args:
         name: the preset, or what else was studied.
-        events: the events of all taps [ms from the trial's start].
+        events: the events of all taps [ms from the trial's start, 500 ms before its valve command].
         commanded_ms: commanded ISIs from the impact [ms], NaN for a tap without a pulse, shape (n,).
         realised_ms: realised ISIs [ms], NaN where no impact was found, shape (n,).
     """
@@ -169,8 +169,9 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
     """
     parts, realised = [], []
     for sweep in sweeps:
-        parts.append(sweep_events(sweep))
-        realised.append(np.nan if sweep.t_tms_ms is None else sweep.t_tms_ms - parts[-1].hit_ms[0])
+        events = sweep_events(sweep)  # raises where the valve's time is unknown
+        realised.append(np.nan if sweep.t_tms_ms is None else sweep.t_tms_ms - events.hit_ms[0])
+        parts.append(_later(events, VALVE_MS - (sweep.t_valve_ms or 0.0)))
     if not parts:
         raise InvalidValueError("a study needs sweeps", got=0)
     commanded = np.array([np.nan if isi is None else isi for isi in commanded_isi_ms])
@@ -222,6 +223,11 @@ def _tap(geometry: Geometry, pulse_ms: FloatArray, rate_hz: float, rng: np.rando
     waves = record_robot(times, taps, rng)
     emg = record_emg(times, rate_hz, taps, rng, pulse_ms=pulse_ms - VALVE_MS, evoked_mv=np.zeros(len(pulse_ms)))
     return detect_events(waves["acceleration"], rate_hz, pressure=waves["pressure"], emg=emg, t_tms_ms=pulse_ms)
+
+
+def _later(events: TapEvents, shift_ms: float) -> TapEvents:
+    """The same events on a clock that began so much earlier [ms]."""
+    return TapEvents(*(times + shift_ms for times in events.columns().values()))
 
 
 def _joined(parts: Iterable[TapEvents]) -> TapEvents:
