@@ -10,7 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from isiw.asking import candidate_isis
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError, OutOfSpaceError
 
 spaces = st.builds(
@@ -24,6 +26,22 @@ isis = st.floats(-1e4, 1e4)
 
 def test_the_grid_holds_both_ends() -> None:
     assert DesignSpace(10, 20, step_ms=2.5).grid_ms.tolist() == [10.0, 12.5, 15.0, 17.5, 20.0]
+
+
+@pytest.mark.parametrize(
+    "bounds",
+    [(20, 120.3, 0.1), (0, 100.3, 0.1), (0, 4.1, 0.1), (-7.3, 1.1, 0.7), (0, 100, 33.3333333334), (0.1, 1.7, 0.2)],
+)
+def test_rounding_puts_no_isi_beyond_the_bounds(bounds: tuple[float, float, float]) -> None:
+    space = DesignSpace(*bounds)
+    assert (space.grid_ms[0], space.grid_ms[-1]) == (space.low_ms, space.high_ms)
+    assert (np.diff(space.grid_ms) > 0).all()
+    assert space.snap(1e4) == space.high_ms
+    assert Limits.of_space(space).high_ms >= space.snap(float(candidate_isis(space)[-1]))
+
+
+def test_a_grid_of_whole_milliseconds_is_exact() -> None:
+    assert DesignSpace(-20, 500).grid_ms.tolist() == [float(isi_ms) for isi_ms in range(-20, 501)]
 
 
 @given(spaces)

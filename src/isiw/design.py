@@ -66,6 +66,7 @@ class DesignSpace:
         """All ISIs that may be asked [ms], shape (t,)."""
         steps = np.arange(round((self.high_ms - self.low_ms) / self.step_ms) + 1, dtype=np.float64)
         grid: FloatArray = self.low_ms + self.step_ms * steps
+        grid[-1] = self.high_ms  # rounding may have put it a little beyond, where limits refuse it
         grid.setflags(write=False)
         return grid
 
