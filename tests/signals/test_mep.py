@@ -113,6 +113,14 @@ def test_too_little_rest_is_an_error():
         background_rms(emg_with_mep(0.1), RATE_HZ, 30.0)
 
 
+@pytest.mark.parametrize("pulse_ms", [1010.0, 1200.0, [500.0, 1200.0]])
+def test_a_pulse_beyond_the_sweep_has_no_background(pulse_ms):
+    emg = 0.004 * np.random.default_rng(3).standard_normal((2, 5000))
+    with pytest.raises(InvalidValueError, match="ends before the pulse"):
+        background_rms(emg, 5000.0, pulse_ms)
+    np.testing.assert_allclose(background_rms(emg, 5000.0, 1000.0), 0.004, rtol=0.15)
+
+
 @pytest.mark.parametrize(
     ("emg", "rate_hz", "pulse_ms", "what"),
     [

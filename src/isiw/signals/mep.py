@@ -192,7 +192,7 @@ def background_rms(
             artefact of the tap and are passed over.
 
     Raises:
-        InvalidValueError: a waveform that is no recording, or less than 40 ms of rest.
+        InvalidValueError: a waveform that is no recording, a pulse after its end, or less than 40 ms of rest.
     """
     waves = as_waveforms(emg_mv, rate_hz, "EMG")
     rest = _quiet(waves, rate_hz, per_waveform(t_tms_ms, waves), per_waveform(t_hit_ms, waves))
@@ -234,6 +234,12 @@ def _quiet(waves: FloatArray, rate_hz: float, pulse_ms: FloatArray, hit_ms: Floa
     if not np.isfinite(pulse_ms).all():
         raise InvalidValueError("the time of the pulse must be finite", got=pulse_ms)
     stop = np.floor((pulse_ms - PULSE_GUARD_MS) * rate_hz / 1000).astype(np.int64)
+    if (stop > waves.shape[-1]).any():
+        raise InvalidValueError(
+            "the sweep ends before the pulse",
+            got=f"pulse at {pulse_ms.max():g} ms in a sweep of {waves.shape[-1] * 1000 / rate_hz:g} ms",
+            remedy="Pulse times count from the sweep's first sample.",
+        )
     columns = (stop - reach)[:, None] + np.arange(reach)
     since_hit = columns * 1000 / rate_hz - hit_ms[:, None]
     resting = (columns >= 0) & ~((since_hit >= 0) & (since_hit <= TAP_SPAN_MS))
