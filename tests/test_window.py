@@ -209,6 +209,12 @@ def test_a_credible_level_lies_between_0_and_1(level: float) -> None:
         WindowEstimate(1.0, None).interval(level)
 
 
+@pytest.mark.parametrize("min_share", [-0.01, 1.01, math.nan])
+def test_the_least_share_of_a_hypothesis_lies_between_0_and_1(min_share: float) -> None:
+    with pytest.raises(InvalidValueError, match="share"):
+        WindowEstimate(1.0, None).robust_interval(min_share=min_share)
+
+
 def test_the_profile_is_interpolated_between_grid_points() -> None:
     estimate = WindowEstimate(
         1.0,

@@ -197,8 +197,10 @@ class WindowEstimate:
             As `interval` does; the same where the method has no hypotheses.
 
         Raises:
-            InvalidValueError: a level outside 0–1.
+            InvalidValueError: a level or a share outside 0–1.
         """
+        if not 0.0 <= min_share <= 1.0:
+            raise InvalidValueError("the least share of a hypothesis must lie in 0–1", got=min_share)
         whole = self.interval(level)
         if whole is None or self.hypotheses is None or self.edge_samples_ms is None:
             return whole
