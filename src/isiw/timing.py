@@ -190,7 +190,7 @@ def study_session(record: SessionRecord) -> TimingStudy:
     from_impact = record.header.space.reference == "impact"
     sweeps, commanded = [], []
     for trial in record.table:
-        channels = {name: wave for (index, name), wave in record.waveforms.items() if index == trial.index}
+        channels = record.sweep(trial.index)
         if "acceleration" in channels and trial.t_valve_ms is not None:
             sweeps.append(Sweep(channels, t_valve_ms=trial.t_valve_ms, t_tms_ms=trial.t_tms_ms))
             commanded.append(trial.commanded_isi_ms if from_impact else None)

@@ -44,7 +44,7 @@ def render() -> Callable[..., Rendered]:
         if harsh:
             geometry = replace(geometry, noise=geometry.noise.scaled(2.0))
         taps = draw_taps(geometry, n, rng)
-        taps = taps.weaker(0.9) if harsh else taps
+        taps = replace(taps, speed_m_s=0.9 * taps.speed_m_s) if harsh else taps
         times = sample_times_ms(RATE_HZ, 1000.0, valve_ms=500.0)
         waves = record_robot(times, taps, rng)
         nothing = np.full(n, np.nan)

@@ -197,10 +197,6 @@ class Taps:
         never = np.full_like(self.hit_ms, math.inf)
         return replace(self, descent_ms=nowhere, hit_ms=nowhere, memg_ms=nowhere, late_ms=never)
 
-    def weaker(self, factor: float) -> Taps:
-        """The same taps, arriving at the same time with another speed."""
-        return replace(self, speed_m_s=factor * self.speed_m_s)
-
 
 def draw_taps(geometry: Geometry, n: int, rng: np.random.Generator) -> Taps:
     """Taps with the variation of a geometry, n of them."""
