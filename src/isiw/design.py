@@ -23,7 +23,8 @@ class DesignSpace:
         high_ms: last ISI [ms].
         step_ms: distance between two ISIs [ms]; the range must hold a whole number of steps.
         reference: the event that an ISI is counted from, the `"impact"` of the hammer or the `"valve"` command.
-        tolerance_ms: how far beyond the range a *realised* ISI may lie before it is an error [ms].
+        tolerance_ms: how far a *realised* ISI may lie beyond the range before it is an error, and from the commanded
+            one before it is a mistrial [ms].
 
     Raises:
         InvalidValueError: a bound that is not finite, an empty range, a step that does not fit, an unknown reference.

@@ -1,9 +1,19 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from isiw.catalogue import make_strategy
+from isiw.design import VALVE_SPACE
+from isiw.devices.limits import Limits
 from isiw.devices.replay import ReplayDevice
+from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import DeviceError
+from isiw.log.reader import read_session
+from isiw.metrics import f1
+from isiw.session import Session
+from isiw.subjects import cohort
 from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
 
 TABLE = TrialTable(
@@ -43,5 +53,43 @@ def test_tms_alone_is_answered_by_tms_alone(device):
 
 def test_each_trial_answers_once(device):
     meps(device, 10.0, 50.0, 50.0)
-    with pytest.raises(DeviceError, match="no recorded trial is left"):
+    with pytest.raises(DeviceError, match=r"no recorded trial is left.*max_pulses"):
         device.deliver(Stimulus(3, 50.0), 1.0)
+
+
+@pytest.fixture
+def person():
+    return cohort("gaussian", 1, 3)[0]
+
+
+@pytest.fixture
+def recording(person, tmp_path):
+    """A logged session of a strategy that asks at random."""
+    begun = person.begin(5)
+    device = SimulatedDevice(lambda isi_ms: begun.respond(isi_ms, "valve"), "valve")
+    strategy = make_strategy("random", space=VALVE_SPACE, particles=200, max_trials=24)
+    return read_session(Session(device, strategy, log=tmp_path / "first.mcap").run().log)
+
+
+def run_again(recording, log, tolerance_ms):
+    """A session of the default strategy on the recorded trials, as the device's documentation says."""
+    space = replace(recording.header.space, tolerance_ms=tolerance_ms)
+    pairs = sum(trial.isi_ms is not None for trial in recording.table.told)
+    device = ReplayDevice(recording.table, space.reference)
+    limits = Limits.of_space(space, max_pulses=pairs)
+    return Session(device, make_strategy(space=space, particles=200), log=log, limits=limits).run()
+
+
+def test_another_strategy_learns_from_every_recorded_trial_of_a_session(recording, person, tmp_path):
+    result = run_again(recording, tmp_path / "again.mcap", tolerance_ms=1000.0)
+    assert all(trial.told for trial in result.trials)
+    recorded = {(trial.isi_ms, trial.mep_mv) for trial in recording.table.told}
+    assert {(trial.isi_ms, trial.mep_mv) for trial in result.trials} <= recorded
+    assert [trial.commanded_isi_ms for trial in result.trials] != [t.commanded_isi_ms for t in recording.table]
+    assert f1(result.estimate, person.window(VALVE_SPACE), VALVE_SPACE) > 0.9
+
+
+def test_with_the_usual_tolerance_most_recorded_trials_are_mistrials_for_another_strategy(recording, tmp_path):
+    result = run_again(recording, tmp_path / "again.mcap", tolerance_ms=10.0)
+    lost = [trial for trial in result.trials if trial.reason is MistrialReason.ISI_OFF]
+    assert len(lost) > len(result.trials) / 2

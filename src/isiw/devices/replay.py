@@ -17,7 +17,16 @@ class ReplayDevice:
     """Answers each stimulus with the recorded trial of the nearest ISI, each trial once.
 
     A session that asks what was asked before gets the same answers; another one gets the nearest there are, at the ISIs
-    at which they were really recorded.
+    at which they were really recorded. These may be far from what is asked, so another strategy needs a space with a
+    `tolerance_ms` wider than its range: beyond it a session takes the recorded trial for a mistrial and learns nothing
+    from it. Its limits end the session when all recorded pairs of stimuli are used up:
+
+        record = isiw.read_session("session.mcap")
+        space = dataclasses.replace(record.header.space, tolerance_ms=1000.0)
+        pairs = sum(trial.isi_ms is not None for trial in record.table.told)
+        device = isiw.ReplayDevice(record.table, space.reference)
+        limits = isiw.Limits.of_space(space, max_pulses=pairs)
+        isiw.Session(device, isiw.make_strategy(space=space), log="again.mcap", limits=limits).run()
 
     Args:
         table: the recorded trials; only those that a strategy may learn from are used.
@@ -52,7 +61,9 @@ class ReplayDevice:
         fitting = [trial for trial in self._left if (trial.isi_ms is None) == (asked_ms is None)]
         if not fitting:
             raise DeviceError(
-                "no recorded trial is left to answer with", remedy="Stop earlier, or replay a longer recording."
+                "no recorded trial is left to answer with",
+                remedy="Give the limits as many max_pulses as there are recorded pairs, or replay a longer recording. "
+                "Where trials were mistrials for their ISI, give the space a tolerance_ms wider than its range.",
             )
         trial = min(fitting, key=lambda candidate: _distance_ms(candidate, asked_ms))
         self._left.remove(trial)
