@@ -124,6 +124,30 @@ def test_drawn_paths_have_the_mean_and_the_covariance_of_the_process() -> None:
     assert ((torch.cov(level.T) - covariance).abs() < bound).all()
 
 
+@pytest.mark.parametrize("alone", [1, 4])
+def test_the_floor_is_drawn_with_its_path_from_what_all_trials_tell(alone: int) -> None:
+    # The joint Gaussian of all trials, path and constant by hand; the baselines lie a unit below the other trials.
+    # 20,000 paths: means within 5 and covariances within 8 standard errors.
+    rng = np.random.default_rng(0)
+    isis_ms = np.concatenate((rng.uniform(0, 320, 40), np.zeros(alone), np.linspace(0, 320, 9), np.zeros(1)))
+    amplitude = np.repeat([1.1, 0.0, 1.1, 0.0], [40, alone, 9, 1])
+    values = np.concatenate((rng.normal(0.5, 0.6, 40), rng.normal(-0.5, 0.1, alone)))
+    steps = 5**0.5 / 30.0 * np.abs(isis_ms[:, None] - isis_ms)
+    shared = 1.0 + amplitude[:, None] * amplitude * (1 + steps + steps**2 / 3) * np.exp(-steps)
+    n = len(values)
+    gain = np.linalg.solve(shared[:n, :n] + 0.36 * np.eye(n), shared[:n, n:]).T
+    mean, covariance = -4.0 + 0.7 * gain @ values, 0.49 * (shared[n:, n:] - gain @ shared[:n, n:])
+
+    meps_mv = np.exp(-4.0 + 0.7 * values)
+    told, fixed = PersonTrials(isis_ms[:40], meps_mv[:40], meps_mv[40:]), FixedProcess(30.0, 1.1, 0.6, -4.0, 0.7)
+    fit = fixed_fit(HyperparameterPrior(p_window=1.0), "matern", Scale("log", 0.005, -4.0, 0.7), told, fixed)
+    paths = draw_paths(fit, torch.as_tensor(isis_ms[n:-1]), 20_000, rng)
+    drawn = np.column_stack((paths.level, paths.alone))
+    sd = covariance.diagonal() ** 0.5
+    assert (np.abs(drawn.mean(0) - mean) < 5 * sd / 20_000**0.5).all()
+    assert (np.abs(np.cov(drawn.T) - covariance) < 8 * np.outer(sd, sd) / 20_000**0.5).all()
+
+
 def test_constant_paths_have_the_posterior_of_the_constant() -> None:
     # Nearly certain that the tap changes nothing: conjugate mean and variance of a constant with a unit prior.
     rng = np.random.default_rng(0)

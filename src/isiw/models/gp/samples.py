@@ -34,6 +34,9 @@ makes no segment of a window. So a lower second peak is lost."""
 PATH_JITTER = 1e-5
 """Share of a process's variance that is added to the diagonal before paths are drawn, for a stable factor."""
 
+FAR_LENGTHS = 100.0
+"""Further than this from all trials, nothing is told of a process but its constant."""
+
 OUTCOMES = 32
 """Values of the transformed MEP on which predictive distributions live."""
 
@@ -68,14 +71,14 @@ def draw_paths(fit: Fit, isi_ms: Tensor, size: int, rng: np.random.Generator) ->
     picks = systematic(torch.log_softmax(fit.log_joint, 0).unsqueeze(0), size)[0]
     chosen = fit.processes.picked(picks)
     present = chosen.amplitude > 0
-    level = torch.empty((size, len(isi_ms)), dtype=torch.float64)
-    z = torch.as_tensor(rng.standard_normal((size, len(isi_ms) + 1)))
-    level[present] = _profiles(fit, picks[present], isi_ms, z[present, 1:])
-    level[~present] = _constants(fit, chosen.noise[~present], z[~present, 0]).unsqueeze(-1)
+    # The first of a path's numbers is its constant's, which is drawn last.
+    z = torch.as_tensor(rng.standard_normal((size, len(isi_ms) + 1))).roll(-1, dims=1)
+    drawn = torch.empty_like(z)
+    drawn[present] = _profiles(fit, picks[present], isi_ms, z[present])
+    drawn[~present] = _constants(fit, chosen.noise[~present], z[~present, -1]).unsqueeze(-1)
+    level, alone = drawn[:, :-1], drawn[:, -1]
     changed = fit.noise.log_variance(isi_ms) * present.unsqueeze(-1)
     noise_sd = chosen.noise.unsqueeze(-1) * torch.exp(0.5 * changed)
-    alone_mean, alone_variance = fit.level(chosen.noise)
-    alone = torch.where(present, alone_mean + alone_variance.sqrt() * z[:, 0], level[:, 0])
     unit, centre = fit.scale.unit, fit.scale.centre
     return Paths(
         level=centre + unit * level,
@@ -87,17 +90,22 @@ def draw_paths(fit: Fit, isi_ms: Tensor, size: int, rng: np.random.Generator) ->
 
 
 def _profiles(fit: Fit, picks: Tensor, isi_ms: Tensor, z: Tensor) -> Tensor:
-    """Paths of processes with an amplitude, one for each pick, in standardised units, shape (s, m)."""
+    """Paths of processes with an amplitude, one for each pick, then their constants, standardised, shape (s, m + 1)."""
     if not len(picks):
         return z
     which, member = torch.unique(picks, return_inverse=True)
+    # Far from all trials a process is its constant, and a deviation that they tell nothing of.
+    far_ms = isi_ms[-1:] + FAR_LENGTHS * fit.processes.length_ms[which].amax()
     with torch.no_grad():
-        posterior: Any = fit.regression(which).posterior(isi_ms.unsqueeze(-1))
+        posterior: Any = fit.regression(which).posterior(torch.cat((isi_ms, far_ms)).unsqueeze(-1))
         mean, covariance = posterior.mean.squeeze(-1), posterior.distribution.covariance_matrix
-    jitter = PATH_JITTER * fit.processes.amplitude[which].square()[:, None, None]
-    factor = torch.linalg.cholesky(covariance + jitter * torch.eye(len(isi_ms), dtype=z.dtype))
-    paths: Tensor = mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
-    return paths
+    surplus = torch.full_like(mean[0], PATH_JITTER)
+    # The deviation is taken away again.
+    surplus[-1] -= 1.0
+    variance = fit.processes.amplitude[which].square()
+    factor = torch.linalg.cholesky(covariance + torch.diag_embed(torch.outer(variance, surplus)))
+    drawn: Tensor = mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
+    return drawn
 
 
 def _constants(fit: Fit, noise: Tensor, z: Tensor) -> Tensor:
