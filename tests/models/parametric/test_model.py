@@ -205,14 +205,15 @@ def test_a_fantasy_moves_the_samples_as_an_update_would() -> None:
 
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_the_predicted_outcomes_have_the_expectation_of_the_profile(likelihood: Likelihood) -> None:
-    # Without outliers; the scale of outcomes is coarse, and the loud ISI is an eighth of it above the quiet one.
+    # Without outliers. Outcomes lie a quarter of a nat apart and leave out the rarest MEPs, which makes 1.1 % at most.
     model = ParametricModel(beliefs=WindowPrior(outliers=(-12.0, 0.1)), likelihood=likelihood)
     posterior = after(model, evenly("gaussian", 2, 20))
-    mass = posterior.outcome_mass(GRID)[0].mean(0)
-    assert mass.shape == (len(GRID), OUTCOMES)
-    quiet, loud = mass[0], mass[GRID == 290.0][0]
-    outcome = torch.arange(float(OUTCOMES))
-    assert (loud @ outcome) > (quiet @ outcome) + OUTCOMES / 8
+    unknowns = posterior.sample.unknowns
+    low = unknowns.floor_mv.log().quantile(0.05) - 1.0
+    high = (unknowns.baseline_mv + unknowns.amplitude_mv).log().quantile(0.95) + 1.5
+    outcomes_mv = torch.linspace(low.item(), high.item(), OUTCOMES).exp()
+    expected_mv = posterior.outcome_mass(GRID)[0].mean(0) @ outcomes_mv
+    torch.testing.assert_close(expected_mv, posterior.profiles_mv(GRID)[0].mean(0), rtol=0.02, atol=0)
 
 
 def test_the_unit_of_the_amplitude_is_learnt() -> None:
@@ -231,7 +232,6 @@ def test_too_little_work_is_reported_with_what_stands_in_for_it() -> None:
     assert "worth" in posterior.trouble
     assert "flattened" in posterior.trouble
     assert posterior.trouble.endswith(".")
-    assert posterior.estimate().probability >= 0
 
 
 @pytest.mark.parametrize(
