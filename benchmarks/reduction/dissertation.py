@@ -10,9 +10,6 @@ from typing import Final
 METHODS: Final = ("nr", "svmr", "gpr", "pf")
 """The dissertation's methods, beside its conventional sweep."""
 
-INITIAL: Final = {"nr": 6, "svmr": 7, "gpr": 7}
-"""Initial observations of Fig. 4.23; a particle filter has none."""
-
 TRIALS: Final = {
     "without": {"nr": 16, "svmr": 33, "gpr": 18, "pf": 199, "incremental": 272},
     "with": {"nr": 15, "svmr": 18, "gpr": 15, "pf": 190},
