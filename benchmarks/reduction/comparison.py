@@ -20,9 +20,10 @@ PEOPLE_OF_KIM = 11
 WORDS = {False: "without", True: "with"}
 
 PROSE = """\
-Sessions end by each method's own stopping rule (default: both 90 % intervals within 30 ms, or 80 trials, which
-count as not converged). F1 is judged by the measured window above the baseline (the text's ground truth), by the
-measured window by the 0.135 rule, and by the true one; the first two leave out people whose sweep shows no window.
+Sessions end by each method's own stopping rule (default: both 90 % intervals within 30 ms under every likely kind of
+noise, or 80 trials, which count as not converged). F1 is judged by the measured window above the baseline (the text's
+ground truth), by the measured window by the 0.135 rule, and by the true one; the first two leave out people whose
+sweep shows no window.
 Conventional: from the range's start until the window was passed. PF has no profile: a Gaussian of SD 25 ms at its
 estimate stands in, since its rule stops at that SD, and its window of ± 75 ms is called three of them. Tests are on
 the eleven people's means over noise seeds (the text has n = 5 with accelerometer), corrected by Holm's method
