@@ -250,6 +250,25 @@ def test_a_model_that_cannot_be_is_refused(wrong) -> None:
         ParametricModel(**wrong)
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"scouts": 11, "starts": 12},
+        {"starts": 0},
+        {"steps": 0},
+        {"draws": 2.5},
+        {"fits": 0},
+        {"fits": True},
+        {"enough": 0.0},
+        {"enough": math.nan},
+        {"enough": math.inf},
+    ],
+)
+def test_effort_that_cannot_be_made_is_refused(wrong) -> None:
+    with pytest.raises(InvalidValueError):
+        Effort(**wrong)
+
+
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_people_of_its_own_have_windows_as_often_as_believed_and_the_same_meps_again(likelihood: Likelihood) -> None:
     model = ParametricModel(likelihood=likelihood)

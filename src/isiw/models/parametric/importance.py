@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 
 import torch
 
+from isiw.errors import InvalidValueError
 from isiw.models.parametric.ascent import LogDensity, Modes, find_modes
 from isiw.models.protocol import Tensor
 
@@ -46,6 +47,9 @@ class Effort:
         draws: draws of the mixture in each round.
         fits: the mixture is fitted at most this many times.
         enough: further draws of the last mixture make all of them worth as many independent ones as this.
+
+    Raises:
+        InvalidValueError: a number not positive and finite, a count that is not whole, or fewer scouts than starts.
     """
 
     scouts: int = 512
@@ -54,6 +58,16 @@ class Effort:
     draws: int = 500
     fits: int = 10
     enough: float = 400.0
+
+    def __post_init__(self) -> None:
+        for name in ("scouts", "starts", "steps", "draws", "fits"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+                raise InvalidValueError(f"{name} must be a whole number", got=value, expected="1 or more")
+        if self.scouts < self.starts:
+            raise InvalidValueError("every start needs a scout", got=self.scouts, expected=f"{self.starts} or more")
+        if not 0.0 < self.enough < math.inf:
+            raise InvalidValueError("enough is a positive number of draws", got=self.enough)
 
 
 @dataclass(frozen=True, eq=False)
