@@ -228,6 +228,14 @@ def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(script
     assert len(resume(log, real, scripted_strategy(10), clock=clock).run().trials) == 10
 
 
+def test_a_simulated_session_does_not_go_on_with_a_real_device(interrupted, scripted_strategy, scripted_device):
+    real, before = scripted_device(simulated=False), interrupted.read_bytes()
+    with pytest.raises(DeviceError, match=r"run with a simulated device.*Start a session of its own"):
+        resume(interrupted, real, scripted_strategy(10))
+    assert interrupted.read_bytes() == before
+    assert real.delivered == []
+
+
 def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted, scripted_strategy, scripted_device):
     first = resume(interrupted, scripted_device(), scripted_strategy(10))
     device = scripted_device()

@@ -54,7 +54,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     Raises:
         LogError: no such log, or one of which not even the header can be read.
         StrategyError: the strategy cannot be made again, or asks something else.
-        DeviceError: a simulated device for a session with a real one.
+        DeviceError: a simulated device for a session with a real one, or the other way round.
     """
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
@@ -163,15 +163,22 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
 
 
 def _require_as_real(device: Device, header: Header) -> None:
-    """Raise where the session would go on without waiting, or with answers from nobody."""
-    info = device.describe()
-    if info.simulated and not header.device.simulated:
+    """Raise where the session would go on without waiting or with answers from nobody, or a simulation on a person."""
+    info, was = device.describe(), header.device
+    if info.simulated and not was.simulated:
         raise DeviceError(
             "the session was run with a real device, and cannot go on with a simulated one",
             got=info.name,
-            expected=f"a real one, as {header.device.name} was",
+            expected=f"a real one, as {was.name} was",
             remedy="Describe the device with DeviceInfo(..., simulated=False), which makes the session wait between "
             "trials in real time.",
+        )
+    if was.simulated and not info.simulated:
+        raise DeviceError(
+            "the session was run with a simulated device, and its limits and trials are no person's",
+            got=info.name,
+            expected=f"a simulated one, as {was.name} was",
+            remedy="Start a session of its own with the real device: isiw.Session(device, strategy, log=NEW_PATH).",
         )
 
 
