@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import os
 import signal
 import subprocess
@@ -16,7 +17,7 @@ from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import DeviceError, InvalidValueError, LogError, StrategyError
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Intent
+from isiw.log.schema import Event, Intent, decode
 from isiw.log.writer import LogWriter
 from isiw.resumption import exclude, resume
 from isiw.session import Session
@@ -103,6 +104,33 @@ def test_earlier_stimuli_count_against_the_limits(interrupted, scripted_strategy
     result = resume(interrupted, device, scripted_strategy(10), limits=limits).run()
     assert len(device.delivered) == 2
     assert result.decision.reason == "The limit of 6 pulses is reached."
+
+
+def test_what_a_session_went_on_with_holds_when_it_is_resumed_again(
+    interrupted, scripted_strategy, scripted_device, space
+):
+    before, limits, device = read_session(interrupted).header, Limits.of_space(space, max_pulses=6), scripted_device()
+    device.info = dataclasses.replace(device.info, version="2.1")
+    resume(interrupted, device, scripted_strategy(10), limits=limits, timeout_s=9.0).run()
+    after = read_session(interrupted).header
+    assert (after.limits, after.device.version, after.timeout_s) == (limits, "2.1", 9.0)
+    assert (after.created, after.subject, after.seed) == (before.created, before.subject, before.seed)
+    again = scripted_device()
+    assert resume(interrupted, again, scripted_strategy(10)).run().decision.reason.startswith("The limit of 6 pulses")
+    assert again.delivered == []
+
+
+def test_the_header_of_each_part_stays_in_the_log(interrupted, scripted_strategy, scripted_device, space):
+    headers = [read_session(interrupted).header]
+    for pulses in (6, 8):
+        resume(
+            interrupted, scripted_device(), scripted_strategy(10), limits=Limits.of_space(space, max_pulses=pulses)
+        ).run()
+        headers.append(read_session(interrupted).header)
+    messages = salvage(interrupted).messages
+    assert messages[0].topic == "/header"
+    assert [decode(m.topic, m.data) for m in messages if m.topic == "/header"] == headers
+    assert len({header.limits for header in headers}) == 3
 
 
 def test_the_first_stimulus_after_resuming_waits_a_whole_interval(interrupted, scripted_strategy, scripted_device):

@@ -37,13 +37,14 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
 ) -> Session:
     """A session that goes on where a log ends. Nothing is delivered or written before its `run`.
 
-    Stimuli whose outcome is not in the log become mistrials "outcome unknown": they count against every limit.
+    Stimuli whose outcome is not in the log become mistrials "outcome unknown": they count against every limit. What the
+    session goes on with is logged as a further header, and holds when it is resumed again.
 
     Args:
         path: the log, with or without `.part`; finished, torn or damaged.
         device: the device to go on with; one with a memory is brought to where the logged stimuli left it.
         strategy: needed where the session's strategy was built from a user's own objects: the same again.
-        limits: other limits than the logged ones.
+        limits: other limits than those that were logged last.
         clock: as for `Session`.
         on_trial: as for `Session`.
         timeout_s: another time for one delivery than the logged one [s].
@@ -78,9 +79,12 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     )
     last = len(replayed.trials) - 1 if replayed.trials else None
     event = Event(kind="resume", trial=last, text=_resumption_text(record, replayed))
-    session.continue_from(
-        replayed.trials, lambda: LogWriter.continuing(path, salvaged, header), (*replayed.unknown, event)
-    )
+
+    def open_log(as_resumed: Header) -> LogWriter:
+        as_resumed = as_resumed.model_copy(update={"created": header.created})
+        return LogWriter.continuing(path, salvaged, header, as_resumed)
+
+    session.continue_from(replayed.trials, open_log, (*replayed.unknown, event))
     return session
 
 

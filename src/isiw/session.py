@@ -13,6 +13,7 @@ import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -160,17 +161,17 @@ class Session:
             versions={"python": platform.python_version()} | {p: importlib.metadata.version(p) for p in _PACKAGES},
             config=dict(config or {}),
         )
-        self._open_log: Callable[[], LogWriter] = lambda: LogWriter.create(log, self._header)
+        self._open_log: Callable[[Header], LogWriter] = partial(LogWriter.create, log)
         self._first_records: Sequence[Record] = ()
 
     def continue_from(
-        self, trials: TrialTable, open_log: Callable[[], LogWriter], first_records: Sequence[Record]
+        self, trials: TrialTable, open_log: Callable[[Header], LogWriter], first_records: Sequence[Record]
     ) -> None:
         """Begin where another run ended; `isiw.resume` does this for you.
 
         Args:
             trials: what was delivered before; the strategy has learned it.
-            open_log: opens the log that goes on.
+            open_log: opens the log that goes on, with this session's header.
             first_records: what it holds next.
         """
         self.trials, self._open_log, self._first_records = trials, open_log, first_records
@@ -183,7 +184,7 @@ class Session:
             LimitExceededError: a stimulus was refused; nothing was delivered.
             LogError: the log cannot be written; nothing is delivered without a log.
         """
-        with DeferredInterrupts() as self._interrupts, self._open_log() as self._log:
+        with DeferredInterrupts() as self._interrupts, self._open_log(self._header) as self._log:
             try:
                 self._log_beginning()
                 with self._armed():

@@ -27,7 +27,7 @@ class SessionRecord:
 
     Args:
         path: the file that was read.
-        header: what the session is.
+        header: what the session is; of one that was resumed, what it went on with last.
         history: intents, trials, estimates and events, in the order in which they were logged.
         waveforms: the recorded channels, by trial and name.
         losses: what could not be read, a sentence each; empty where the log is whole.

@@ -1,6 +1,6 @@
 """What is in a log: one kind of record a topic, as JSON with a JSON schema.
 
-    /header     who, with what, and how: everything needed to make the strategy again
+    /header     who, with what, and how: everything needed to make the strategy again; once more on resuming
     /intent     about to be delivered; an intent without a trial was interrupted
     /trial      what came of it
     /emg …      the waveforms of a trial, one topic a channel
@@ -74,7 +74,7 @@ class StrategyRecipe(_Record):
 
 
 class Header(_Record):
-    """What a session is, written before anything else."""
+    """What a session is, written before anything else, and again before it goes on: the last one holds."""
 
     schema_version: int = SCHEMA_VERSION
     isiw_version: str

@@ -67,7 +67,7 @@ class LogWriter:
         return log
 
     @classmethod
-    def continuing(cls, path: str | Path, salvage: Salvage, header: Header) -> Self:
+    def continuing(cls, path: str | Path, salvage: Salvage, header: Header, as_resumed: Header | None = None) -> Self:
         """Go on with a log: everything that was salvaged, and then what comes.
 
         The old file keeps its place until the copy is durable. Where something was lost it is kept for good, as
@@ -77,6 +77,7 @@ class LogWriter:
             path: the log, with or without `.part`.
             salvage: what was read from it.
             header: its header.
+            as_resumed: the header that holds from here on, where it is another.
 
         Raises:
             LogError: it is still being written, or has changed since it was read.
@@ -92,11 +93,13 @@ class LogWriter:
         fresh = DurableFile(copy)
         log = cls(target, fresh)
         log._replaces = True
-        log.begin(header)
+        log.begin(as_resumed or header)
         if not any(message.topic == "/header" for message in salvage.messages):
             log.append(header)
         for message in salvage.messages:
             log._copy(message)
+        if as_resumed is not None:
+            log.append(as_resumed)
         log.sync()
         if salvage.losses:
             _keep(salvage.path, target)
