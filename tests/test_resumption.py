@@ -82,11 +82,15 @@ def test_resuming_a_finished_session_delivers_nothing(scripted_strategy, scripte
     assert len(read_session(log).table) == 3
 
 
-def test_a_stimulus_without_outcome_becomes_a_mistrial_and_is_asked_again(
-    interrupted, scripted_strategy, scripted_device, uninterrupted, log
-):
+def kill_during_trial_4(log, isi_ms):
     with LogWriter.continuing(log, salvage(log), read_session(log).header) as writer:
-        writer.append(Intent(trial=4, isi_ms=uninterrupted[4]))
+        writer.append(Intent(trial=4, isi_ms=isi_ms))
+
+
+def test_a_stimulus_without_outcome_becomes_a_mistrial_and_is_asked_again(
+    interrupted, scripted_strategy, scripted_device, uninterrupted
+):
+    kill_during_trial_4(interrupted, uninterrupted[4])
     device = scripted_device()
     session = resume(interrupted, device, scripted_strategy(10))
     result = session.run()
@@ -243,6 +247,32 @@ def test_a_log_with_a_lost_trial_goes_on_after_an_exclusion(interrupted, scripte
     assert [trial.index for trial in result.trials] == list(range(10))
     assert [trial.index for trial in result.trials if not trial.told] == [1, 2]
     assert len(session.strategy.posterior.told) == 8
+
+
+def test_what_was_asked_before_an_exclusion_is_compared_as_it_was_asked(
+    interrupted, scripted_strategy, scripted_device, uninterrupted
+):
+    kill_during_trial_4(interrupted, uninterrupted[4])
+    exclude(interrupted, 1, "sneezed")
+    result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+    assert result.trials[4].reason is MistrialReason.OUTCOME_UNKNOWN
+    again = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+    assert again.trials == result.trials
+
+
+def test_a_stimulus_of_which_nothing_is_left_is_compared_with_nothing(interrupted, scripted_strategy, scripted_device):
+    with LogWriter.continuing(interrupted, salvage(interrupted), read_session(interrupted).header) as writer:
+        writer.append(Intent(trial=5, isi_ms=77.0))  # intent and trial 4 are lost; what was told of it is not known
+    result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+    assert [trial.commanded_isi_ms for trial in result.trials[4:6]] == [None, 77.0]
+    again = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+    assert again.trials == result.trials
+
+
+def test_what_was_asked_and_never_answered_is_compared_as_well(interrupted, scripted_strategy, scripted_device):
+    kill_during_trial_4(interrupted, 199.0)
+    with pytest.raises(StrategyError, match="does not ask again what was asked in trial 4"):
+        resume(interrupted, scripted_device(), scripted_strategy(10))
 
 
 def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(scripted_strategy, scripted_device, log):

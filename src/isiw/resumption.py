@@ -15,7 +15,7 @@ from isiw.devices.protocol import Device, HasMemory
 from isiw.errors import DeviceError, InvalidValueError, StrategyError
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Header
+from isiw.log.schema import Event, Header, Intent
 from isiw.log.writer import LogWriter
 from isiw.session import Session, SessionUpdate, learn
 from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
@@ -119,11 +119,12 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
     told: list[Trial] = []
     by_fallback = {event.trial for event in record.events if event.kind == "fallback"}
     for entry in record.history:
-        if isinstance(entry, Trial):
+        if isinstance(entry, Intent):
             # Behind a lost trial the strategy knew more than the log does.
-            comparable = entry.index == len(told) and entry.index not in by_fallback
+            comparable = entry.trial == len(told) and entry.trial not in by_fallback
             if verify and comparable:
                 _verify(strategy, entry, record.header)
+        elif isinstance(entry, Trial):
             learn(strategy, entry)
             told.append(entry)
         elif isinstance(entry, Event) and entry.kind == "exclusion" and entry.trial is not None:
@@ -196,14 +197,14 @@ def _strategy_of(header: Header) -> Strategy:
     return make_strategy(recipe.name, space=header.space, seed=recipe.seed, **recipe.settings)
 
 
-def _verify(strategy: Strategy, trial: Trial, header: Header) -> None:
+def _verify(strategy: Strategy, intent: Intent, header: Header) -> None:
     asked_ms = strategy.ask()
-    if asked_ms != trial.commanded_isi_ms:
+    if asked_ms != intent.isi_ms:
         versions = ", ".join(f"{name} {version}" for name, version in header.versions.items())
         raise StrategyError(
-            f"the strategy does not ask again what was asked in trial {trial.index}",
+            f"the strategy does not ask again what was asked in trial {intent.trial}",
             got=f"{asked_ms:g} ms",
-            expected=f"{trial.commanded_isi_ms} ms, as logged with isiw {header.isiw_version}, {versions}",
+            expected=f"{intent.isi_ms} ms, as logged with isiw {header.isiw_version}, {versions}",
             remedy="Resume with the same strategy, machine and versions, or without verification: the logged trials "
             "are then told as they are.",
         )
