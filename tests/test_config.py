@@ -18,6 +18,7 @@ from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError
 from isiw.log.reader import read_session
 from isiw.session import Session
+from isiw.settings.dissertation import NRSettings, PFSettings
 from isiw.settings.particles import ParticleSettings
 
 
@@ -88,6 +89,20 @@ def test_the_command_line_wins_over_the_file(config_file):
 def test_a_bad_value_on_the_command_line_is_named():
     with pytest.raises(ConfigError, match=r"the command line.*subject.kind.*'reel'"):
         RunConfig().with_overrides(subject="reel")
+
+
+@pytest.mark.parametrize("given", [{"max_trials": 80}, {"max_trials": 50}, {}])
+def test_another_strategy_on_the_command_line_keeps_the_settings_that_were_given(config_file, given):
+    text = "".join(f"{key} = {value}\n" for key, value in given.items())
+    config = load_config(config_file(f"[strategy.settings]\n{text}"))
+    overridden = config.with_overrides(seed=8).with_overrides(strategy="pf")
+    assert overridden.strategy.settings == PFSettings(**given)
+    assert overridden.with_overrides(strategy="default").strategy == config.strategy
+
+
+def test_what_a_strategys_name_stands_for_is_not_kept_with_another(config_file):
+    config = load_config(config_file('[strategy]\nname = "nr2"\n'))
+    assert config.with_overrides(strategy="nr").strategy.settings == NRSettings()
 
 
 def test_the_same_seed_makes_the_same_person():

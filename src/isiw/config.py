@@ -15,7 +15,7 @@ from __future__ import annotations
 import datetime as dt
 import itertools
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final, Literal, Self
@@ -24,6 +24,8 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    ModelWrapValidatorHandler,
+    PrivateAttr,
     ValidationInfo,
     create_model,
     field_validator,
@@ -108,11 +110,19 @@ class SpaceConfig(_Section):
         return DesignSpace(**self.model_dump())
 
 
+@dataclass(frozen=True)
+class _Given:
+    """The settings that were given, without those that follow from the name; in comparisons it does not count."""
+
+    settings: Any = field(default_factory=dict, compare=False)
+
+
 class StrategyConfig(_Section):
     """The strategy: a name from `isiw.list_strategies()`, and settings of its family."""
 
     name: str = "default"
     settings: Any = _FILLED
+    _given: _Given = PrivateAttr(default_factory=_Given)
 
     @field_validator("name")
     @classmethod
@@ -130,6 +140,18 @@ class StrategyConfig(_Section):
     def _of_the_family(cls, settings: Any, info: ValidationInfo) -> Any:
         known = isinstance(settings, Mapping) and "name" in info.data
         return settings_of(info.data["name"])[0](**settings) if known else settings
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _remembering(cls, values: Any, build: ModelWrapValidatorHandler[Self]) -> Self:
+        config = build(values)
+        if isinstance(values, Mapping):
+            config._given = _Given(values.get("settings", {}))  # noqa: SLF001 - the new one of this very class
+        return config
+
+    def overridden(self, name: str | None) -> dict[str, Any]:
+        """The values of another strategy, or of this one, with the settings that were given."""
+        return {"name": self.name if name is None else name, "settings": self._given.settings}
 
 
 class LimitsConfig(_Section):
@@ -163,10 +185,7 @@ class RunConfig(_Section):
         values |= {key: value for key, value in {"seed": seed, "log": log}.items() if value is not None}
         about = {"kind": subject, "data": data}
         values["subject"] |= {key: value for key, value in about.items() if value is not None}
-        if strategy not in {None, self.strategy.name}:
-            usual = asdict(StrategyConfig(name=self.strategy.name).settings)
-            given = {key: value for key, value in values["strategy"]["settings"].items() if value != usual[key]}
-            values["strategy"] = {"name": strategy, "settings": given}
+        values["strategy"] = self.strategy.overridden(strategy)
         return _validated(values, "the command line")
 
 
