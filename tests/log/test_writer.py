@@ -63,19 +63,48 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path, header):
         LogWriter.create(tmp_path / "file" / "s.mcap", header)
 
 
+def full_disk(_):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
 def test_a_full_disk_is_an_error_and_what_was_synced_is_safe(tmp_path, header, writes, monkeypatch):
     log = LogWriter.create(tmp_path / "s.mcap", header)
     writes(log, range(3))
-
-    def full(_):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
     with monkeypatch.context() as patched:
-        patched.setattr(os, "fsync", full)
+        patched.setattr(os, "fsync", full_disk)
         with pytest.raises(LogError, match="No space left"):
             writes(log, [3])
     assert len(read_session(tmp_path / "s.mcap").table) >= 3
     log.close()
+
+
+@pytest.mark.parametrize("config", [{"operator": None}, {"rig": object()}, {"name": "\ud800"}])
+def test_a_header_that_cannot_be_written_leaves_no_file(tmp_path, header, config):
+    unwritable = header.model_copy(update={"config": config})
+    with pytest.raises(LogError, match=r"header cannot be written.*TOML values"):
+        LogWriter.create(tmp_path / "s.mcap", unwritable)
+    assert list(tmp_path.iterdir()) == []
+    LogWriter.create(tmp_path / "s.mcap", header).close()
+
+
+def test_a_log_that_cannot_be_begun_leaves_no_file(tmp_path, header, monkeypatch):
+    monkeypatch.setattr(os, "fsync", full_disk)
+    with pytest.raises(LogError, match="No space left"):
+        LogWriter.create(tmp_path / "s.mcap", header)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("trouble", ["header", "disk"])
+def test_a_log_that_cannot_go_on_stays_as_it_was(finished_log, header, monkeypatch, trouble):
+    before, found = finished_log.read_bytes(), salvage(finished_log)
+    unwritable = header.model_copy(update={"config": {"operator": None}})
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", full_disk if trouble == "disk" else os.fsync)
+        with pytest.raises(LogError):
+            LogWriter.continuing(finished_log, found, unwritable if trouble == "header" else header)
+    assert list(finished_log.parent.iterdir()) == [finished_log]
+    assert finished_log.read_bytes() == before
+    LogWriter.continuing(finished_log, found, header).close()
 
 
 def test_any_mcap_reader_reads_a_finished_log(finished_log):

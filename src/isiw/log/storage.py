@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -14,7 +14,7 @@ from isiw.errors import LogError
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["DurableFile", "log_of", "part_of", "refuse_if_locked", "sync_folder"]
+__all__ = ["DurableFile", "begun", "log_of", "part_of", "refuse_if_locked", "sync_folder"]
 
 
 def part_of(path: Path) -> Path:
@@ -136,3 +136,24 @@ class DurableFile:
         finally:
             with _disk_errors(self.path):
                 self._file.close()
+
+    def abandon(self) -> None:
+        """Close, whatever has become of it."""
+        with suppress(OSError):
+            self._file.close()
+
+
+@contextmanager
+def begun(path: Path) -> Iterator[DurableFile]:
+    """A new file that is gone again where its beginning fails; once it has taken another file's place, it stays.
+
+    Raises:
+        LogError: it exists, or cannot be made.
+    """
+    file = DurableFile(path)
+    try:
+        yield file
+    except BaseException:
+        file.abandon()
+        path.unlink(missing_ok=True)
+        raise

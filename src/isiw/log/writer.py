@@ -13,7 +13,7 @@ from mcap.writer import Writer
 from isiw.errors import LogError
 from isiw.log.salvage import Message, Salvage, current_file
 from isiw.log.schema import TOPICS, Header, Record, encode, json_schema, topic_of
-from isiw.log.storage import DurableFile, log_of, part_of, refuse_if_locked, sync_folder
+from isiw.log.storage import DurableFile, begun, log_of, part_of, refuse_if_locked, sync_folder
 
 __all__ = ["CONFIGURATION", "LogWriter"]
 
@@ -49,7 +49,7 @@ class LogWriter:
         """Start a new log with its header.
 
         Raises:
-            LogError: there is one already, finished or not; it is never overwritten.
+            LogError: there is one already, finished or not; it is never overwritten. Or the header cannot be written.
         """
         target = Path(path)
         for existing in (target, part_of(target)):
@@ -59,11 +59,12 @@ class LogWriter:
                     got=str(existing),
                     remedy=f"Choose another path, or continue it: isiw resume {target}",
                 )
-        log = cls(target, DurableFile(part_of(target)))
-        log.begin(header)
-        log.append(header)
-        log.sync()
-        sync_folder(target.parent)
+        with begun(part_of(target)) as file:
+            log = cls(target, file)
+            log.begin(header)
+            log.append(header)
+            log.sync()
+            sync_folder(target.parent)
         return log
 
     @classmethod
@@ -80,7 +81,7 @@ class LogWriter:
             as_resumed: the header that holds from here on, where it is another.
 
         Raises:
-            LogError: it is still being written, or has changed since it was read.
+            LogError: it is still being written, or has changed since it was read, or a header cannot be written.
         """
         target = log_of(Path(path))
         refuse_if_locked(salvage.path)
@@ -90,24 +91,28 @@ class LogWriter:
         if copy.exists():  # an earlier attempt was killed before it took over; its source is still whole
             refuse_if_locked(copy)
             copy.unlink()
-        fresh = DurableFile(copy)
-        log = cls(target, fresh)
-        log._replaces = True
-        log.begin(as_resumed or header)
-        if not any(message.topic == "/header" for message in salvage.messages):
-            log.append(header)
-        for message in salvage.messages:
-            log._copy(message)
-        if as_resumed is not None:
-            log.append(as_resumed)
-        log.sync()
-        if salvage.losses:
-            _keep(salvage.path, target)
-        fresh.move_to(part_of(target))
+        with begun(copy) as file:
+            log = cls(target, file)
+            log._replaces = True
+            log.begin(as_resumed or header)
+            if not any(message.topic == "/header" for message in salvage.messages):
+                log.append(header)
+            for message in salvage.messages:
+                log._copy(message)
+            if as_resumed is not None:
+                log.append(as_resumed)
+            log.sync()
+            if salvage.losses:
+                _keep(salvage.path, target)
+            file.move_to(part_of(target))
         return log
 
     def begin(self, header: Header) -> None:
-        """Write what is no message: metadata for whoever lists files, and the header as TOML."""
+        """Write what is no message: metadata for whoever lists files, and the header as TOML.
+
+        Raises:
+            LogError: something in the header is no TOML value.
+        """
         facts = {
             "isiw_version": header.isiw_version,
             "schema_version": str(header.schema_version),
@@ -115,10 +120,10 @@ class LogWriter:
             "seed": str(header.seed),
             "created": header.created,
         }
-        text = tomli_w.dumps(header.model_dump(mode="json", exclude_none=True))
+        configuration = _as_toml(header)
         now_ns = time.time_ns()
         self._writer.add_metadata("session", facts)
-        self._writer.add_attachment(now_ns, now_ns, CONFIGURATION, "application/toml", text.encode())
+        self._writer.add_attachment(now_ns, now_ns, CONFIGURATION, "application/toml", configuration)
 
     def append(self, record: Record, channel_name: str | None = None) -> None:
         """Append a record; it is durable after the next `sync`.
@@ -175,6 +180,16 @@ class LogWriter:
                 topic, "json", self._writer.register_schema(name, "jsonschema", schema)
             )
         return self._channels[topic]
+
+
+def _as_toml(header: Header) -> bytes:
+    try:
+        return tomli_w.dumps(header.model_dump(mode="json", exclude_none=True)).encode()
+    except (TypeError, ValueError) as error:
+        raise LogError(
+            f"the header cannot be written: {error}",
+            remedy="Give subject, config and the strategy's settings as TOML values, and leave out what is None.",
+        ) from error
 
 
 def _keep(damaged: Path, target: Path) -> None:
