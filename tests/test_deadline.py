@@ -69,6 +69,19 @@ def test_within_the_deadline_the_choice_is_the_usual_one(held_up, go):
     assert held_up.fallback_reason is None
 
 
+@pytest.mark.parametrize("deadline_s", [float("inf"), 1e300])
+def test_a_deadline_that_never_comes_is_none(held_up, go, deadline_s):
+    go.set()
+    assert held_up.ask(deadline_s=deadline_s) == 40.0
+    assert held_up.fallback_reason is None
+
+
+def test_a_session_may_be_given_all_the_time_there_is(scripted_strategy, scripted_device, tmp_path):
+    log = tmp_path / "session.mcap"
+    isiw.Session(scripted_device(), scripted_strategy(2), log=log, ask_deadline_s=float("inf")).run()
+    assert isiw.read_session(log).header.ask_deadline_s == float("inf")
+
+
 def test_a_choice_that_fails_within_the_deadline_is_an_error_not_a_fallback(scripted_strategy):
     usual = scripted_strategy()
 

@@ -121,6 +121,7 @@ class Strategy:
 
         Args:
             deadline_s: answer within this time [s]: past it with an evenly spaced ISI, and a `fallback_reason`.
+                None and infinity are no deadline.
 
         Raises:
             InvalidValueError: a deadline that is negative or not a number.
@@ -187,7 +188,7 @@ class Strategy:
         # A posterior never changes, so a late thread can go on with it and be forgotten.
         threading.Thread(target=_fulfil, args=(answer, partial(self._best, self._posterior)), daemon=True).start()
         try:
-            return answer.result(deadline_s)
+            return answer.result(min(deadline_s, threading.TIMEOUT_MAX))
         except TimeoutError:
             reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
             return Choice(evenly_spaced(self.space, self._told), reason)
