@@ -1,8 +1,12 @@
 from __future__ import annotations
 
+import pytest
 from typer.testing import CliRunner
 
 from isiw.cli import app
+from isiw.design import DesignSpace
+from isiw.devices.tapper import Tapper
+from isiw.session import Session
 
 
 def run(*arguments: object):
@@ -26,3 +30,17 @@ def test_an_unknown_source_is_a_message_with_the_presets(tmp_path):
     result = run(tmp_path / "nothing.mcap")
     assert result.exit_code == 1
     assert "timing-fault" in result.output
+
+
+class Silent:
+    mep_mv = 0.0
+
+
+@pytest.mark.parametrize(("there", "asked"), [("s.mcap.part", "s.mcap"), ("s.mcap", "s.mcap.part")])
+def test_timing_of_a_log_takes_either_of_its_names(tmp_path, scripted_strategy, there, asked):
+    strategy = scripted_strategy(4, space=DesignSpace(20, 200, reference="impact"))
+    log = Session(Tapper(lambda _: Silent(), "subject4"), strategy, log=tmp_path / "s.mcap").run().log
+    log.rename(tmp_path / there)
+    result = run(tmp_path / asked)
+    assert result.exit_code == 0, result.output
+    assert "4 taps" in result.output

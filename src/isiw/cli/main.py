@@ -120,15 +120,20 @@ def timing(
 ) -> None:
     """Say how repeatable the taps are: events, ISI errors, mistrials."""
     with errors_reported(_INTERRUPTED):
-        recorded = Path(source).is_file()
         study = (
             isiw.timing.study_session(isiw.read_session(source))
-            if recorded
+            if _is_log(source)
             else isiw.timing.study_preset(source, taps=taps, seed=seed)
         )
         show(isiw.timing.timing_report(study))
         if output is not None:
             show(f"picture: {isiw.plots_timing.save_timing_plot(study, output)}")
+
+
+def _is_log(source: str) -> bool:
+    """Whether there is a log of this name, closed or not."""
+    closed = source.removesuffix(".part")
+    return Path(closed).is_file() or Path(f"{closed}.part").is_file()
 
 
 def _run_to_the_end(session: Session) -> None:
