@@ -1,12 +1,18 @@
 from __future__ import annotations
 
+import re
+
+import numpy as np
 import pandas as pd
 import pytest
 
+from isiw.devices.limits import Limits
 from isiw.errors import LogError
 from isiw.log.reader import read_session
-from isiw.log.schema import SCHEMA_VERSION, Event, Intent
+from isiw.log.salvage import salvage
+from isiw.log.schema import SCHEMA_VERSION, Event, Intent, Waveform
 from isiw.log.writer import LogWriter
+from isiw.trials import Channel
 
 
 def test_the_trials_are_a_data_frame(finished_log):
@@ -52,3 +58,40 @@ def test_a_log_of_a_newer_version_is_refused(tmp_path, header):
     LogWriter.create(tmp_path / "s.mcap", newer).close()
     with pytest.raises(LogError, match=r"newer isiw.*Upgrade"):
         read_session(tmp_path / "s.mcap")
+
+
+@pytest.fixture
+def resumed_log(finished_log, header):
+    """A log whose second header stands in another block than its first, and that header."""
+    with LogWriter.continuing(finished_log, salvage(finished_log), header) as log:
+        for trial in range(8, 11):
+            noise = np.random.default_rng(trial).standard_normal(20_000)
+            log.append(Waveform.of(trial, Channel(noise, 3000.0, "mV")), "emg")
+    tightened = header.model_copy(update={"limits": Limits.of_space(header.space, max_pulses=50)})
+    LogWriter.continuing(finished_log, salvage(finished_log), header, tightened).close()
+    return finished_log, tightened
+
+
+def test_the_last_header_holds(resumed_log):
+    log, tightened = resumed_log
+    assert read_session(log).header == tightened
+
+
+def test_the_last_header_holds_where_its_record_is_lost(resumed_log):
+    log, tightened = resumed_log
+    whole = bytearray(log.read_bytes())
+    blocks = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
+    whole[blocks[len(blocks) // 2 - 1] + 40] ^= 0xFF  # the last one; the index at the end names each once more
+    log.write_bytes(whole)
+    assert [message.topic for message in salvage(log).messages].count("/header") == 1
+    record = read_session(log)
+    assert record.losses
+    assert record.header == tightened
+
+
+def test_a_damaged_configuration_is_said_and_not_believed(broken_log, header):
+    whole = broken_log.read_bytes()
+    broken_log.write_bytes(whole.replace(b"max_pulses = 200", b"max_pulses = 900"))
+    record = read_session(broken_log)
+    assert record.header == header
+    assert record.losses == ("The attachment configuration.toml fails its checksum and is lost.",)

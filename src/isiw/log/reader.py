@@ -117,7 +117,9 @@ def read_salvaged(salvaged: Salvage) -> SessionRecord:
             waveforms[record.trial, message.topic.removeprefix("/")] = record.channel()
         else:
             history.append(record)
-    header = _checked_version(header or _header_from_attachment(salvaged), salvaged.path)
+    if header is None or (losses and CONFIGURATION in salvaged.attachments):
+        header = _header_from_attachment(salvaged)  # what is lost may have been the last header
+    header = _checked_version(header, salvaged.path)
     return SessionRecord(salvaged.path, header, tuple(history), waveforms, tuple(losses), salvaged.finished)
 
 

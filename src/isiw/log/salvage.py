@@ -29,6 +29,7 @@ _UNREADABLE = (McapError, zstandard.ZstdError, struct.error, ValueError, KeyErro
 _CHUNK_MARK = b"\x04\x00\x00\x00zstd"
 _CHUNK_MARK_AT = 8 + 8 + 8 + 4  # behind a chunk's two times, size and checksum
 
+_RECORD_HEAD_BYTES = 1 + 8  # what it is, and its length
 _FOOTER_BYTES = 1 + 8 + 8 + 8 + 4
 _MAGIC = b"\x89MCAP0\r\n"
 
@@ -129,7 +130,7 @@ def _read(file: IO[bytes], found: Salvage) -> None:
                 _read_chunk(record, readable_to, found)
                 chunks += 1
             elif isinstance(record, mcap.Attachment):
-                found.attachments[record.name] = record.data
+                _keep_attachment(record, file, readable_to, found)
             readable_to = file.tell()
             sealed = sealed or isinstance(record, mcap.DataEnd)
             found.finished = found.finished or isinstance(record, mcap.Footer)
@@ -147,6 +148,17 @@ def _read(file: IO[bytes], found: Salvage) -> None:
             found.losses.insert(0, f"The log is torn or damaged at byte {readable_to} of {found.size}.")
     if found.finished and not sealed:
         found.losses.append("The mark behind the last record is damaged. No record is affected.")
+
+
+def _keep_attachment(attachment: mcap.Attachment, file: IO[bytes], start: int, found: Salvage) -> None:
+    """Keep an attachment that has just been read, if it agrees with its checksum; the library leaves that unchecked."""
+    end = file.tell()
+    file.seek(start + _RECORD_HEAD_BYTES)
+    content = file.read(end - file.tell())
+    if zlib.crc32(content[:-4]) == int.from_bytes(content[-4:], "little"):
+        found.attachments[attachment.name] = attachment.data
+    else:
+        found.losses.append(f"The attachment {attachment.name} fails its checksum and is lost.")
 
 
 class _Exact:
