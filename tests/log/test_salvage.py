@@ -49,6 +49,18 @@ def test_a_flipped_bit_costs_no_more_than_its_own_block(finished_log):
         assert len(all_trials - kept) <= 1
 
 
+def test_a_length_that_swallows_other_blocks_costs_none_of_them(finished_log):
+    whole = bytearray(finished_log.read_bytes())
+    blocks = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
+    first, other = blocks[4], blocks[12]
+    assert whole[first] == whole[other] == 6  # what a block begins with
+    whole[first + 1 : first + 9] = (other - first - 9).to_bytes(8, "little")
+    finished_log.write_bytes(whole)
+    record = read_session(finished_log)
+    assert [trial.index for trial in record.table] == list(range(8))
+    assert record.losses
+
+
 def test_a_log_torn_anywhere_keeps_every_trial_before_the_tear(broken_log):
     whole = broken_log.read_bytes()
     ends = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]

@@ -136,6 +136,7 @@ def _read(file: IO[bytes], found: Salvage) -> None:
             found.finished = found.finished or isinstance(record, mcap.Footer)
     except CRCValidationError:
         found.finished = sealed = True
+        _search_swallowed(file, found, chunks, readable_to)
         if not found.losses:
             found.losses.append("The checksum of the whole file fails, though every record's own is good.")
     except _UNREADABLE as error:
@@ -174,18 +175,27 @@ class _Exact:
         return data
 
 
-def _search_chunks(file: IO[bytes], found: Salvage) -> None:
+def _search_swallowed(file: IO[bytes], found: Salvage, chunks: int, size: int) -> None:
+    """Read all chunks again where fewer were met than there are: a damaged length has swallowed some."""
+    if chunks < sum(1 for _ in _chunks(file, size)):
+        _search_chunks(file, found, size)
+
+
+def _search_chunks(file: IO[bytes], found: Salvage, size: int = -1) -> None:
     """Read all chunks of a file in which the records' lengths can no longer be followed from one to the next."""
     found.messages.clear()
     found.losses.clear()
-    for start, chunk in _chunks(file):
+    for start, chunk in _chunks(file, size):
         _read_chunk(chunk, start, found)
 
 
-def _chunks(file: IO[bytes]) -> Iterator[tuple[int, mcap.Chunk]]:
-    """All chunks that can be read, wherever they are, and where; a torn one shows in the numbers of its records."""
+def _chunks(file: IO[bytes], size: int = -1) -> Iterator[tuple[int, mcap.Chunk]]:
+    """All chunks that can be read, wherever they are, and where; a torn one shows in the numbers of its records.
+
+    Behind the first `size` bytes nothing is searched: the index at the end of a file looks like chunks.
+    """
     file.seek(0)
-    data = file.read()
+    data = file.read(size)
     for match in re.finditer(re.escape(_CHUNK_MARK), data):
         start = max(0, match.start() - _CHUNK_MARK_AT)
         try:
