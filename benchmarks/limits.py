@@ -3,8 +3,9 @@
     python benchmarks/limits.py --out benchmarks/results/limits
 
 The oracle knows a person's response and that there is a window. Here the default's own model is given the cohort's
-laws as its prior (uniform ones by their SD; that some trials may be artefacts it goes on believing), first with "no window" as probable as the default has it, then knowing that there is one. The
-same people as in `benchmarks/acquisition.py` with the same seed; what it writes is told in the same way.
+laws as its prior, first with "no window" as probable as the default has it, then knowing that there is one. Uniform
+laws are told by their SD, and artefacts it goes on expecting. The same people as in `benchmarks/acquisition.py` with
+the same seed; what it writes is told in the same way.
 """
 
 from __future__ import annotations
