@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from isiw.design import IMPACT_SPACE
-from isiw.errors import InvalidValueError
+from isiw.errors import InvalidValueError, StudyError
 from isiw.studies import SimulatedSession, paired_sessions, play, run_study, simulate
 from isiw.window import Window
 
@@ -106,3 +106,20 @@ def test_a_session_that_cannot_be_is_refused(wrong):
 def test_a_study_without_workers_is_refused():
     with pytest.raises(InvalidValueError, match="worker"):
         run_study([small()], workers=0)
+
+
+def test_what_a_session_would_reject_is_delivered_again_and_not_told():
+    strict = replace(IMPACT_SPACE, tolerance_ms=2.0)
+    session = replace(small(), trials=40, marks=(40,), space=strict)
+    player = Perfect(session)
+    (row,) = play(session, player).to_dict("records")
+    assert len(player.told) == 40
+    assert all(abs(isi_ms - 250.0) <= 2.0 for isi_ms, _ in player.told)
+    assert row["mistrials"] > 0
+    assert row["delivered"] == 40 + row["mistrials"]
+
+
+def test_a_space_that_no_realised_isi_keeps_is_refused():
+    session = replace(small(), space=replace(IMPACT_SPACE, tolerance_ms=0.0))
+    with pytest.raises(StudyError, match="wider tolerance_ms"):
+        play(session, Perfect(session))

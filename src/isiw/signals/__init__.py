@@ -11,7 +11,7 @@ from isiw.signals.mep import (
     mep_onsets,
     mep_present,
 )
-from isiw.signals.quality import Judged, SignalLimits, is_saturated, judge, judge_measurement
+from isiw.signals.quality import Judged, SignalLimits, is_saturated, judge, judge_measurement, wrong_isi
 
 __all__ = [
     "MEP_WINDOWS_MS",
@@ -31,4 +31,5 @@ __all__ = [
     "mep_onsets",
     "mep_present",
     "sweep_events",
+    "wrong_isi",
 ]

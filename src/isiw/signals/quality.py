@@ -29,7 +29,16 @@ from isiw.signals.waveforms import is_recording
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
 from isiw.types import ArrayLike, BoolArray, FloatArray
 
-__all__ = ["ACCELERATION_UNITS", "EMG_UNITS_MV", "Judged", "SignalLimits", "is_saturated", "judge", "judge_measurement"]
+__all__ = [
+    "ACCELERATION_UNITS",
+    "EMG_UNITS_MV",
+    "Judged",
+    "SignalLimits",
+    "is_saturated",
+    "judge",
+    "judge_measurement",
+    "wrong_isi",
+]
 
 EMG_UNITS_MV: Mapping[str, float] = MappingProxyType({"V": 1e3, "mV": 1.0, "uV": 1e-3, "µV": 1e-3, "μV": 1e-3})
 """One of each unit in mV; both of Unicode's micro signs are known."""
@@ -158,7 +167,7 @@ def judge_measurement(
         )
     judged, wrong = Judged(**asdict(measurement)), None
     if measurement.isi_ms is not None and stimulus.isi_ms is not None:
-        wrong = _wrong_isi(measurement.isi_ms, stimulus.isi_ms, space, limits)
+        wrong = wrong_isi(measurement.isi_ms, stimulus.isi_ms, space, limits)
     if wrong is None and (measurement.background_rms_uv or 0.0) > limits.background_uv:
         wrong = MistrialReason.BACKGROUND_ACTIVITY
     return judged if wrong is None else _mistrial(judged, wrong)
@@ -218,14 +227,22 @@ def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: 
         return _mistrial(judged, wrong or MistrialReason.MISSING_CHANNEL)
     isi_ms = sweep.t_tms_ms - start
     judged = replace(judged, isi_ms=isi_ms)
-    wrong = _wrong_isi(isi_ms, stimulus.isi_ms, space, limits)
+    wrong = wrong_isi(isi_ms, stimulus.isi_ms, space, limits)
     return judged if wrong is None else _mistrial(judged, wrong)
 
 
-def _wrong_isi(
-    isi_ms: float, commanded_isi_ms: float, space: DesignSpace, limits: SignalLimits
+def wrong_isi(
+    isi_ms: float, commanded_isi_ms: float, space: DesignSpace, limits: SignalLimits | None = None
 ) -> MistrialReason | None:
-    """What is wrong with a realised ISI."""
+    """What is wrong with a realised ISI; None where the trial may be told.
+
+    Args:
+        isi_ms: when the pulse came after the event that the space counts from [ms].
+        commanded_isi_ms: when it should have come [ms].
+        space: says which event the ISI counts from, and how far it may be off.
+        limits: may ask for less than the space's tolerance.
+    """
+    limits = limits or SignalLimits()
     if space.reference == "impact" and isi_ms < 0:
         return MistrialReason.TMS_BEFORE_IMPACT
     tolerance = min(space.tolerance_ms, limits.isi_tolerance_ms or math.inf)

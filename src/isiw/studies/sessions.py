@@ -18,8 +18,9 @@ from isiw.asking import Choice
 from isiw.asktell import Strategy
 from isiw.catalogue import make_strategy
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.errors import InvalidValueError
+from isiw.errors import InvalidValueError, StudyError
 from isiw.metrics import covers, f1
+from isiw.signals import wrong_isi
 from isiw.stopping import StopDecision, StoppingRule, stimuli_left
 from isiw.subjects import Response, SimulatedSubject, cohort
 from isiw.window import Window, WindowEstimate
@@ -30,6 +31,8 @@ TIMES = ("ask_ms", "tell_ms")
 """Columns that differ each time a session is run."""
 
 _OF_THE_STOP = ("f1", "start_covered", "end_covered")
+
+_MOST_DELIVERIES = 1000
 
 Stopping: TypeAlias = Literal["ignored", "noted", "ends"]
 Judgement: TypeAlias = WindowEstimate | Window | None
@@ -152,6 +155,9 @@ def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
         fired (NaN where it has not), why, whether that was before the budget was used up (NaN where the rule is
         ignored), and F1 and coverage at that moment, named `stop_f1` and so on; the time that the last ask and the last
         tell took for each person [ms]. After the end of a session its last estimate stays.
+
+    Raises:
+        StudyError: a person's realised ISIs are hardly ever near enough to the commanded ones.
     """
     people = [_Person(session, number, crowd) for number, session in enumerate(sessions)]
     for trial in range(1, sessions[0].trials + 1):
@@ -190,14 +196,20 @@ class _Person:
         return self.session.stopping == "ends" and not math.isnan(self.stop["stop_trial"])
 
     def respond(self, choice: Choice) -> Response:
-        """Deliver the pair, again where the realised ISI is beyond the space: a session asks the same once more."""
+        """Deliver the pair, again where its ISI makes it a mistrial: a session asks the same once more."""
         space = self.session.space
-        while True:
+        for _ in range(_MOST_DELIVERIES):
             response = self.responder.respond(choice.isi_ms, space.reference)
-            if response.isi_ms is not None and space.admits(response.isi_ms):
+            if response.isi_ms is not None and wrong_isi(response.isi_ms, choice.isi_ms, space) is None:
                 return response
             self.mistrials += not self.ended
             self.crowd.count_mistrial(self.number)
+        raise StudyError(
+            "a person's realised ISIs are hardly ever near enough to the commanded one",
+            got=f"{_MOST_DELIVERIES} mistrials in a row at {choice.isi_ms:g} ms",
+            expected=f"ISIs within {space.tolerance_ms:g} ms of it",
+            remedy="Give the space a wider tolerance_ms.",
+        )
 
     def note(self, trial: int, choice: Choice, spent_ms: dict[str, float]) -> None:
         if self.ended:
