@@ -36,6 +36,7 @@ LASTING = (0.8, 0.9, 0.95)
 SPACES = {"valve": VALVE_SPACE, "impact": IMPACT_SPACE}
 KEYS = ["cohort", "strategy", "trial"]
 MEANS = (
+    "delivered",
     "f1",
     "f1_se",
     "behind_oracle",
@@ -85,17 +86,18 @@ def at_stopping(rows: pd.DataFrame) -> pd.DataFrame:
     """One row a cohort and strategy: how often, when and with what its stopping rule ended the session."""
     last = rows[(rows["trial"] == rows.groupby(KEYS[:2])["trial"].transform("max")) & rows["converged"].notna()]
     stopped = last[last["converged"] == 1.0]
-    groups = stopped.groupby(KEYS[:2])
+    groups, sessions = stopped.groupby(KEYS[:2]), last.groupby(KEYS[:2]).size()
     table = groups[["stop_trial", "stop_f1", "stop_start_covered", "stop_end_covered"]].mean()
-    return table.assign(stopped=groups.size() / last.groupby(KEYS[:2]).size()).reset_index()
+    table = table.reindex(sessions.index)
+    return table.assign(stopped=groups.size().reindex(sessions.index, fill_value=0) / sessions).reset_index()
 
 
 def lasting(table: pd.DataFrame) -> pd.DataFrame:
-    """One row a cohort and strategy: the first trial from which mean F1 stays above each criterion, of those marked."""
+    """One row a cohort and strategy: mean pairs delivered where mean F1 begins to stay above each criterion."""
 
     def first(group: pd.DataFrame, criterion: float) -> float:
         mark = trials_to_lasting(group["f1"], criterion)
-        return float("nan") if mark is None else float(group["trial"].iloc[mark - 1])
+        return float("nan") if mark is None else float(group["delivered"].iloc[mark - 1])
 
     groups = table.sort_values(KEYS).groupby(KEYS[:2])
     return (
@@ -118,7 +120,7 @@ def write(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
     table = summary(rows)
     tables = {
         "F1 by trial": table,
-        "Trials to a lasting F1 (among the marked trials)": lasting(table),
+        "Pairs delivered up to a lasting F1 (among the marked trials)": lasting(table),
         "False decisions": decisions(rows),
         "At the stopping rule": at_stopping(rows),
     }

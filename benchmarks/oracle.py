@@ -20,7 +20,7 @@ from isiw.design import DesignSpace
 from isiw.profiles import PeakProfile
 from isiw.recruitment import GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.studies import SimulatedSession, play
-from isiw.subjects import WIDTHS_KIM_MS, SimulatedSubject
+from isiw.subjects import OUTLIERS_MV, WIDTHS_KIM_MS, SimulatedSubject
 from isiw.types import BoolArray, FloatArray
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window
 
@@ -87,9 +87,11 @@ def outcome_table(subject: SimulatedSubject) -> tuple[FloatArray, FloatArray]:
     cdf = np.stack(
         [_evoked_cdf(subject.response, level, edges[:, None] - floors).mean(-1) for level in LEVELS.tolist()]
     )
+    low_mv, high_mv = OUTLIERS_MV
+    outliers = np.clip((edges - low_mv) / (high_mv - low_mv), 0.0, 1.0)
+    cdf += subject.outlier_probability * (outliers - cdf)
     padded = np.concatenate([np.zeros((len(LEVELS), 1)), cdf, np.ones((len(LEVELS), 1))], axis=1)
-    mass = np.maximum(np.diff(padded, axis=1), 0.0)
-    mass = (1 - subject.outlier_probability) * mass + subject.outlier_probability / BINS + 1e-9
+    mass = np.maximum(np.diff(padded, axis=1), 0.0) + 1e-9
     return edges, mass / mass.sum(1, keepdims=True)
 
 

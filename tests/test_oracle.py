@@ -1,8 +1,10 @@
 """The benchmarks' oracle knows the cohort's windows, and the rule."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from benchmarks.oracle import OTHER_SPANS, USUAL_SPANS, Oracle, Spans
+from benchmarks.oracle import OTHER_SPANS, USUAL_SPANS, Oracle, Spans, outcome_table
 
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1
@@ -42,3 +44,12 @@ def test_its_spans_are_those_of_the_cohort(name: str) -> None:
             (widths_ms <= width_ms).mean(), abs=0.06
         )
     assert (spans.widths_ms.min(), spans.widths_ms.max()) == pytest.approx((widths_ms.min(), widths_ms.max()), abs=0.1)
+
+
+def test_its_law_of_the_mep_is_the_simulators_artefacts_included() -> None:
+    subject = replace(cohort("outliers", 1, 3)[0], outlier_probability=0.3, jitter_told=True)
+    edges_mv, mass = outcome_table(subject)
+    responder = subject.begin(5)
+    answers_mv = np.array([responder.respond(None, "valve").mep_mv for _ in range(20_000)])
+    below = (answers_mv[:, None] < edges_mv).mean(0)
+    assert np.abs(below - mass[0].cumsum()[:-1]).max() < 0.03  # floors on 24 nodes

@@ -16,6 +16,7 @@ import isiw
 from benchmarks.reduction.readings import BASE, Reading
 from benchmarks.reduction.recorded import STEP_MS, SWEPT, TRIALS_PER_ISI, RecordedSweep, record, stops_inside
 from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.signals import wrong_isi
 from isiw.stopping import stimuli_left
 from isiw.subjects import cohort
 from isiw.types import BoolArray, FloatArray
@@ -158,8 +159,13 @@ def play(session: Session, swept: RecordedSweep) -> dict[str, Any]:
     truth = swept.windows["true"]
     trials, stopped, f1_by_trial, spread_ms = 0, None, [], []
     while stopped is None or trials < session.horizon:
-        strategy.tell(*answer(strategy.ask()))
+        asked_ms = strategy.ask()
+        isi_ms, mep_mv = answer(asked_ms)
         trials += 1
+        if wrong_isi(isi_ms, asked_ms, where.space) is None:
+            strategy.tell(isi_ms, mep_mv)
+        else:
+            strategy.count_mistrial()
         estimate = strategy.estimate()
         if trials <= session.horizon:
             f1_by_trial.append(isiw.metrics.f1(where.from_valve(estimate.window), truth, SWEPT))

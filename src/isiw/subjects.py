@@ -21,7 +21,19 @@ from isiw.recruitment import EmgFloor, GainResponse, RecruitmentResponse, Respon
 from isiw.types import FloatArray, Reference
 from isiw.window import Window, window_from_excess
 
-__all__ = ["COHORTS", "WIDTHS_KIM_MS", "Drift", "Responder", "Response", "SimulatedSubject", "cohort"]
+__all__ = [
+    "COHORTS",
+    "OUTLIERS_MV",
+    "WIDTHS_KIM_MS",
+    "Drift",
+    "Responder",
+    "Response",
+    "SimulatedSubject",
+    "cohort",
+]
+
+OUTLIERS_MV: Final = (0.1, 0.5)
+"""Between these an artefact's amplitude is uniform [mV]."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +146,7 @@ class Responder:
         floor_mv = subject.response.floor.median_mv * np.exp(subject.response.floor.log_sd * rng.standard_normal())
         mep_mv = subject.response.sample_evoked_mv(facilitation, noise, rng) + floor_mv
         if rng.random() < subject.outlier_probability:
-            mep_mv = rng.uniform(0.1, 0.5)
+            mep_mv = rng.uniform(*OUTLIERS_MV)
         unseen_ms = 0.0 if subject.jitter_told or isi_ms is None else subject.isi_jitter_ms
         return Response(told_ms, float(subject.scale * mep_mv), unseen_ms)
 

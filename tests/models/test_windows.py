@@ -2,7 +2,7 @@ import numpy as np
 import torch
 
 from isiw.design import DesignSpace
-from isiw.models.windows import best_window, edge_samples, sampled_estimate
+from isiw.models.windows import best_window, edge_samples, profile_grid, sampled_estimate
 
 SPACE = DesignSpace(0, 9)
 
@@ -40,3 +40,10 @@ def test_more_than_one_segment_has_a_probability_given_a_window():
     estimate = sampled_estimate(sampled, torch.ones(5, 10), SPACE)
     assert estimate.split_probability == 0.5
     assert sampled_estimate(masks("0000000000"), torch.ones(1, 10), SPACE).split_probability is None
+
+
+def test_a_profile_is_reported_up_to_both_ends_of_the_range():
+    for high_ms in (302, 320, 500):
+        grid = profile_grid(DesignSpace(0, high_ms))
+        assert (grid[0], grid[-1]) == (0, high_ms)
+        assert (grid.diff() > 0).all()

@@ -80,7 +80,7 @@ def thompson(posterior: _CountedProfiles, isi_ms: Tensor, seed: int = 0) -> Tens
     """
     profiles = posterior.profiles_mv(isi_ms)
     people, samples = profiles.shape[:2]
-    rng = np.random.default_rng([seed, posterior.trials])
+    rng = np.random.default_rng([seed, 1 + posterior.trials])  # [seed, 0] is the stream of seed
     return profiles[torch.arange(people), torch.as_tensor(rng.integers(samples, size=people))]
 
 

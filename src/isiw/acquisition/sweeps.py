@@ -57,7 +57,7 @@ class RandomIsi:
 
     def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
         """Score the ISI drawn for this trial 1 and all others 0, shape (1, t)."""
-        rng = np.random.default_rng([self.seed, posterior.trials])
+        rng = np.random.default_rng([self.seed, 1 + posterior.trials])  # [seed, 0] is the stream of seed
         return _only(int(rng.integers(len(isi_ms))), isi_ms)
 
 

@@ -80,7 +80,7 @@ class BootstrapFilter:
 
     def prior(self, space: DesignSpace, seed: int, people: int = 1) -> BootstrapPosterior:
         """The first generation: uniform over the range, diffused, not measured."""
-        rng = np.random.default_rng([seed, 0])
+        rng = np.random.default_rng([seed, 1])  # [seed, 0] is the stream of seed
         particles = self.on_lattice(space, rng.uniform(space.low_ms, space.high_ms, (people, self.particles)))
         unknown = np.full_like(particles, np.nan)
         return BootstrapPosterior(
@@ -116,7 +116,7 @@ class BootstrapFilter:
 
     def _next_generation(self, posterior: BootstrapPosterior, complete: BoolArray) -> BootstrapPosterior:
         """What follows from the generation of those people for whom it is complete; nobody else notices."""
-        rng = np.random.default_rng([posterior.seed, posterior.trials])
+        rng = np.random.default_rng([posterior.seed, 1 + posterior.trials])
         floors_mv = [self.floor.level_mv(posterior.told.person(person)) for person in range(len(complete))]
         weights = self.floor.excess_mv(posterior.mep_mv, np.array(floors_mv)[:, None]).clip(0.0)
         # A particle is where its MEP was measured, which may not be where it was sent.

@@ -54,7 +54,8 @@ def _split(masks: Tensor) -> Tensor:
 
 def profile_grid(space: DesignSpace) -> Tensor:
     """The ISIs at which profiles are reported [ms], shape (t,)."""
-    return torch.tensor(space.grid_ms[:: max(1, len(space.grid_ms) // PROFILE_POINTS)], dtype=torch.float32)
+    every = max(1, len(space.grid_ms) // PROFILE_POINTS)
+    return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=torch.float32)
 
 
 def sampled_estimate(

@@ -105,3 +105,12 @@ def test_however_odd_a_mep_its_likelihood_and_its_gradient_are_finite(likelihood
     total.sum().backward()
     assert total.isfinite().all()
     assert latents.grad.isfinite().all()
+
+
+@pytest.mark.parametrize("likelihood", LIKELIHOODS)
+def test_a_mep_is_seen_or_not(likelihood: Likelihood) -> None:
+    least = math.log(0.02)
+    both = torch.tensor([[-math.inf, least], [least, math.inf]], dtype=torch.double)
+    for level in (0.0, 0.3, 1.0):
+        shares = log_likelihood(people(likelihood, 300, spread=1.0), torch.full((1, 2), level), both, likelihood).exp()
+        torch.testing.assert_close(shares.sum(-1), torch.ones(300, dtype=torch.double), atol=1e-9, rtol=0.0)

@@ -33,6 +33,21 @@ def test_a_prior_that_trusts_no_stimulator_is_even_over_the_range() -> None:
     assert (shares - 0.2).abs().max() < 0.02  # three SDs of a share are 0.009
 
 
+@pytest.mark.parametrize("space", [DesignSpace(400, 900, reference="valve"), DesignSpace(200, 400)])
+def test_where_no_start_is_expected_all_are_as_likely(space: DesignSpace) -> None:
+    start = people(Prior(), space).shape.start_ms[0]
+    shares = torch.histc(start, 5, min=space.low_ms - 50, max=space.high_ms) / MANY
+    assert (shares - 0.2).abs().max() < 0.02
+
+
+def test_a_range_with_a_part_of_the_usual_starts_has_only_their_share_of_them() -> None:
+    space = DesignSpace(115, 315)  # of the usual starts, 0 to 115 ms, its 50 ms margin holds 50 / 115
+    start = people(Prior(p_anywhere=0.5), space).shape.start_ms[0]
+    usual = 0.5 * 50 / 115
+    in_margin = (usual + 0.5 * 50 / 250) / (usual + 0.5)
+    assert (start < 115).float().mean().item() == pytest.approx(in_margin, abs=0.015)
+
+
 def test_kinds_come_as_often_as_the_prior_says() -> None:
     prior = Prior()
     person = people(prior, VALVE_SPACE)

@@ -204,7 +204,8 @@ class GaussianProcessPosterior:
     def log_evidence(self) -> Tensor:
         """Log marginal likelihood of the trials, as a density of log amplitudes [nat]; see `HasEvidence`.
 
-        It is that of equal noise also where the noise depends on the ISI.
+        It is that of equal noise also where the noise depends on the ISI, and of a process whose mean and scale come
+        from the same trials (empirical Bayes): it compares these processes with each other, not with other models.
         """
         return torch.tensor([f.log_evidence for f in self.fits])
 

@@ -129,9 +129,10 @@ def log_likelihood(unknowns: Unknowns, level: Tensor, log_mep: Tensor, likelihoo
 
 
 def _log_between(parts: _Components, low: Tensor, high: Tensor, likelihood: Likelihood) -> Tensor:
-    # Ends at infinity leave no gradient of their own.
+    # Ends at infinity leave no gradient of their own, and below the lower one is nothing.
     ends = (torch.nan_to_num(end, neginf=-50.0, posinf=50.0).unsqueeze(-1) for end in (high, low))
     to_high, to_low = (_below(parts, end, likelihood) for end in ends)
+    to_low = torch.where(low.isneginf().unsqueeze(-1), 0.0, to_low)
     return _mixed(torch.log((to_high - to_low).clamp_min(1e-300)), likelihood)
 
 

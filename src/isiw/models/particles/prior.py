@@ -248,6 +248,9 @@ def start_ms(
     return _interpolate(torch.special.ndtr(z), cdf.to(z), knots.to(z))
 
 
+_LEAST_MASS = 1e-6
+
+
 @lru_cache(maxsize=16)
 def _start_cdf(
     space: DesignSpace, after_impact_ms: tuple[float, float], hit_delay_ms: tuple[float, float], p_anywhere: float
@@ -259,9 +262,10 @@ def _start_cdf(
     edges = [torch.special.ndtr((knots - edge) / blur) * (knots - edge) for edge in (low, high)]
     bumps = [torch.exp(-0.5 * ((knots - edge) / blur) ** 2) * blur / math.sqrt(2 * math.pi) for edge in (low, high)]
     informed = (edges[0] + bumps[0] - edges[1] - bumps[1]) / (high - low)
-    informed = (informed - informed[0]) / (informed[-1] - informed[0]).clamp_min(1e-6)
     anywhere = (knots - knots[0]) / (knots[-1] - knots[0])
-    return (1 - p_anywhere) * informed + p_anywhere * anywhere, knots
+    mixed = (1 - p_anywhere) * (informed - informed[0]) + p_anywhere * anywhere
+    # Given that it lies in the range: the further that is from where starts usually are, the more "anywhere" counts.
+    return (mixed / mixed[-1] if mixed[-1] > _LEAST_MASS else anywhere), knots
 
 
 def _interpolate(x: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
