@@ -109,6 +109,8 @@ REFUSED = [
     ({"isi_ms": -10.5, "mep_mv": 0.1}, OutOfSpaceError, "beyond the design space"),
     ({"isi_ms": 250.0}, InvalidValueError, "either mep_mv or response"),
     ({"isi_ms": 250.0, "mep_mv": 0.1, "response": True}, InvalidValueError, "either mep_mv or response"),
+    ({"isi_ms": 250.0, "response": math.nan}, InvalidValueError, "True or False"),
+    ({"isi_ms": 250.0, "response": 0.5}, InvalidValueError, "True or False"),
     ({"isi_ms": 250.0, "mep_mv": 0.1, "isi_sd_ms": -1.0}, InvalidValueError, "isi_sd_ms"),
     ({"isi_ms": 250.0, "mep_mv": 0.1, "isi_sd_ms": math.nan}, InvalidValueError, "isi_sd_ms"),
     ({"isi_ms": 250.0, "response": True, "isi_sd_ms": math.inf}, InvalidValueError, "isi_sd_ms"),

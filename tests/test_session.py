@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from isiw.asktell import Recipe
+from isiw.catalogue import make_strategy
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
-from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError
+from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.log.reader import read_session
 from isiw.log.schema import Estimate, Intent
 from isiw.session import Session
@@ -330,3 +331,40 @@ def test_ctrl_c_at_any_time_leaves_an_intact_log(scripted_strategy, scripted_dev
     assert len(record.table) - len(device.delivered) in {0, 1}
     assert record.events[-1].text == "Interrupted by the operator."
     assert device.calls[-2:] == ["stop", "unstage"]
+
+
+def test_a_strategy_that_knows_of_other_trials_is_refused_before_anything_is_delivered(
+    scripted_strategy, scripted_device, log, tmp_path
+):
+    strategy, device = scripted_strategy(3), scripted_device()
+    Session(scripted_device(), strategy, log=tmp_path / "another.mcap").run()
+    with pytest.raises(StrategyError, match=r"not this session's; got '3 trials'; expected 0 .*restarted"):
+        Session(device, strategy, log=log).run()
+    assert not device.delivered
+    assert not list(tmp_path.glob("s.mcap*"))
+    assert len(Session(device, strategy.restarted(), log=log).run().trials) == 3
+
+
+@pytest.mark.parametrize("times", [{"timeout_s": 0.0}, {"timeout_s": math.nan}, {"ask_deadline_s": -1.0}])
+def test_times_that_nobody_can_keep_are_refused(scripted_strategy, scripted_device, log, times):
+    with pytest.raises(InvalidValueError, match="are times"):
+        Session(scripted_device(), scripted_strategy(3), log=log, **times)
+
+
+@pytest.mark.parametrize("channels", [{"emg": "microvolt"}, {"emg": "mV", "acceleration": "m/s2"}, {"event": "mV"}])
+def test_channels_that_cannot_be_judged_or_logged_are_refused_before_anything_is_delivered(
+    scripted_strategy, scripted_device, log, channels
+):
+    device = scripted_device()
+    info = dataclasses.replace(device.describe(), channels=channels)
+    device.describe = lambda: info
+    with pytest.raises(InvalidValueError, match=r"unit of the channel|cannot have this name"):
+        Session(device, scripted_strategy(3), log=log)
+
+
+def test_numbers_of_numpy_are_numbers(scripted_device, space, log):
+    strategy = make_strategy("even", space, np.int64(3), max_trials=np.int64(2), particles=np.int64(64))
+    limits = Limits(np.float64(0), space.high_ms, max_pulses=np.int64(2))
+    result = Session(scripted_device(), strategy, log=log, limits=limits).run()
+    assert len(result.trials) == 2
+    assert read_session(log).header.strategy.settings["particles"] == 64

@@ -450,3 +450,9 @@ def test_input_noise_is_standard_normal_with_its_lag_1_correlation(correlation: 
 def test_input_noise_has_its_full_spread_from_the_first_trial_on() -> None:
     first = np.array([input_noise(0.2, 1, seed)[0] for seed in range(1000)])
     assert stats.kstest(first, stats.norm.cdf).pvalue > KS_LEVEL
+
+
+@pytest.mark.parametrize("stimulus", [(100.0, "hit"), (100.0, "Valve"), (float("nan"), "valve")])
+def test_a_stimulus_that_means_nothing_is_refused(stimulus):
+    with pytest.raises(InvalidValueError):
+        cohort("gaussian", 1, 0)[0].begin(0).respond(*stimulus)

@@ -116,6 +116,11 @@ class Strategy:
         """What is believed after the trials told so far."""
         return self._posterior
 
+    @property
+    def delivered(self) -> int:
+        """How many stimuli it knows of, mistrials among them."""
+        return self._told + self._mistrials
+
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], on the grid; the same until the next `tell`.
 
@@ -210,7 +215,8 @@ class Strategy:
             isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
 
         Raises:
-            InvalidValueError: NaN, infinite or negative values, or not exactly one of `mep_mv` and `response`.
+            InvalidValueError: NaN, infinite or negative values, a response that is neither True nor False, or not
+                exactly one of `mep_mv` and `response`.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             StrategyError: a kind of outcome that the model cannot learn from.
         """
@@ -222,6 +228,8 @@ class Strategy:
                 got=mep_mv,
                 remedy="Log a trial without a trustworthy amplitude as a mistrial instead of telling it.",
             )
+        if response not in {None, False, True}:
+            raise InvalidValueError("response must be True or False", got=response)
         if not (math.isfinite(isi_sd_ms) and isi_sd_ms >= 0):
             raise InvalidValueError("isi_sd_ms must be finite and not negative", got=isi_sd_ms)
         isi = math.nan if isi_ms is None else self.space.check_realised(isi_ms)
@@ -250,4 +258,4 @@ class Strategy:
 
     def decision(self) -> StopDecision:
         """Whether to stop now, and why."""
-        return self.stopping(Progress(self._told + self._mistrials, self._told, self.estimate(), past=self._past))
+        return self.stopping(Progress(self.delivered, self._told, self.estimate(), past=self._past))

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Final
 
+import numpy as np
+
 from isiw.asktell import Recipe, Strategy
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
@@ -125,6 +127,7 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
     unknown = sorted(set(settings) - set(known))
     if unknown:
         raise StrategyError(f"the strategy {name!r} has no such setting", got=unknown, expected=", ".join(known))
+    seed, settings = _plain(seed), {name: _plain(value) for name, value in settings.items()}
     chosen = family(**{**meant, **settings})
     return Strategy(
         space,
@@ -135,3 +138,8 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
         seed=seed,
         recipe=Recipe(name=name, seed=seed, settings=asdict(chosen)),  # type: ignore[call-overload]
     )
+
+
+def _plain(value: Any) -> Any:
+    """A number of numpy's as Python's own, which a log can hold."""
+    return value.item() if isinstance(value, np.generic) else value

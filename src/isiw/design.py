@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Real
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class DesignSpace:
     def __post_init__(self) -> None:
         for name in ("low_ms", "high_ms", "step_ms", "tolerance_ms"):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
                 raise InvalidValueError(f"DesignSpace.{name} must be a finite number", got=value)
             object.__setattr__(self, name, float(value))
         if self.reference not in {"impact", "valve"}:

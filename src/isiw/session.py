@@ -22,11 +22,11 @@ from isiw.asktell import Strategy
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo
-from isiw.errors import DeviceError, LimitExceededError
+from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, StrategyError
 from isiw.interrupts import DeferredInterrupts
-from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform
+from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform, waveform_topic
 from isiw.log.writer import LogWriter
-from isiw.signals.quality import SignalLimits, judge, judge_measurement
+from isiw.signals.quality import SignalLimits, judge, judge_measurement, require_units
 from isiw.stopping import StopDecision, stimuli_left
 from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Sweep, Trial, TrialTable
 from isiw.window import WindowEstimate
@@ -89,6 +89,9 @@ def _require_matching(info: DeviceInfo, strategy: Strategy) -> None:
             expected=strategy.space.reference,
             remedy="Give the DesignSpace the device's reference.",
         )
+    require_units(info.channels)
+    for name in info.channels:
+        waveform_topic(name)
     limit_mv, assumed_mv = info.detection_limit_mv, strategy.recipe.settings.get("detection_limit_mv")
     if limit_mv is not None and assumed_mv is not None and not math.isclose(limit_mv, assumed_mv):
         raise DeviceError(
@@ -118,6 +121,7 @@ class Session:
     Raises:
         DeviceError: the device counts its ISIs from another event than the space, or states another detection limit
             than the strategy's.
+        InvalidValueError: a time that is no positive number, or a channel whose name or unit a session cannot use.
     """
 
     def __init__(  # noqa: PLR0913 - the public surface of the design; all but two are keyword-only
@@ -137,6 +141,8 @@ class Session:
     ) -> None:
         space, info = strategy.space, device.describe()
         _require_matching(info, strategy)
+        if not (timeout_s > 0 and (ask_deadline_s is None or ask_deadline_s >= 0)):
+            raise InvalidValueError("timeout_s and ask_deadline_s are times [s]", got=(timeout_s, ask_deadline_s))
         self.strategy = strategy
         self.trials = TrialTable()
         self.log_path = Path(log)
@@ -183,7 +189,15 @@ class Session:
             DeviceError: the device failed; it is stopped, and the trial is a mistrial "outcome unknown".
             LimitExceededError: a stimulus was refused; nothing was delivered.
             LogError: the log cannot be written; nothing is delivered without a log.
+            StrategyError: the strategy knows of trials that are not this session's; nothing was delivered.
         """
+        if self.strategy.delivered != len(self.trials):
+            raise StrategyError(
+                "the strategy knows of trials that are not this session's",
+                got=f"{self.strategy.delivered} trials",
+                expected=f"{len(self.trials)} trials",
+                remedy="Make it anew, or give the session strategy.restarted().",
+            )
         with DeferredInterrupts() as self._interrupts, self._open_log(self._header) as self._log:
             try:
                 self._log_beginning()

@@ -6,11 +6,12 @@ start-up, serial correlation). Person i of seed s is the same on every machine.
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final
+from typing import Final, get_args
 
 import numpy as np
 
@@ -139,7 +140,14 @@ class Responder:
             isi_ms: the commanded ISI on the reference [ms]; None for TMS alone.
             reference: the event that the ISI counts from. From the valve command the hit delay's variation stays
                 unseen; from the impact it moves the realised ISI, which is told.
+
+        Raises:
+            InvalidValueError: an ISI that is not finite, or an unknown reference.
         """
+        if isi_ms is not None and not math.isfinite(isi_ms):
+            raise InvalidValueError("an ISI must be a finite number of milliseconds", got=isi_ms)
+        if reference not in get_args(Reference):
+            raise InvalidValueError("reference is unknown", got=reference, expected=" or ".join(get_args(Reference)))
         noise = self._next_noise()
         told_ms, facilitation = (None, 0.0) if isi_ms is None else self._stimulate(isi_ms, reference)
         subject, rng = self.subject, self._rng

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,7 @@ from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError
 from isiw.subjects import cohort
 from isiw.testing import check_device
-from isiw.trials import Measurement, Status, Trial, TrialTable
+from isiw.trials import Channel, Measurement, Status, Sweep, Trial, TrialTable
 
 
 def responder(reference="valve"):
@@ -100,7 +102,7 @@ def test_the_suite_finds_a_device_that_cannot_resume(space):
 
 
 def test_the_suite_finds_a_device_with_wrong_timing(space):
-    with pytest.raises(AssertionError, match="20 ms off"):
+    with pytest.raises(AssertionError, match=r"ISI off .* 20.* ms for 0"):
         check_device(lambda: Inaccurate(responder(), "valve"), space)
 
 
@@ -193,3 +195,51 @@ def test_an_interval_that_nobody_can_wait_for_is_an_error(space, iti_s):
 def test_the_suite_finds_what_is_no_device(space):
     with pytest.raises(AssertionError, match="describe, stage"):
         check_device(object, space)
+
+
+class Slow(Hardware):
+    """Takes longer than it is allowed to."""
+
+    def deliver(self, stimulus, timeout_s):
+        answer = super().deliver(stimulus, timeout_s)
+        time.sleep(1.2 * timeout_s)
+        return answer
+
+
+def test_the_suite_finds_a_device_that_ignores_its_timeout(space):
+    with pytest.raises(AssertionError, match="within its timeout"):
+        check_device(Slow, space, clock=VirtualClock(), timeout_s=0.05)
+
+
+class Rig(Hardware):
+    """Answers with sweeps of some channels and lengths."""
+
+    def __init__(self, *, unit="mV", length_ms=600, other=None):
+        super().__init__()
+        self.unit, self.length_ms, self.other = unit, length_ms, other
+
+    def describe(self):
+        return DeviceInfo("rig", "valve", channels={"emg": self.unit} | ({self.other: "V"} if self.other else {}))
+
+    def deliver(self, stimulus, timeout_s):
+        super().deliver(stimulus, timeout_s)
+        noise = 0.001 * np.random.default_rng(stimulus.trial).standard_normal(5 * self.length_ms)
+        channels = {name: Channel(noise, 5000.0, unit) for name, unit in self.describe().channels.items()}
+        return Sweep(channels, t_valve_ms=100.0, t_tms_ms=100.0 + (stimulus.isi_ms or 0.0))
+
+
+def test_a_device_of_sweeps_conforms(space):
+    check_device(Rig, space, clock=VirtualClock())
+
+
+@pytest.mark.parametrize(
+    ("rig", "broken"),
+    [
+        ({"unit": "microvolt"}, "can judge .*unit of the channel emg"),
+        ({"other": "event"}, "can judge .*cannot have this name"),
+        ({"length_ms": 310}, "can use .*missing channel"),
+    ],
+)
+def test_the_suite_finds_sweeps_that_no_session_could_use(space, rig, broken):
+    with pytest.raises(AssertionError, match=broken):
+        check_device(lambda: Rig(**rig), space, clock=VirtualClock())

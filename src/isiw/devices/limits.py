@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Integral
 
 from isiw.design import DesignSpace
 from isiw.devices.clock import Clock
@@ -39,8 +40,9 @@ class Limits:
         if not (math.isfinite(self.min_iti_s) and self.min_iti_s >= 0):
             raise InvalidValueError("min_iti_s must be finite and not negative", got=self.min_iti_s)
         # A NaN compares as false with any count, and so would limit nothing.
-        if isinstance(self.max_pulses, bool) or not isinstance(self.max_pulses, int) or self.max_pulses < 1:
+        if isinstance(self.max_pulses, bool) or not isinstance(self.max_pulses, Integral) or self.max_pulses < 1:
             raise InvalidValueError("max_pulses must be a whole number of at least 1", got=self.max_pulses)
+        object.__setattr__(self, "max_pulses", int(self.max_pulses))
 
     @classmethod
     def of_space(cls, space: DesignSpace, *, min_iti_s: float = 5.0, max_pulses: int = 200) -> Limits:

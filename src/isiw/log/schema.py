@@ -252,7 +252,16 @@ def topic_of(record: Record, channel_name: str | None = None) -> str:
     """
     if not isinstance(record, Waveform):
         return _TOPIC_OF_KIND[type(record)]
-    topic = f"/{channel_name or ''}"
+    return waveform_topic(channel_name or "")
+
+
+def waveform_topic(channel_name: str) -> str:
+    """The topic of a channel's waveforms.
+
+    Raises:
+        InvalidValueError: an empty name, or one that isiw uses for itself.
+    """
+    topic = f"/{channel_name}"
     if topic == "/" or topic in _KINDS:
         raise InvalidValueError(
             "a waveform's channel cannot have this name", got=channel_name, remedy="Rename it in the device."

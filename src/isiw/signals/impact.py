@@ -56,9 +56,11 @@ def impact_times(acceleration: ArrayLike, rate_hz: float, after_ms: float = VALV
         after_ms: the valve command [ms from the first sample]; the hammer is at rest before it.
 
     Raises:
-        InvalidValueError: a waveform that is no recording, or less than 20 ms of rest.
+        InvalidValueError: a waveform that is no recording, no finite time, or less than 20 ms of rest.
     """
     waves = as_waveforms(acceleration, rate_hz, "acceleration")
+    if not math.isfinite(after_ms):
+        raise InvalidValueError("after_ms must be finite", got=after_ms)
     valve = round(after_ms * rate_hz / 1000)
     level, noise = rest_level(waves, valve, rate_hz)
     above_rest = waves - level

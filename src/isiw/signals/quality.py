@@ -37,6 +37,7 @@ __all__ = [
     "is_saturated",
     "judge",
     "judge_measurement",
+    "require_units",
     "wrong_isi",
 ]
 
@@ -47,6 +48,23 @@ ACCELERATION_UNITS = frozenset({"m/s^2", "m/s²", "g", "V", "mV"})
 """Units of the acceleration; the impact is found in any of them."""
 
 FLAT_MS = 1.0
+
+
+def require_units(units: Mapping[str, str]) -> None:
+    """Raise where waveforms are in units that nobody can judge.
+
+    Args:
+        units: by the channel's name.
+
+    Raises:
+        InvalidValueError: an unknown unit of EMG or acceleration.
+    """
+    known = {"emg": EMG_UNITS_MV.keys(), "acceleration": ACCELERATION_UNITS}
+    for name in known.keys() & units.keys():
+        if units[name] not in known[name]:
+            raise InvalidValueError(
+                f"the unit of the channel {name} is unknown", got=units[name], expected=", ".join(sorted(known[name]))
+            )
 
 
 @dataclass(frozen=True)
@@ -256,10 +274,7 @@ def _impact(sweep: Sweep) -> tuple[float | None, MistrialReason | None]:
     if "acceleration" not in sweep.channels:
         return None, None
     channel = sweep.channels["acceleration"]
-    if channel.unit not in ACCELERATION_UNITS:
-        raise InvalidValueError(
-            "the acceleration's unit is unknown", got=channel.unit, expected=", ".join(sorted(ACCELERATION_UNITS))
-        )
+    require_units({"acceleration": channel.unit})
     if sweep.t_valve_ms is None or not _usable(sweep, "acceleration"):
         return None, MistrialReason.MISSING_CHANNEL
     hit = impact_time(channel.values, channel.rate_hz, sweep.t_valve_ms - channel.t0_ms)
@@ -278,8 +293,7 @@ def _of_one_length(sweep: Sweep) -> bool:
 
 
 def _unit_mv(emg: Channel) -> float:
-    if emg.unit not in EMG_UNITS_MV:
-        raise InvalidValueError("the EMG's unit is unknown", got=emg.unit, expected=", ".join(EMG_UNITS_MV))
+    require_units({"emg": emg.unit})
     return EMG_UNITS_MV[emg.unit]
 
 

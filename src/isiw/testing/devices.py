@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,11 +11,16 @@ from dataclasses import dataclass
 from isiw.design import DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
-from isiw.errors import DeviceError, InvalidValueError
+from isiw.errors import DeviceError, InvalidValueError, IsiwError
+from isiw.log.schema import waveform_topic
+from isiw.signals import Judged, SignalLimits, judge, judge_measurement
 from isiw.testing.promises import require
-from isiw.trials import Measurement, Stimulus, Sweep
+from isiw.trials import Measurement, MistrialReason, Stimulus, Sweep
 
 __all__ = ["check_device"]
+
+_OF_THE_DEVICE = {MistrialReason.NO_PULSE, MistrialReason.MISSING_CHANNEL, MistrialReason.ISI_OFF}
+"""Mistrials that are no person's, nor a phantom's."""
 
 
 def check_device(
@@ -24,6 +30,7 @@ def check_device(
     timeout_s: float = 30.0,
     iti_s: float = 5.0,
     clock: Clock | None = None,
+    signals: SignalLimits | None = None,
 ) -> None:
     """Check that a device keeps the promises of `isiw.Device`. It stimulates: put the coil on a phantom.
 
@@ -36,6 +43,7 @@ def check_device(
         timeout_s: how long one delivery may take [s].
         iti_s: how long to wait before each of these deliveries [s].
         clock: waits; a virtual one by default where the device is simulated.
+        signals: what a session's sweeps must keep.
 
     Raises:
         AssertionError: a promise is broken; the message says which.
@@ -44,9 +52,10 @@ def check_device(
     device = make()
     require(isinstance(device, Device), "it has describe, stage, deliver, stop and unstage")
     _check_description(device, space)
+    rules = _Rules(space, signals or SignalLimits())
     pace = _Pace(timeout_s, iti_s, clock or (VirtualClock() if device.describe().simulated else MonotonicClock()))
     with _disarmed_at_last(device):
-        _check_delivery(device, space, pace)
+        _check_delivery(device, rules, pace)
     if isinstance(device, HasMemory):
         _check_memory(make, space, pace)
 
@@ -66,7 +75,26 @@ class _Pace:
     def deliver(self, device: Device, stimulus: Stimulus) -> Answer:
         """Deliver one pair of stimuli, an inter-trial interval after whatever was delivered before."""
         self.clock.sleep_s(self.iti_s)
-        return device.deliver(stimulus, self.timeout_s)
+        began_s = time.monotonic()
+        answer = device.deliver(stimulus, self.timeout_s)
+        spent_s = time.monotonic() - began_s
+        require(spent_s <= self.timeout_s, f"deliver returns or raises within its timeout, here after {spent_s:.3g} s")
+        return answer
+
+
+@dataclass(frozen=True)
+class _Rules:
+    """By what a session would judge the answers."""
+
+    space: DesignSpace
+    limits: SignalLimits
+
+    def judged(self, answer: Answer, stimulus: Stimulus) -> Judged:
+        if isinstance(answer, Sweep):
+            for name in answer.channels:
+                waveform_topic(name)
+            return judge(answer, stimulus, self.space, self.limits)
+        return judge_measurement(answer, stimulus, self.space, self.limits)
 
 
 @contextmanager
@@ -80,12 +108,12 @@ def _disarmed_at_last(device: Device) -> Iterator[None]:
             device.unstage()
 
 
-def _check_delivery(device: Device, space: DesignSpace, pace: _Pace) -> None:
+def _check_delivery(device: Device, rules: _Rules, pace: _Pace) -> None:
     _check_refusal(device, "before stage()", pace)
     device.stage()
-    for trial, isi_ms in enumerate((space.low_ms, None, space.high_ms)):
+    for trial, isi_ms in enumerate((rules.space.low_ms, None, rules.space.high_ms)):
         stimulus = Stimulus(trial, isi_ms)
-        _check_answer(device.describe(), stimulus, pace.deliver(device, stimulus), space)
+        _check_answer(device.describe(), stimulus, pace.deliver(device, stimulus), rules)
     for verb in (device.stop, device.stop, device.unstage, device.unstage):
         verb()
         _check_refusal(device, "after stop() or unstage()", pace)
@@ -109,19 +137,22 @@ def _check_refusal(device: Device, when: str, pace: _Pace) -> None:
     raise AssertionError(f"broken promise: deliver raises a DeviceError {when}")
 
 
-def _check_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, space: DesignSpace) -> None:
+def _check_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, rules: _Rules) -> None:
     require(isinstance(answer, Sweep | Measurement), "deliver returns a Sweep or a Measurement")
     if isinstance(answer, Sweep):
         units = {name: channel.unit for name, channel in answer.channels.items()}
         require(units == dict(info.channels), f"a sweep has the channels and units of describe(), here {units}")
         require("emg" in units and answer.t_tms_ms is not None, "a sweep has its EMG and the time of the pulse")
-        return
-    require(not info.channels, "a device that measures the MEP itself describes no channels")
-    if stimulus.isi_ms is None or answer.isi_ms is None:
-        require(stimulus.isi_ms is answer.isi_ms, "the realised ISI is None for TMS alone, and only then")
     else:
-        off_ms = abs(answer.isi_ms - stimulus.isi_ms)
-        require(off_ms <= space.tolerance_ms, f"the realised ISI is near the commanded one, here {off_ms:g} ms off")
+        require(not info.channels, "a device that measures the MEP itself describes no channels")
+        alone = stimulus.isi_ms is None
+        require((answer.isi_ms is None) is alone, "the realised ISI is None for TMS alone, and only then")
+    try:
+        judged = rules.judged(answer, stimulus)
+    except IsiwError as error:
+        raise AssertionError(f"broken promise: a session can judge what deliver returns, here: {error}") from error
+    what = f"{judged.reason}, {judged.isi_ms} ms for {stimulus.isi_ms} ms"
+    require(judged.reason not in _OF_THE_DEVICE, f"a session can use what deliver returns, here a mistrial: {what}")
 
 
 def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: _Pace) -> None:

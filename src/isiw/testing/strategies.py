@@ -61,6 +61,8 @@ def _check_refusals(strategy: Strategy) -> None:
         (isi_ms, {"mep_mv": -1.0}),
         (isi_ms, {}),
         (isi_ms, {"mep_mv": 0.1, "response": True}),
+        (isi_ms, {"response": math.nan}),
+        (isi_ms, {"response": 0.5}),
         (math.nan, {"mep_mv": 0.1}),
         (far_ms, {"mep_mv": 0.1}),
     ]
