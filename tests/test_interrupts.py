@@ -30,7 +30,7 @@ def test_an_interrupt_waits_until_it_is_allowed():
     assert done == ["record"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_where_allowed_it_comes_at_once(number):
     done = []
 
@@ -105,3 +105,15 @@ def test_outside_the_main_thread_it_does_nothing():
     thread.start()
     thread.join()
     assert failures == []
+
+
+def test_what_the_process_ignores_it_goes_on_ignoring():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    done = []
+    try:
+        with DeferredInterrupts() as interrupts, interrupts.allowed():
+            interrupt(signal.SIGHUP)
+            done.append("all")
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert done == ["all"]

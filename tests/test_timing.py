@@ -198,3 +198,8 @@ def test_a_study_of_nothing_is_an_error():
         study_preset("bench", taps=0)
     with pytest.raises(InvalidValueError, match="needs sweeps"):
         study_sweeps("nothing", [], [])
+
+
+def test_a_seed_that_is_none_is_refused():
+    with pytest.raises(InvalidValueError, match="seed"):
+        study_preset("subject1", taps=1, seed=-1)

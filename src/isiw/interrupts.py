@@ -11,14 +11,16 @@ from typing import Any, Self
 
 __all__ = ["DeferredInterrupts"]
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last two, a closed terminal, are not on every system
+_SIGNALS = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
 
 
 class DeferredInterrupts:
-    """Holds back Ctrl-C, and a polite request to terminate, except where they are allowed.
+    """Holds back Ctrl-C, a polite request to terminate, and a terminal's closing, except where they are allowed.
 
-    Either arrives as a KeyboardInterrupt: at once inside `allowed`, else at the next entry into it or at the very end.
-    Outside the main thread, which is where Python delivers signals, nothing is held back.
+    Each arrives as a KeyboardInterrupt: at once inside `allowed`, else at the next entry into it or at the very end.
+    Outside the main thread, which is where Python delivers signals, nothing is held back; what the process ignores, as
+    under nohup, it goes on ignoring.
     """
 
     def __init__(self) -> None:
@@ -27,7 +29,8 @@ class DeferredInterrupts:
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
-            self._before = {number: signal.signal(number, self._receive) for number in _SIGNALS}
+            heard = [number for number in _SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+            self._before = {number: signal.signal(number, self._receive) for number in heard}
         return self
 
     def __exit__(

@@ -143,10 +143,10 @@ def study_preset(
         rate_hz: sampling rate [Hz].
 
     Raises:
-        InvalidValueError: an unknown preset, or no taps.
+        InvalidValueError: an unknown preset, no taps, or a negative seed.
     """
-    if taps < 1:
-        raise InvalidValueError("a study needs taps", got=taps)
+    if taps < 1 or seed < 0:
+        raise InvalidValueError("a study needs taps, and a seed that is not negative", got=(taps, seed))
     geometry, rng = preset(name), np.random.default_rng(seed)
     predicted_ms = float(np.nanmedian(_tap(geometry, np.full(CALIBRATION_TAPS, np.nan), rate_hz, rng).hit_ms))
     commanded = np.repeat(np.asarray(isi_ms, dtype=np.float64), taps) if len(isi_ms) else np.full(taps, np.nan)
@@ -173,7 +173,7 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
         realised.append(np.nan if sweep.t_tms_ms is None else sweep.t_tms_ms - events.hit_ms[0])
         parts.append(_later(events, VALVE_MS - (sweep.t_valve_ms or 0.0)))
     if not parts:
-        raise InvalidValueError("a study needs sweeps", got=0)
+        raise InvalidValueError("a study needs sweeps with an acceleration and the valve's time", got=f"none in {name}")
     commanded = np.array([np.nan if isi is None else isi for isi in commanded_isi_ms])
     return TimingStudy(name, _joined(parts), commanded, np.array(realised))
 

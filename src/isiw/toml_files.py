@@ -12,7 +12,7 @@ from typing import Any, TypeVar, cast, get_args, get_type_hints
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
-from isiw.errors import ConfigError, IsiwError
+from isiw.errors import ConfigError, IsiwError, StrategyError
 
 __all__ = ["checked", "read_toml"]
 
@@ -50,6 +50,10 @@ def checked(kind: type[_T], values: Mapping[str, Any], source: str) -> _T:
     """
     try:
         return cast("_T", dict(_strict(kind).model_validate({"values": values}))["values"])
+    except StrategyError as error:  # pydantic knows ValueErrors alone
+        raise ConfigError(
+            f"{source}: {error.what}", got=error.got, expected=error.expected, remedy=error.remedy
+        ) from error
     except ValidationError as error:
         found = error.errors()
         # A key that was misspelt is reported before the one that is missing because of it.
@@ -75,7 +79,8 @@ def _explained(kind: Any, error: ErrorDetails, source: str) -> ConfigError:
         )
     if error["type"] == "missing":
         return ConfigError(f"{source}: the key {key} is missing", remedy="Add it.")
-    what, remedy = f"{source}: the value of {key} cannot be used", "Correct it, or remove the key for its default."
+    what = f"{source}: the value of {key} cannot be used" if key else f"{source} cannot be used"
+    remedy = "Correct it, or remove the key for its default."
     own = error.get("ctx", {}).get("error")
     if isinstance(own, IsiwError):
         return ConfigError(f"{what}: {own.what}", got=own.got, expected=own.expected, remedy=own.remedy or remedy)

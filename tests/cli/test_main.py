@@ -209,3 +209,18 @@ def test_help_and_import_load_no_torch_and_are_fast():
     assert "resume" in done.stdout
     # Time on the processor, which does not depend on what else the machine is doing.
     assert (end.children_user - begin.children_user) + (end.children_system - begin.children_system) < 0.5
+
+
+def test_a_log_is_not_overwritten_by_its_picture(isiw, short, tmp_path):
+    result = isiw("run", short, "--log", "s.png")
+    assert result.exit_code == 1
+    assert "overwritten by its picture" in result.output
+    assert not (tmp_path / "s.png").exists()
+
+
+def test_what_the_operating_system_refuses_is_a_message(isiw, log, tmp_path):
+    (tmp_path / "picture.png").mkdir()
+    result = isiw("plot", log, "-o", "picture.png")
+    assert result.exit_code == 1
+    assert "error: " in result.output
+    assert "picture.png" in result.output

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import gzip
+
 import numpy as np
 import pytest
 
@@ -71,4 +73,13 @@ def test_the_recordings_sort_into_quiet_sweeps_and_clear_meps(recordings):
 
 def test_a_folder_without_recordings_is_refused_with_the_way_out(tmp_path):
     with pytest.raises(DeviceError, match=r"not found.*--data"):
+        load_recordings(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"trial,0.0\n0,1.0\n", gzip.compress(b"trial,0.0\n0,none\n"), gzip.compress(b"")]
+)
+def test_a_damaged_recording_is_named(tmp_path, content):
+    (tmp_path / "uef_1_ECR_epochs_uV_3kHz.csv.gz").write_bytes(content)
+    with pytest.raises(DeviceError, match="cannot be read"):
         load_recordings(tmp_path)

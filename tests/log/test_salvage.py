@@ -119,3 +119,9 @@ def test_the_part_is_read_where_there_are_both(tmp_path):
         (tmp_path / name).write_bytes(b"x")
     for name in ("s.mcap", "s.mcap.part"):
         assert current_file(tmp_path / name).name == "s.mcap.part"
+
+
+@pytest.mark.parametrize("path", ["", ".", "/", 300 * "s"])
+def test_what_can_be_no_file_is_an_error_of_its_own(path):
+    with pytest.raises(LogError):
+        salvage(path)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -167,7 +168,16 @@ def test_a_copy_left_by_a_killed_resumption_is_no_obstacle(broken_log, header):
     assert len(read_session(broken_log).table) == 8
 
 
-def test_a_damaged_file_is_kept_beside_what_was_salvaged(broken_log, header):
+def _no_links(new, old):
+    if new.exists():
+        raise FileExistsError(new)
+    raise OSError(errno.EPERM, "no such thing here")
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_a_damaged_file_is_kept_beside_what_was_salvaged(broken_log, header, monkeypatch, links):
+    if not links:  # as on a memory stick
+        monkeypatch.setattr(Path, "hardlink_to", _no_links)
     damaged = broken_log.read_bytes()[:-40]
     for name in ("s.mcap.damaged", "s.mcap.damaged1"):
         broken_log.write_bytes(damaged)
@@ -185,3 +195,12 @@ def test_a_running_session_cannot_be_resumed_beside_itself(tmp_path, header, wri
     writes(log, [2])
     log.close()
     assert len(read_session(tmp_path / "s.mcap").table) == 3
+
+
+@pytest.mark.parametrize("name", ["s.mcap.part", "", "folder", 300 * "s"])
+def test_a_name_that_no_log_can_have_is_refused_and_leaves_nothing(tmp_path, header, name):
+    (tmp_path / "folder").mkdir()
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(LogError):
+        LogWriter.create(tmp_path / name, header)
+    assert sorted(tmp_path.iterdir()) == before

@@ -8,7 +8,7 @@ import pytest
 import tomli_w
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
-from isiw.errors import ConfigError, InvalidValueError, StrategyError
+from isiw.errors import ConfigError, InvalidValueError
 from isiw.studies import Study, StudyStrategy, load_study
 from isiw.studies.plan import study_from, study_values
 from studies.tiny import TOML, tiny
@@ -61,7 +61,9 @@ def test_toml_values_make_the_same_study_again():
     ("text", "message"),
     [
         (TOML + "peple = 3", r"study.toml: the key peple is unknown.*Did you mean people"),
-        (TOML.replace("people = 12", "people = 0"), r"people is too small; got 0"),
+        (TOML.replace("people = 12", "people = 0"), r"people must be from 1 to \d+; got 0"),
+        (TOML + "amplitude = -1.0", r"study.toml cannot be used: amplitude is a factor above 0; got -1.0"),
+        (TOML + "seed = 5000000000000000000", r"seed must be from 0 to \d+"),
         (TOML.replace('"ignored"', '"never"'), r"the value of stopping cannot be used; got 'never'"),
         (TOML.replace("[2, 4]", "[4, 2]"), r"marks ascend"),
         (TOML.replace("[2, 4]", "[2, 5]"), r"marks ascend"),
@@ -69,7 +71,7 @@ def test_toml_values_make_the_same_study_again():
         (TOML.replace('"incremental"', '"even"'), r"each once.*another label"),
         (TOML.replace("[{", "[ ] # "), r"a study needs strategies"),
         (TOML.replace("particles", "partikels"), r"the settings of even: the key partikels is unknown"),
-        (TOML.replace("= 40", "= 1"), r"the settings of even: .*particles must be a whole number; got 1"),
+        (TOML.replace("= 40", "= 1"), r"the settings of even cannot be used: particles must be a whole number; got 1"),
         (TOML.replace("= 40", '= "many"'), r"the settings of even: the value of particles cannot be used; got 'many'"),
         (TOML.replace("settings =", "setings ="), r"strategies.0.setings is unknown.*Did you mean settings"),
         (TOML + 'space = "head"', r"the value of space cannot be used; got 'head'"),
@@ -84,7 +86,7 @@ def test_what_is_wrong_with_a_file_is_told_with_the_way_out(tmp_path, text, mess
 
 def test_an_unknown_strategy_is_told_with_the_known_ones(tmp_path):
     (tmp_path / "study.toml").write_text(TOML.replace("incremental", "incrementel"))
-    with pytest.raises(StrategyError, match="unknown strategy; got 'incrementel'; expected default"):
+    with pytest.raises(ConfigError, match=r"study.toml: .*unknown strategy; got 'incrementel'; expected default"):
         load_study(tmp_path / "study.toml")
 
 

@@ -26,7 +26,7 @@ def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:
 
 @contextmanager
 def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
-    """Turn what isiw raises into a message and an exit code.
+    """Turn what isiw raises, and what the operating system refuses, into a message and an exit code.
 
     Args:
         interrupted: what to say after Ctrl-C.
@@ -36,6 +36,9 @@ def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
     except isiw.errors.IsiwError as error:
         show(f"error: {error}", style="red", stderr=True)
         raise typer.Exit(DAMAGED if isinstance(error, isiw.errors.DamagedLogError) else 1) from error
+    except OSError as error:
+        show(f"error: {error}", style="red", stderr=True)
+        raise typer.Exit(1) from error
     except KeyboardInterrupt as error:
         show(interrupted, style="red", stderr=True)
         raise typer.Exit(INTERRUPTED) from error

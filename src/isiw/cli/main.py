@@ -120,11 +120,10 @@ def timing(
 ) -> None:
     """Say how repeatable the taps are: events, ISI errors, mistrials."""
     with errors_reported(_INTERRUPTED):
-        study = (
-            isiw.timing.study_session(isiw.read_session(source))
-            if _is_log(source)
-            else isiw.timing.study_preset(source, taps=taps, seed=seed)
-        )
+        if _is_log(source) or Path(source).suffix:
+            study = isiw.timing.study_session(isiw.read_session(source))
+        else:
+            study = isiw.timing.study_preset(source, taps=taps, seed=seed)
         show(isiw.timing.timing_report(study))
         if output is not None:
             show(f"picture: {isiw.plots_timing.save_timing_plot(study, output)}")
@@ -137,20 +136,23 @@ def _is_log(source: str) -> bool:
 
 
 def _run_to_the_end(session: Session) -> None:
+    picture = session.log_path.with_suffix(".png")
+    if picture == session.log_path:
+        raise isiw.errors.ConfigError("the log would be overwritten by its picture", got=str(picture), expected=".mcap")
     show(f"log: {session.log_path}")
     _print_row(isiw.report.PROGRESS_HEADINGS)
+    before = len(session.trials)
     try:
         result = session.run()
     except BaseException:
-        if session.trials:
+        if len(session.trials) > before:
             show(f"The session ended early. Its log is safe; go on with: isiw resume {session.log_path}")
         raise
     record = isiw.read_session(result.log)
     truth = isiw.config.true_window(record)
-    picture = isiw.plots.save_session_plot(record, result.log.with_suffix(".png"), truth=truth)
     show(f"\n{isiw.report.final_statement(record)}", style="bold")
     show(isiw.report.truth_sentence(record, truth))
-    show(f"log:     {result.log}\npicture: {picture}")
+    show(f"log:     {result.log}\npicture: {isiw.plots.save_session_plot(record, picture, truth=truth)}")
 
 
 def _show_progress(update: SessionUpdate) -> None:

@@ -33,5 +33,5 @@ def preset(name: str) -> Geometry:
         InvalidValueError: an unknown name.
     """
     if name not in PRESETS:
-        raise InvalidValueError("unknown preset", got=name, expected=", ".join(PRESETS))
+        raise InvalidValueError("no preset of the tapping robot has this name", got=name, expected=", ".join(PRESETS))
     return PRESETS[name]

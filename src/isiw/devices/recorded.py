@@ -9,6 +9,7 @@ Finland, BSD-3-Clause) are not part of the package; see the repository Neuromodu
 from __future__ import annotations
 
 import os
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -101,11 +102,19 @@ def load_recordings(folder: str | os.PathLike[str]) -> Recordings:
             expected=f"a folder with {PATTERN}",
             remedy="Give their folder with --data, or use --subject simulated.",
         )
-    frames = [pd.read_csv(file, index_col="trial") for file in files]
+    frames = [_read_sweeps(file) for file in files]
     time_ms = frames[0].columns.to_numpy().astype(np.float64)
     if any(list(frame.columns) != list(frames[0].columns) for frame in frames):
         raise DeviceError("the recorded files do not share their times", got=[file.name for file in files])
-    return _sorted_recordings(time_ms, np.concatenate([frame.to_numpy(dtype=np.float64) for frame in frames]) / 1e3)
+    return _sorted_recordings(time_ms, np.concatenate([frame.to_numpy() for frame in frames]) / 1e3)
+
+
+def _read_sweeps(file: Path) -> pd.DataFrame:
+    try:
+        frame = pd.read_csv(file, index_col="trial").astype(np.float64)
+        return frame.set_axis(frame.columns.astype(np.float64), axis=1)
+    except (OSError, EOFError, ValueError, zlib.error) as error:
+        raise DeviceError(f"a recorded file cannot be read: {error}", got=str(file), remedy="Copy it anew.") from error
 
 
 def _sorted_recordings(time_ms: FloatArray, sweeps_mv: FloatArray) -> Recordings:

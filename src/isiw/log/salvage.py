@@ -19,7 +19,7 @@ from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.schema import TOPICS
-from isiw.log.storage import log_of, part_of
+from isiw.log.storage import disk_errors, log_of, part_of
 
 __all__ = ["Message", "Salvage", "current_file", "salvage"]
 
@@ -97,26 +97,29 @@ def salvage(path: str | Path) -> Salvage:
         path: the log, with or without `.part`.
 
     Raises:
-        LogError: no such file, or not a log.
+        LogError: no such file, not a log, or one that may not be read.
         DamagedLogError: a log of which nothing can be read.
     """
-    found = Salvage(current_file(path))
-    with found.path.open("rb") as file:
-        if not file.read(len(_MAGIC)):
-            raise DamagedLogError(
-                "the log is empty", got=str(found.path), remedy="Nothing was recorded in it; delete it."
-            )
-        file.seek(0)
-        found.size = found.path.stat().st_size
-        _read(file, found)
-        if found.finished and not found.losses:
-            _check_summary(file, found)
+    with disk_errors(Path(path), "the log cannot be read", "Check its permissions and those of its folder."):
+        found = Salvage(current_file(path))
+        with found.path.open("rb") as file:
+            _read_file(file, found)
     _report_gaps(found)
     if not found.messages and not found.attachments:
         raise DamagedLogError(
             "nothing can be read from the log", got=str(found.path), remedy="Is it an isiw log (MCAP)?"
         )
     return found
+
+
+def _read_file(file: IO[bytes], found: Salvage) -> None:
+    if not file.read(len(_MAGIC)):
+        raise DamagedLogError("the log is empty", got=str(found.path), remedy="Nothing was recorded in it; delete it.")
+    file.seek(0)
+    found.size = found.path.stat().st_size
+    _read(file, found)
+    if found.finished and not found.losses:
+        _check_summary(file, found)
 
 
 def _read(file: IO[bytes], found: Salvage) -> None:

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import IO
 
@@ -14,11 +15,17 @@ from isiw.errors import LogError
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["DurableFile", "begun", "log_of", "part_of", "refuse_if_locked", "sync_folder"]
+__all__ = ["DurableFile", "begun", "disk_errors", "log_of", "part_of", "refuse_if_locked", "sync_folder"]
 
 
 def part_of(path: Path) -> Path:
-    """Where a log is while it is being written."""
+    """Where a log is while it is being written.
+
+    Raises:
+        LogError: the path names no file.
+    """
+    if not path.name:
+        raise LogError("a log needs a file's name", got=str(path))
     return path.with_name(f"{path.name}.part")
 
 
@@ -65,15 +72,25 @@ def refuse_if_locked(path: Path) -> None:
 
 
 @contextmanager
-def _disk_errors(path: Path) -> Iterator[None]:
+def disk_errors(path: Path, what: str, remedy: str) -> Iterator[None]:
+    """Within, what the operating system refuses is a LogError.
+
+    Args:
+        path: the file, for the message.
+        what: what cannot be done.
+        remedy: the way out.
+    """
     try:
         yield
     except OSError as error:
-        raise LogError(
-            f"the log cannot be written: {error.strerror}",
-            got=str(path),
-            remedy="What was synced before is safe. Make room, then resume the session.",
-        ) from error
+        raise LogError(f"{what}: {error.strerror}", got=str(path), remedy=remedy) from error
+
+
+_writing = partial(
+    disk_errors,
+    what="the log cannot be written",
+    remedy="What was synced before is safe. Make room, then resume the session.",
+)
 
 
 class DurableFile:
@@ -87,19 +104,15 @@ class DurableFile:
     """
 
     def __init__(self, path: Path) -> None:
-        try:
+        with disk_errors(path, "the log cannot be made", "Choose another path."):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file: IO[bytes] = path.open("xb")
-        except OSError as error:
-            raise LogError(
-                f"the log cannot be made: {error.strerror}", got=str(path), remedy="Choose another path."
-            ) from error
         self.path = path
         _lock(self._file, path)
 
     def write(self, data: bytes) -> int:
         """Append."""
-        with _disk_errors(self.path):
+        with _writing(self.path):
             return self._file.write(data)
 
     def tell(self) -> int:
@@ -108,12 +121,12 @@ class DurableFile:
 
     def flush(self) -> None:
         """Hand everything to the operating system."""
-        with _disk_errors(self.path):
+        with _writing(self.path):
             self._file.flush()
 
     def sync(self) -> None:
         """Make everything so far durable."""
-        with _disk_errors(self.path):
+        with _writing(self.path):
             self._file.flush()
             os.fsync(self._file.fileno())
 
@@ -134,7 +147,7 @@ class DurableFile:
         try:
             self.sync()
         finally:
-            with _disk_errors(self.path):
+            with _writing(self.path):
                 self._file.close()
 
     def abandon(self) -> None:

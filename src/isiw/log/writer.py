@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import os
+import shutil
 import time
 from pathlib import Path
 from types import TracebackType
@@ -13,7 +16,7 @@ from mcap.writer import Writer
 from isiw.errors import LogError
 from isiw.log.salvage import Message, Salvage, current_file
 from isiw.log.schema import TOPICS, Header, Record, encode, json_schema, topic_of
-from isiw.log.storage import DurableFile, begun, log_of, part_of, refuse_if_locked, sync_folder
+from isiw.log.storage import DurableFile, begun, disk_errors, log_of, part_of, refuse_if_locked, sync_folder
 
 __all__ = ["CONFIGURATION", "LogWriter"]
 
@@ -49,16 +52,12 @@ class LogWriter:
         """Start a new log with its header.
 
         Raises:
-            LogError: there is one already, finished or not; it is never overwritten. Or the header cannot be written.
+            LogError: there is one already, finished or not; it is never overwritten. Or it cannot have this name, or
+                the header cannot be written.
         """
         target = Path(path)
-        for existing in (target, part_of(target)):
-            if existing.exists():
-                raise LogError(
-                    "there is a log already, and it is never overwritten",
-                    got=str(existing),
-                    remedy=f"Choose another path, or continue it: isiw resume {target}",
-                )
+        with disk_errors(target, "the log cannot be made", "Choose another path."):
+            _require_free(target)
         with begun(part_of(target)) as file:
             log = cls(target, file)
             log.begin(header)
@@ -182,6 +181,20 @@ class LogWriter:
         return self._channels[topic]
 
 
+def _require_free(target: Path) -> None:
+    if target != log_of(target) or target.is_dir():
+        raise LogError(
+            "a log cannot have this name", got=str(target), remedy="Name a file; .part is added while the session runs."
+        )
+    for existing in (target, part_of(target)):
+        if existing.exists():
+            raise LogError(
+                "there is a log already, and it is never overwritten",
+                got=str(existing),
+                remedy=f"Choose another path, or continue it: isiw resume {target}",
+            )
+
+
 def _as_toml(header: Header) -> bytes:
     try:
         return tomli_w.dumps(header.model_dump(mode="json", exclude_none=True)).encode()
@@ -194,12 +207,22 @@ def _as_toml(header: Header) -> bytes:
 
 def _keep(damaged: Path, target: Path) -> None:
     """Keep a damaged file's bytes under a name of their own."""
-    number = 0
-    while True:
+    for number in itertools.count():
         kept = target.with_name(f"{target.name}.damaged{number or ''}")
         try:
-            kept.hardlink_to(damaged)
+            _link(kept, damaged)
         except FileExistsError:
-            number += 1
-        else:
-            return
+            continue
+        return
+
+
+def _link(new: Path, old: Path) -> None:
+    """Give a file a second name, or copy it where the disk knows no such thing."""
+    try:
+        new.hardlink_to(old)
+    except FileExistsError:
+        raise
+    except OSError:
+        with old.open("rb") as source, new.open("xb") as copy:
+            shutil.copyfileobj(source, copy)
+            os.fsync(copy.fileno())

@@ -25,11 +25,14 @@ from isiw.catalogue import settings_of
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.studies.batch import simulate_batch
-from isiw.studies.sessions import SimulatedSession, Stopping, simulate
+from isiw.studies.sessions import SimulatedSession, Stopping, require_factor, simulate
 from isiw.subjects import COHORTS
 from isiw.toml_files import checked, read_toml
 
 __all__ = ["Engine", "Study", "StudyStrategy", "Unit", "load_study", "run_unit", "study_from", "study_values"]
+
+_MOST: Final = 2**62
+"""Of people, seeds and trials; their sums stay within 64 bits."""
 
 Engine: TypeAlias = Literal["single", "batched"]
 
@@ -131,8 +134,9 @@ class Study:
         if not self.marks:
             object.__setattr__(self, "marks", (*range(5, self.trials, 5), self.trials))
         for name, least in (("people", 1), ("seed", 0), ("trials", 1), ("batch", 1)):
-            if getattr(self, name) < least:
-                raise InvalidValueError(f"{name} is too small", got=getattr(self, name), expected=f"at least {least}")
+            if not least <= getattr(self, name) <= _MOST:
+                raise InvalidValueError(f"{name} must be from {least} to {_MOST}", got=getattr(self, name))
+        require_factor(self.amplitude)
         if list(self.marks) != sorted(set(self.marks)) or not 1 <= self.marks[0] <= self.marks[-1] <= self.trials:
             raise InvalidValueError("marks ascend from 1 to the number of trials", got=self.marks)
         for name, known in (("stopping", get_args(Stopping)), ("engine", get_args(Engine))):

@@ -114,8 +114,7 @@ class SimulatedSession:
     def __post_init__(self) -> None:
         if self.trials < 1 or self.person < 0:
             raise InvalidValueError("a session needs a trial and a person", got=(self.trials, self.person))
-        if not 0.0 < self.amplitude < math.inf:
-            raise InvalidValueError("amplitude is a factor above 0", got=self.amplitude)
+        require_factor(self.amplitude)
         if self.stopping not in get_args(Stopping):
             raise InvalidValueError("stopping is unknown", got=self.stopping, expected=", ".join(get_args(Stopping)))
 
@@ -127,6 +126,16 @@ class SimulatedSession:
     def player(self) -> Strategy:
         """The strategy before its first trial."""
         return make_strategy(self.strategy, self.space, self.seed + self.person, **dict(self.settings))
+
+
+def require_factor(amplitude: float) -> None:
+    """Raise where the factor on all amplitudes is none.
+
+    Raises:
+        InvalidValueError: not a finite number above 0.
+    """
+    if not 0.0 < amplitude < math.inf:
+        raise InvalidValueError("amplitude is a factor above 0", got=amplitude)
 
 
 def simulate(session: SimulatedSession) -> pd.DataFrame:

@@ -94,7 +94,7 @@ class Store:
     def _table(self, kind: str, keys: set[str], order: Sequence[str]) -> pd.DataFrame:
         if not keys:
             return pd.DataFrame()
-        parts = [pq.read_table(self._path(kind, key)) for key in sorted(keys)]
+        parts = [_read(self._path(kind, key)) for key in sorted(keys)]
         table: pd.DataFrame = pa.concat_tables(parts).to_pandas()
         return table.sort_values(list(order), ignore_index=True)
 
@@ -163,6 +163,17 @@ def _error_rows(unit: Unit, failure: Failure) -> pd.DataFrame:
         }
         for session in unit.sessions
     )
+
+
+def _read(path: Path) -> pa.Table:
+    try:
+        return pq.read_table(path)
+    except pa.ArrowInvalid as error:
+        raise StudyError(
+            f"a part of the study is damaged: {error}",
+            got=str(path),
+            remedy="Delete that file and run the study again; only its people are computed anew.",
+        ) from error
 
 
 def _write(path: Path, rows: pd.DataFrame) -> None:
