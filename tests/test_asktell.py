@@ -110,6 +110,7 @@ REFUSED = [
     ({"isi_ms": 250.0}, InvalidValueError, "either mep_mv or response"),
     ({"isi_ms": 250.0, "mep_mv": 0.1, "response": True}, InvalidValueError, "either mep_mv or response"),
     ({"isi_ms": 250.0, "response": math.nan}, InvalidValueError, "True or False"),
+    ({"isi_ms": 250.0, "response": [True]}, InvalidValueError, "True or False"),
     ({"isi_ms": 250.0, "response": 0.5}, InvalidValueError, "True or False"),
     ({"isi_ms": 250.0, "mep_mv": 0.1, "isi_sd_ms": -1.0}, InvalidValueError, "isi_sd_ms"),
     ({"isi_ms": 250.0, "mep_mv": 0.1, "isi_sd_ms": math.nan}, InvalidValueError, "isi_sd_ms"),

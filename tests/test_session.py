@@ -351,7 +351,7 @@ def test_times_that_nobody_can_keep_are_refused(scripted_strategy, scripted_devi
         Session(scripted_device(), scripted_strategy(3), log=log, **times)
 
 
-@pytest.mark.parametrize("channels", [{"emg": "microvolt"}, {"emg": "mV", "acceleration": "m/s2"}, {"event": "mV"}])
+@pytest.mark.parametrize("channels", [{"emg": "microvolt"}, {"event": "mV"}])
 def test_channels_that_cannot_be_judged_or_logged_are_refused_before_anything_is_delivered(
     scripted_strategy, scripted_device, log, channels
 ):
@@ -364,7 +364,16 @@ def test_channels_that_cannot_be_judged_or_logged_are_refused_before_anything_is
 
 def test_numbers_of_numpy_are_numbers(scripted_device, space, log):
     strategy = make_strategy("even", space, np.int64(3), max_trials=np.int64(2), particles=np.int64(64))
-    limits = Limits(np.float64(0), space.high_ms, max_pulses=np.int64(2))
+    limits = Limits(np.int64(0), np.float32(space.high_ms), np.float32(5), np.int64(2))
     result = Session(scripted_device(), strategy, log=log, limits=limits).run()
     assert len(result.trials) == 2
     assert read_session(log).header.strategy.settings["particles"] == 64
+
+
+def test_to_run_a_session_again_that_failed_says_how_to_go_on(scripted_strategy, scripted_device, log):
+    def answer(stimulus):
+        raise DeviceError(f"unplugged at {stimulus}")
+
+    session = Session(scripted_device(answer), scripted_strategy(3), log=log)
+    run_failing(session, DeviceError)
+    assert "isiw resume" in run_failing(session, LogError)[1]

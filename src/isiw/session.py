@@ -25,6 +25,7 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, StrategyError
 from isiw.interrupts import DeferredInterrupts
 from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform, waveform_topic
+from isiw.log.storage import log_of
 from isiw.log.writer import LogWriter
 from isiw.signals.quality import SignalLimits, judge, judge_measurement, require_units
 from isiw.stopping import StopDecision, stimuli_left
@@ -89,9 +90,10 @@ def _require_matching(info: DeviceInfo, strategy: Strategy) -> None:
             expected=strategy.space.reference,
             remedy="Give the DesignSpace the device's reference.",
         )
-    require_units(info.channels)
-    for name in info.channels:
+    for name, unit in info.channels.items():
         waveform_topic(name)
+        if name == "emg":  # an acceleration is not read where the device itself knows the time of the hit
+            require_units({name: unit})
     limit_mv, assumed_mv = info.detection_limit_mv, strategy.recipe.settings.get("detection_limit_mv")
     if limit_mv is not None and assumed_mv is not None and not math.isclose(limit_mv, assumed_mv):
         raise DeviceError(
@@ -145,7 +147,7 @@ class Session:
             raise InvalidValueError("timeout_s and ask_deadline_s are times [s]", got=(timeout_s, ask_deadline_s))
         self.strategy = strategy
         self.trials = TrialTable()
-        self.log_path = Path(log)
+        self.log_path = log_of(Path(log))
         self._raw_device = device
         self._limits = limits or Limits.of_space(space)
         self._clock = clock or (VirtualClock() if info.simulated else MonotonicClock())
@@ -191,7 +193,7 @@ class Session:
             LogError: the log cannot be written; nothing is delivered without a log.
             StrategyError: the strategy knows of trials that are not this session's; nothing was delivered.
         """
-        if self.strategy.delivered != len(self.trials):
+        if self.strategy.delivered > len(self.trials):
             raise StrategyError(
                 "the strategy knows of trials that are not this session's",
                 got=f"{self.strategy.delivered} trials",

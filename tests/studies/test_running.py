@@ -213,9 +213,10 @@ def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path, started):
     finished_to_the_end(tmp_path / "tiny.study")
 
 
-def test_a_damaged_part_is_named_with_the_way_out(tmp_path):
+@pytest.mark.parametrize("damage", [lambda whole: whole[:-20], lambda whole: whole[:100] + bytes(800) + whole[900:]])
+def test_a_damaged_part_is_named_with_the_way_out(tmp_path, damage):
     conduct(tiny(people=1), tmp_path)
     part = next((tmp_path / "parts").glob("*.parquet"))
-    part.write_bytes(part.read_bytes()[:-20])
+    part.write_bytes(damage(part.read_bytes()))
     with pytest.raises(StudyError, match=rf"damaged.*{part.name}.*run the study again"):
         open_store(tmp_path).rows()

@@ -136,9 +136,10 @@ def _is_log(source: str) -> bool:
 
 
 def _run_to_the_end(session: Session) -> None:
-    picture = session.log_path.with_suffix(".png")
-    if picture == session.log_path:
-        raise isiw.errors.ConfigError("the log would be overwritten by its picture", got=str(picture), expected=".mcap")
+    if session.log_path.suffix.lower() == ".png":
+        raise isiw.errors.ConfigError(
+            "the log would be overwritten by its picture", got=str(session.log_path), expected=".mcap"
+        )
     show(f"log: {session.log_path}")
     _print_row(isiw.report.PROGRESS_HEADINGS)
     before = len(session.trials)
@@ -152,7 +153,8 @@ def _run_to_the_end(session: Session) -> None:
     truth = isiw.config.true_window(record)
     show(f"\n{isiw.report.final_statement(record)}", style="bold")
     show(isiw.report.truth_sentence(record, truth))
-    show(f"log:     {result.log}\npicture: {isiw.plots.save_session_plot(record, picture, truth=truth)}")
+    picture = isiw.plots.save_session_plot(record, result.log.with_suffix(".png"), truth=truth)
+    show(f"log:     {result.log}\npicture: {picture}")
 
 
 def _show_progress(update: SessionUpdate) -> None:

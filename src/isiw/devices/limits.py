@@ -42,7 +42,8 @@ class Limits:
         # A NaN compares as false with any count, and so would limit nothing.
         if isinstance(self.max_pulses, bool) or not isinstance(self.max_pulses, Integral) or self.max_pulses < 1:
             raise InvalidValueError("max_pulses must be a whole number of at least 1", got=self.max_pulses)
-        object.__setattr__(self, "max_pulses", int(self.max_pulses))
+        for name, kind in (("low_ms", float), ("high_ms", float), ("min_iti_s", float), ("max_pulses", int)):
+            object.__setattr__(self, name, kind(getattr(self, name)))
 
     @classmethod
     def of_space(cls, space: DesignSpace, *, min_iti_s: float = 5.0, max_pulses: int = 200) -> Limits:

@@ -103,7 +103,7 @@ def load_recordings(folder: str | os.PathLike[str]) -> Recordings:
             remedy="Give their folder with --data, or use --subject simulated.",
         )
     frames = [_read_sweeps(file) for file in files]
-    time_ms = frames[0].columns.to_numpy().astype(np.float64)
+    time_ms = frames[0].columns.to_numpy()
     if any(list(frame.columns) != list(frames[0].columns) for frame in frames):
         raise DeviceError("the recorded files do not share their times", got=[file.name for file in files])
     return _sorted_recordings(time_ms, np.concatenate([frame.to_numpy() for frame in frames]) / 1e3)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import shutil
 import time
 from pathlib import Path
@@ -207,22 +206,11 @@ def _as_toml(header: Header) -> bytes:
 
 def _keep(damaged: Path, target: Path) -> None:
     """Keep a damaged file's bytes under a name of their own."""
-    for number in itertools.count():
-        kept = target.with_name(f"{target.name}.damaged{number or ''}")
-        try:
-            _link(kept, damaged)
-        except FileExistsError:
-            continue
-        return
-
-
-def _link(new: Path, old: Path) -> None:
-    """Give a file a second name, or copy it where the disk knows no such thing."""
+    names = (target.with_name(f"{target.name}.damaged{number or ''}") for number in itertools.count())
+    kept = next(name for name in names if not name.exists())
     try:
-        new.hardlink_to(old)
-    except FileExistsError:
-        raise
-    except OSError:
-        with old.open("rb") as source, new.open("xb") as copy:
+        kept.hardlink_to(damaged)
+    except OSError:  # a disk without hard links
+        with begun(kept) as copy, damaged.open("rb") as source:
             shutil.copyfileobj(source, copy)
-            os.fsync(copy.fileno())
+            copy.close()

@@ -168,9 +168,9 @@ def _error_rows(unit: Unit, failure: Failure) -> pd.DataFrame:
 def _read(path: Path) -> pa.Table:
     try:
         return pq.read_table(path)
-    except pa.ArrowInvalid as error:
+    except (pa.ArrowException, OSError) as error:
         raise StudyError(
-            f"a part of the study is damaged: {error}",
+            f"a part of the study is damaged, or cannot be read: {error}",
             got=str(path),
             remedy="Delete that file and run the study again; only its people are computed anew.",
         ) from error

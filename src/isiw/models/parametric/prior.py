@@ -72,7 +72,8 @@ class WindowPrior:
         p_window: probability that there is a window.
         start_ms: where windows start after the impact [ms], uniform between these.
         hit_delay_ms: mean and SD of the hit delay of a person unknown [ms]; 172–188 ms measured (dissertation, 4.2).
-        p_anywhere: probability that a window starts anywhere in the range instead, for stimulators unlike that one.
+        p_anywhere: probability that a window starts anywhere in the range instead, for stimulators unlike that one;
+            more in a range that only a part of the usual starts lies in.
         width_ms: the width; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
         floor_mv: the EMG floor; 6–20 µV measured, and wide enough for rigs with ten times the gain.
         floor_cv: its CV; 0.12–0.35 measured.

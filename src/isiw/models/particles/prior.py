@@ -87,7 +87,8 @@ class Prior:
         p_hand: probability that a recruitment curve is a hand muscle's, or another's of which as little is known.
         start_ms: where windows start after the impact [ms], uniform between these.
         hit_delay_ms: mean and SD of the hit delay of a person unknown [ms]; 172–188 ms measured (dissertation, 4.2).
-        p_anywhere: probability that a window starts anywhere in the range instead, for stimulators unlike that one.
+        p_anywhere: probability that a window starts anywhere in the range instead, for stimulators unlike that one;
+            more in a range that only a part of the usual starts lies in.
         width_ms: logarithmic scale of the width; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
         floor_mv: logarithmic scale of the EMG floor; 6–20 µV measured. The tail reaches a factor of ten at 2.4 SDs, for
             rigs with another gain.
@@ -242,7 +243,8 @@ def start_ms(
         space: the design space.
         after_impact_ms: the start is uniform between these, counted from the impact [ms].
         hit_delay_ms: mean and SD of the impact on the clock of the valve [ms].
-        p_anywhere: probability that the start lies anywhere in the range instead, or up to 50 ms before it.
+        p_anywhere: probability that the start lies anywhere in the range instead, or up to 50 ms before it; before it
+            is known that it lies there.
     """
     cdf, knots = _start_cdf(space, after_impact_ms, hit_delay_ms, p_anywhere)
     return _interpolate(torch.special.ndtr(z), cdf.to(z), knots.to(z))
