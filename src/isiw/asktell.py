@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeVar
 
-import numpy as np
 import torch
 
 from isiw.acquisition.batch import greedy_batch, own_plan
@@ -229,7 +228,7 @@ class Strategy:
                 got=mep_mv,
                 remedy="Log a trial without a trustworthy amplitude as a mistrial instead of telling it.",
             )
-        if response is not None and not isinstance(response, bool | np.bool_):
+        if response not in (None, False, True):
             raise InvalidValueError("response must be True or False", got=response)
         if not (math.isfinite(isi_sd_ms) and isi_sd_ms >= 0):
             raise InvalidValueError("isi_sd_ms must be finite and not negative", got=isi_sd_ms)
