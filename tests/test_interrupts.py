@@ -11,6 +11,14 @@ from isiw.interrupts import DeferredInterrupts
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 
 
+@pytest.fixture(autouse=True)
+def terminal():
+    """A terminal whose closing is heard, also where the tests themselves run under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
 def interrupt(number=signal.SIGINT):
     signal.raise_signal(number)
 

@@ -133,7 +133,7 @@ def test_a_sweep_that_ends_before_the_mep_is_a_missing_channel(sweep_of):
 
 @pytest.mark.parametrize("name", ["emg", "acceleration"])
 def test_an_unknown_unit_is_an_error(sweep_of, name):
-    with pytest.raises(InvalidValueError, match="unit is unknown"):
+    with pytest.raises(InvalidValueError, match=r"unit of the channel .* is unknown"):
         judge(with_channel(sweep_of(), name, unit="furlong"), PAIR, IMPACT)
 
 

@@ -120,10 +120,11 @@ def timing(
 ) -> None:
     """Say how repeatable the taps are: events, ISI errors, mistrials."""
     with errors_reported(_INTERRUPTED):
-        if _is_log(source) or Path(source).suffix:
-            study = isiw.timing.study_session(isiw.read_session(source))
-        else:
-            study = isiw.timing.study_preset(source, taps=taps, seed=seed)
+        study = (
+            isiw.timing.study_session(isiw.read_session(source))
+            if _is_log(source)
+            else isiw.timing.study_preset(source, taps=taps, seed=seed)
+        )
         show(isiw.timing.timing_report(study))
         if output is not None:
             show(f"picture: {isiw.plots_timing.save_timing_plot(study, output)}")
