@@ -8,7 +8,8 @@ import pytest
 
 from isiw.interrupts import DeferredInterrupts
 
-pytestmark = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+if os.name == "nt":
+    pytest.skip("POSIX signals", allow_module_level=True)
 
 
 @pytest.fixture(autouse=True)
