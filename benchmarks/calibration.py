@@ -118,7 +118,7 @@ def figure(tables: dict[str, pd.DataFrame]) -> matplotlib.figure.Figure:
     for line, (name, rows) in zip(picture.subplots(len(tables), 2, squeeze=False), tables.items(), strict=True):
         low, high = scipy.stats.binom.ppf((0.005, 0.995), len(rows), 1 / BINS)
         for axes, edge in zip(line, ("start", "end"), strict=True):
-            axes.hist(rows[f"{edge}_rank"], BINS, (0, 1))
+            axes.hist(rows[f"{edge}_rank"], BINS, range=(0, 1))
             axes.axhspan(low, high, color="black", alpha=0.15)
             axes.set(title=f"{name}: {edge}", xlabel="rank of the true edge", ylabel="people")
     return picture
