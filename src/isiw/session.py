@@ -27,7 +27,7 @@ from isiw.interrupts import DeferredInterrupts
 from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform, waveform_topic
 from isiw.log.storage import log_of
 from isiw.log.writer import LogWriter
-from isiw.signals.quality import SignalLimits, judge, judge_measurement, require_units
+from isiw.signals.quality import EMG_UNITS_MV, SignalLimits, judge, judge_measurement, require_unit
 from isiw.stopping import StopDecision, stimuli_left
 from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Sweep, Trial, TrialTable
 from isiw.window import WindowEstimate
@@ -90,10 +90,10 @@ def _require_matching(info: DeviceInfo, strategy: Strategy) -> None:
             expected=strategy.space.reference,
             remedy="Give the DesignSpace the device's reference.",
         )
-    for name, unit in info.channels.items():
+    for name in info.channels:
         waveform_topic(name)
-        if name == "emg":  # an acceleration is not read where the device itself knows the time of the hit
-            require_units({name: unit})
+    if "emg" in info.channels:  # an acceleration is not read where the device itself knows the time of the hit
+        require_unit("emg", info.channels["emg"], EMG_UNITS_MV)
     limit_mv, assumed_mv = info.detection_limit_mv, strategy.recipe.settings.get("detection_limit_mv")
     if limit_mv is not None and assumed_mv is not None and not math.isclose(limit_mv, assumed_mv):
         raise DeviceError(

@@ -7,7 +7,7 @@ every trial, an unknown unit or a rate that measures nothing, is an error: no re
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 
@@ -37,7 +37,7 @@ __all__ = [
     "is_saturated",
     "judge",
     "judge_measurement",
-    "require_units",
+    "require_unit",
     "wrong_isi",
 ]
 
@@ -50,21 +50,21 @@ ACCELERATION_UNITS = frozenset({"m/s^2", "m/s²", "g", "V", "mV"})
 FLAT_MS = 1.0
 
 
-def require_units(units: Mapping[str, str]) -> None:
-    """Raise where waveforms are in units that nobody can judge.
+def require_unit(name: str, unit: str, known: Collection[str]) -> None:
+    """Raise where a waveform is in a unit that nobody can judge.
 
     Args:
-        units: by the channel's name.
+        name: of the channel.
+        unit: its unit.
+        known: `EMG_UNITS_MV` or `ACCELERATION_UNITS`.
 
     Raises:
-        InvalidValueError: an unknown unit of EMG or acceleration.
+        InvalidValueError: an unknown unit.
     """
-    known = {"emg": EMG_UNITS_MV.keys(), "acceleration": ACCELERATION_UNITS}
-    for name in known.keys() & units.keys():
-        if units[name] not in known[name]:
-            raise InvalidValueError(
-                f"the unit of the channel {name} is unknown", got=units[name], expected=", ".join(sorted(known[name]))
-            )
+    if unit not in known:
+        raise InvalidValueError(
+            f"the unit of the channel {name} is unknown", got=unit, expected=", ".join(sorted(known))
+        )
 
 
 @dataclass(frozen=True)
@@ -274,7 +274,7 @@ def _impact(sweep: Sweep) -> tuple[float | None, MistrialReason | None]:
     if "acceleration" not in sweep.channels:
         return None, None
     channel = sweep.channels["acceleration"]
-    require_units({"acceleration": channel.unit})
+    require_unit("acceleration", channel.unit, ACCELERATION_UNITS)
     if sweep.t_valve_ms is None or not _usable(sweep, "acceleration"):
         return None, MistrialReason.MISSING_CHANNEL
     hit = impact_time(channel.values, channel.rate_hz, sweep.t_valve_ms - channel.t0_ms)
@@ -293,7 +293,7 @@ def _of_one_length(sweep: Sweep) -> bool:
 
 
 def _unit_mv(emg: Channel) -> float:
-    require_units({"emg": emg.unit})
+    require_unit("emg", emg.unit, EMG_UNITS_MV)
     return EMG_UNITS_MV[emg.unit]
 
 
