@@ -26,9 +26,9 @@ from rich.progress import Progress
 import isiw
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.metrics import trials_to_lasting
-from isiw.plots_studies import save_study_plot
+from isiw.plots.study import save_study_plot
 from isiw.studies import Processes, Study, StudyStrategy, conduct, paired_sessions, run_study, summarise
-from isiw.subjects import COHORTS
+from isiw.subjects.cohorts import COHORTS
 from oracle import ORACLE_COHORTS, simulate_oracle
 
 MARKS = (5, 10, 12, 15, 20, 25, 30, 40, 60, 80)

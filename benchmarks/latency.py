@@ -34,7 +34,7 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
-from isiw.subjects import cohort
+from isiw.subjects.cohorts import cohort
 
 TIMED_TRIALS = range(46, 56)
 PLAIN = "plain BoTorch: SingleTaskGP + qNIPV"

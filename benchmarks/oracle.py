@@ -17,10 +17,11 @@ import pandas as pd
 from scipy.stats import gamma, norm
 
 from isiw.design import DesignSpace
-from isiw.profiles import PeakProfile
-from isiw.recruitment import GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.studies import SimulatedSession, play
-from isiw.subjects import OUTLIERS_MV, WIDTHS_KIM_MS, SimulatedSubject
+from isiw.subjects.cohorts import WIDTHS_KIM_MS
+from isiw.subjects.profiles import PeakProfile
+from isiw.subjects.responses import GainResponse, RecruitmentResponse, ResponseCurve
+from isiw.subjects.subject import OUTLIERS_MV, SimulatedSubject
 from isiw.types import BoolArray, FloatArray
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window
 

@@ -16,9 +16,10 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
-from isiw.recruitment import EmgFloor, ResponseCurve, TrialNoise
 from isiw.studies import SimulatedSession
-from isiw.subjects import SimulatedSubject, cohort
+from isiw.subjects.cohorts import cohort
+from isiw.subjects.responses import EmgFloor, ResponseCurve, TrialNoise
+from isiw.subjects.subject import SimulatedSubject
 from isiw.types import ArrayLike, FloatArray
 
 FOLDER = Path("../shared/data/uef")

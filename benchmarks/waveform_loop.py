@@ -31,9 +31,10 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
-from isiw.devices.plant import Geometry, SensorNoise
-from isiw.devices.tapper import Trigger
-from isiw.subjects import SimulatedSubject, cohort
+from isiw.devices.robot.mechanism import Geometry, SensorNoise
+from isiw.devices.robot.tapper import Trigger
+from isiw.subjects.cohorts import cohort
+from isiw.subjects.subject import SimulatedSubject
 
 Deliver = Callable[[isiw.Stimulus], isiw.Measurement | isiw.Sweep]
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import torch
 
-from isiw.asktell import Strategy
 from isiw.design import DesignSpace
 from isiw.devices.protocol import DeviceInfo
 from isiw.models.protocol import Observation, Tensor
-from isiw.stopping import Budget
+from isiw.strategy.stopping import Budget
+from isiw.strategy.strategy import Strategy
 from isiw.trials import Measurement, Stimulus
 from isiw.window import Window, WindowEstimate
 

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from isiw.asking import candidate_isis
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError, OutOfSpaceError
+from isiw.strategy.choosing import candidate_isis
 
 spaces = st.builds(
     lambda low, step, count: DesignSpace(low, low + step * count, step_ms=step),

@@ -6,7 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
-from isiw.config import load_config
+from isiw.config.run import load_config
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")

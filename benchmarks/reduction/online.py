@@ -17,7 +17,7 @@ from benchmarks.reduction.look import COLOURS, NAMES, panels
 from benchmarks.reduction.sessions import correlation
 from benchmarks.waveform_loop import Pair, by_waveform
 from isiw.design import IMPACT_SPACE
-from isiw.subjects import cohort
+from isiw.subjects.cohorts import cohort
 from isiw.types import FloatArray
 
 PEOPLE: Final = (4, 7)

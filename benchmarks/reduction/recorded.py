@@ -12,11 +12,11 @@ from functools import cached_property
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.models.sweep import SweepPosterior, SweepRule
-from isiw.models.told import Told
-from isiw.settings.dissertation import SweepSettings
-from isiw.stopping import Progress
-from isiw.subjects import SimulatedSubject
+from isiw.models.dissertation.incremental import SweepPosterior, SweepRule
+from isiw.models.shared.history import AmplitudeHistory
+from isiw.strategy.settings.dissertation import SweepSettings
+from isiw.strategy.stopping import Progress
+from isiw.subjects.subject import SimulatedSubject
 from isiw.types import FloatArray
 from isiw.window import Window, WindowEstimate
 
@@ -98,7 +98,7 @@ class RecordedSweep:
         )
         mep_mv = np.concatenate((self.baseline_mv, self.trials_mv[first:last].ravel()))
         model = SweepSettings(rule=rule).model()
-        return SweepPosterior(model, space, Told(isi_ms[None], mep_mv[None])).estimate()
+        return SweepPosterior(model, space, AmplitudeHistory(isi_ms[None], mep_mv[None])).estimate()
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from benchmarks.reduction.readings import BASE, Reading
 from benchmarks.reduction.recorded import STEP_MS, SWEPT, TRIALS_PER_ISI, RecordedSweep, record, stops_inside
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.signals import wrong_isi
-from isiw.stopping import stimuli_left
-from isiw.subjects import cohort
+from isiw.strategy.stopping import stimuli_left
+from isiw.subjects.cohorts import cohort
 from isiw.types import BoolArray, FloatArray
 from isiw.window import Window, WindowEstimate
 

@@ -13,13 +13,13 @@ from botorch.acquisition.analytic import AnalyticAcquisitionFunction
 from botorch.utils.transforms import t_batch_mode_transform
 
 from isiw.acquisition.botorch import BotorchAcquisition
-from isiw.asktell import Strategy
 from isiw.design import VALVE_SPACE
 from isiw.errors import StrategyError
 from isiw.models.gp import GaussianProcess, GaussianProcessPosterior
 from isiw.models.particles import ParticleModel
 from isiw.models.protocol import Observation
-from isiw.stopping import Budget
+from isiw.strategy.stopping import Budget
+from isiw.strategy.strategy import Strategy
 from isiw.testing import check_acquisition, check_strategy
 
 CANDIDATES = torch.linspace(0.0, 500.0, 101)

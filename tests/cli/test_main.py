@@ -8,11 +8,11 @@ import sys
 import pytest
 from typer.testing import CliRunner
 
-from isiw.catalogue import list_strategies
 from isiw.cli import app
-from isiw.config import true_window
+from isiw.config.run import true_window
 from isiw.log.reader import read_session
-from isiw.session import Session
+from isiw.session.loop import Session
+from isiw.strategy.catalogue import list_strategies
 
 
 @pytest.fixture

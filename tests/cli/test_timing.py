@@ -5,8 +5,8 @@ from typer.testing import CliRunner
 
 from isiw.cli import app
 from isiw.design import DesignSpace
-from isiw.devices.tapper import Tapper
-from isiw.session import Session
+from isiw.devices.robot.tapper import Tapper
+from isiw.session.loop import Session
 
 
 def run(*arguments: object):

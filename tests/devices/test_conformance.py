@@ -15,7 +15,7 @@ from isiw.devices.recorded import RecordedDevice, Recordings
 from isiw.devices.replay import ReplayDevice
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError
-from isiw.subjects import cohort
+from isiw.subjects.cohorts import cohort
 from isiw.testing import check_device
 from isiw.trials import Channel, Measurement, Status, Sweep, Trial, TrialTable
 

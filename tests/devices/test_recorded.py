@@ -7,8 +7,8 @@ import pytest
 
 from isiw.devices.recorded import RecordedDevice, load_recordings
 from isiw.errors import DeviceError
-from isiw.signals.quality import judge
-from isiw.subjects import Response
+from isiw.signals.judgement import judge
+from isiw.subjects.subject import Response
 from isiw.trials import Status, Stimulus
 
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from isiw.catalogue import make_strategy
 from isiw.design import VALVE_SPACE
 from isiw.devices.limits import Limits
 from isiw.devices.replay import ReplayDevice
@@ -12,8 +11,9 @@ from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import DeviceError
 from isiw.log.reader import read_session
 from isiw.metrics import f1
-from isiw.session import Session
-from isiw.subjects import cohort
+from isiw.session.loop import Session
+from isiw.strategy.catalogue import make_strategy
+from isiw.subjects.cohorts import cohort
 from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
 
 TABLE = TrialTable(

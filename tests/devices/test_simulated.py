@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from isiw.devices.simulated import SimulatedDevice
-from isiw.subjects import Response
+from isiw.subjects.subject import Response
 from isiw.trials import Stimulus
 
 

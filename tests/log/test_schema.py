@@ -8,7 +8,7 @@ import pytest
 
 from isiw.errors import InvalidValueError
 from isiw.log.schema import TOPICS, Estimate, Event, Intent, Waveform, decode, encode, json_schema, topic_of
-from isiw.stopping import StopDecision
+from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, MistrialReason, Status, Trial
 from isiw.window import Window, WindowEstimate
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from isiw.devices.plant import Geometry, Taps, draw_taps
-from isiw.devices.presets import preset
-from isiw.devices.rendering import record_emg, record_robot, sample_times_ms
+from isiw.devices.robot.mechanism import Geometry, Taps, draw_taps
+from isiw.devices.robot.presets import preset
+from isiw.devices.robot.waveforms import record_emg, record_robot, sample_times_ms
 from isiw.trials import Channel, Sweep
 from isiw.types import FloatArray
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from isiw.devices.plant import drive
+from isiw.devices.robot.mechanism import drive
 from isiw.errors import InvalidValueError
 from isiw.signals import impact_time, impact_times
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from isiw.devices.rendering import mep_mv
+from isiw.devices.robot.waveforms import mep_mv
 from isiw.errors import InvalidValueError
 from isiw.signals import (
     background_rms,

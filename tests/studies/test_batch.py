@@ -10,12 +10,12 @@ import pandas as pd
 import pytest
 import torch
 
-from isiw.asktell import Strategy
-from isiw.catalogue import make_strategy
-from isiw.stopping import EdgeVariance
+from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.stopping import EdgeVariance
+from isiw.strategy.strategy import Strategy
 from isiw.studies import SimulatedSession, simulate
 from isiw.studies.batch import simulate_batch
-from isiw.subjects import Responder
+from isiw.subjects.subject import Responder
 from studies.tiny import FEW, timeless
 
 EVERY = ("default", "even", "random", "gp-straddle", "nr", "svmr", "gpr", "pf", "incremental")

@@ -11,16 +11,16 @@ import torch
 
 from isiw.acquisition.information import MutualInformation
 from isiw.acquisition.protocol import AcquisitionFunction
-from isiw.asktell import Strategy
-from isiw.catalogue import list_strategies, make_strategy
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import StrategyError
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.protocol import Observation, ProposesIsi, Tensor
-from isiw.settings.common import ACQUISITIONS
-from isiw.subjects import cohort
+from isiw.strategy.catalogue import list_strategies, make_strategy
+from isiw.strategy.settings.common import ACQUISITIONS
+from isiw.strategy.strategy import Strategy
+from isiw.subjects.cohorts import cohort
 from isiw.testing import check_acquisition, check_model, check_strategy
-from isiw.testing.promises import Trials, trials_that_break_things, usual_trials
+from isiw.testing.requirements import Trials, trials_that_break_things, usual_trials
 from isiw.window import Window, WindowEstimate
 
 FEW: dict[str, Any] = {"particles": 100}

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from isiw.acquisition.botorch import BotorchAcquisition
+from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep, OwnProposal, RandomIsi, SobolIsi
 from isiw.acquisition.improvement import KnowledgeGradient, LogExpectedImprovement, Thompson, UpperConfidenceBound
 from isiw.acquisition.information import Alternating, MutualInformation, WindowGain, WindowInformation
 from isiw.acquisition.levelset import IntegratedFeasibility, Straddle
 from isiw.acquisition.protocol import AcquisitionFunction
-from isiw.acquisition.sweeps import EvenSpacing, IncrementalSweep, OwnProposal, RandomIsi, SobolIsi
 from isiw.acquisition.twostep import TwoStep
 from isiw.acquisition.variance import EdgeVariance, IntegratedVariance, ProfileVariance
 

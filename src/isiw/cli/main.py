@@ -13,7 +13,7 @@ from isiw.cli import study
 from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show
 
 if TYPE_CHECKING:
-    from isiw.session import Session, SessionUpdate
+    from isiw.session.loop import Session, SessionUpdate
 
 __all__ = ["app"]
 
@@ -48,8 +48,9 @@ def run(
 ) -> None:
     """Run a session with a simulated person, and say what was found."""
     with errors_reported(_INTERRUPTED):
-        given = {"seed": seed, "log": log, "subject": subject, "data": data, "strategy": strategy}
-        settings = isiw.config.load_config(config).with_overrides(**given)
+        settings = isiw.config.load_config(config).with_overrides(
+            seed=seed, log=log, subject=subject, data=data, strategy=strategy
+        )
         _run_to_the_end(isiw.config.session_for(settings, on_trial=_show_progress))
 
 
@@ -121,13 +122,13 @@ def timing(
     """Say how repeatable the taps are: events, ISI errors, mistrials."""
     with errors_reported(_INTERRUPTED):
         study = (
-            isiw.timing.study_session(isiw.read_session(source))
+            isiw.repeatability.study_session(isiw.read_session(source))
             if _is_log(source)
-            else isiw.timing.study_preset(source, taps=taps, seed=seed)
+            else isiw.repeatability.study_preset(source, taps=taps, seed=seed)
         )
-        show(isiw.timing.timing_report(study))
+        show(isiw.repeatability.timing_report(study))
         if output is not None:
-            show(f"picture: {isiw.plots_timing.save_timing_plot(study, output)}")
+            show(f"picture: {isiw.plots.save_timing_plot(study, output)}")
 
 
 def _is_log(source: str) -> bool:

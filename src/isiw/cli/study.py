@@ -79,7 +79,7 @@ def summary(folder: Folder) -> None:
         table = isiw.studies.summarise(store.rows(), store.errors())
         show(table.to_string(index=False, float_format=lambda value: f"{value:.3f}"))
         table.to_csv(folder / "summary.csv", index=False)
-        picture = isiw.plots_studies.save_study_plot(table, folder / "summary.png")
+        picture = isiw.plots.save_study_plot(table, folder / "summary.png")
         _say_what_is_there(store)
         show(f"table:   {folder / 'summary.csv'}\npicture: {picture}")
 

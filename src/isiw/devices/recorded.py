@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from isiw.devices.protocol import DeviceInfo, require_staged
-from isiw.devices.rendering import scale_of_mep
+from isiw.devices.robot.waveforms import scale_of_mep
 from isiw.devices.simulated import Respond, SimulatedPerson
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals.mep import MEP_WINDOW_MS

@@ -15,7 +15,7 @@ from isiw.errors import DamagedLogError, LogError
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import SCHEMA_VERSION, Estimate, Event, Header, Intent, Record, Waveform, decode
 from isiw.log.writer import CONFIGURATION
-from isiw.stopping import StopDecision
+from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, Trial, TrialTable
 
 __all__ = ["SessionRecord", "read_salvaged", "read_session"]

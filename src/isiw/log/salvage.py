@@ -18,8 +18,8 @@ from mcap.exceptions import EndOfFile, McapError
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.log.durable import disk_errors, log_of, part_of
 from isiw.log.schema import TOPICS
-from isiw.log.storage import disk_errors, log_of, part_of
 
 __all__ = ["Message", "Salvage", "current_file", "salvage"]
 

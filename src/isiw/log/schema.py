@@ -24,8 +24,8 @@ from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError
-from isiw.signals.quality import SignalLimits
-from isiw.stopping import StopDecision
+from isiw.signals.judgement import SignalLimits
+from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
 from isiw.window import Window, WindowEstimate

@@ -13,9 +13,9 @@ import tomli_w
 from mcap.writer import Writer
 
 from isiw.errors import LogError
+from isiw.log.durable import DurableFile, begun, disk_errors, log_of, part_of, refuse_if_locked, sync_folder
 from isiw.log.salvage import Message, Salvage, current_file
 from isiw.log.schema import TOPICS, Header, Record, encode, json_schema, topic_of
-from isiw.log.storage import DurableFile, begun, disk_errors, log_of, part_of, refuse_if_locked, sync_folder
 
 __all__ = ["CONFIGURATION", "LogWriter"]
 

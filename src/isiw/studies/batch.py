@@ -1,7 +1,7 @@
 """The vectorised engine: a batch of people, examined side by side by one strategy.
 
-Models hold b people at once, on a CPU or a GPU. Each person follows the law that one session follows (`isiw.asking`);
-only the draws of the models' randomness differ, so that a batch of one is that one session.
+Models hold b people at once, on a CPU or a GPU. Each person follows the law that one session follows
+(`isiw.strategy.choosing`); only the draws of the models' randomness differ, so that a batch of one is that one session.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import pandas as pd
 import torch
 
 from isiw.acquisition.protocol import AcquisitionFunction
-from isiw.asking import Choice, best_choices, planned_choices, remembered
 from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel
-from isiw.stopping import Progress, StopDecision
+from isiw.strategy.choosing import Choice, best_choices, planned_choices, remembered
+from isiw.strategy.stopping import Progress, StopDecision
 from isiw.studies.sessions import SimulatedSession, examine
-from isiw.subjects import Response
+from isiw.subjects.subject import Response
 from isiw.window import WindowEstimate
 
 __all__ = ["simulate_batch"]

@@ -21,12 +21,12 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 
 import pandas as pd
 
-from isiw.catalogue import settings_of
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.strategy.catalogue import settings_of
 from isiw.studies.batch import simulate_batch
 from isiw.studies.sessions import SimulatedSession, Stopping, require_factor, simulate
-from isiw.subjects import COHORTS
+from isiw.subjects.cohorts import COHORTS
 from isiw.toml_files import checked, read_toml
 
 __all__ = ["Engine", "Study", "StudyStrategy", "Unit", "load_study", "run_unit", "study_from", "study_values"]

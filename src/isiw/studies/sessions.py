@@ -14,15 +14,16 @@ from typing import Any, Literal, Protocol, TypeAlias, get_args
 import pandas as pd
 import torch
 
-from isiw.asking import Choice
-from isiw.asktell import Strategy
-from isiw.catalogue import make_strategy
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StudyError
 from isiw.metrics import covers, f1
 from isiw.signals import wrong_isi
-from isiw.stopping import StopDecision, StoppingRule, stimuli_left
-from isiw.subjects import Response, SimulatedSubject, cohort
+from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.choosing import Choice
+from isiw.strategy.stopping import StopDecision, StoppingRule, stimuli_left
+from isiw.strategy.strategy import Strategy
+from isiw.subjects.cohorts import cohort
+from isiw.subjects.subject import Response, SimulatedSubject
 from isiw.window import Window, WindowEstimate
 
 __all__ = ["TIMES", "Crowd", "Judgement", "Player", "SimulatedSession", "Stopping", "examine", "play", "simulate"]

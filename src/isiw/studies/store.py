@@ -26,7 +26,7 @@ import torch
 
 import isiw
 from isiw.errors import StudyError
-from isiw.log.storage import part_of, sync_folder
+from isiw.log.durable import part_of, sync_folder
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Study, Unit, study_from, study_values
 from isiw.toml_files import read_toml

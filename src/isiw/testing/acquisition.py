@@ -7,7 +7,7 @@ import torch
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.design import DesignSpace
 from isiw.models.protocol import Posterior
-from isiw.testing.promises import require, same_estimates
+from isiw.testing.requirements import require, same_estimates
 
 __all__ = ["check_acquisition"]
 

@@ -14,7 +14,7 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
 from isiw.errors import DeviceError, InvalidValueError, IsiwError
 from isiw.log.schema import waveform_topic
 from isiw.signals import Judged, SignalLimits, judge, judge_measurement
-from isiw.testing.promises import require
+from isiw.testing.requirements import require
 from isiw.trials import Measurement, MistrialReason, Stimulus, Sweep
 
 __all__ = ["check_device"]

@@ -22,7 +22,7 @@ from isiw.models.protocol import (
     SamplesWindows,
     Tensor,
 )
-from isiw.testing.promises import (
+from isiw.testing.requirements import (
     Trials,
     check_estimate,
     require,

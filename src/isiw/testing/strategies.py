@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from isiw.asktell import Strategy
 from isiw.errors import InvalidValueError, StrategyError
-from isiw.stopping import StopDecision
-from isiw.testing.promises import (
+from isiw.strategy.stopping import StopDecision
+from isiw.strategy.strategy import Strategy
+from isiw.testing.requirements import (
     Trials,
     check_estimate,
     require,

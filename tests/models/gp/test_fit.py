@@ -15,7 +15,7 @@ from isiw.models.gp import fit as gp_fit
 from isiw.models.gp.fit import Fit, fit, fixed_fit
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, Hyperparameters
 from isiw.models.gp.scale import Scale, Transform, scale_of
-from isiw.models.told import PersonTrials
+from isiw.models.shared.history import PersonTrials
 
 PRIOR = HyperparameterPrior()
 FIXED = FixedProcess(length_ms=40.0, amplitude=1.1, noise=0.6, centre=-3.8, unit=0.9)

@@ -27,9 +27,9 @@ from isiw.models.protocol import (
     SamplesWindows,
 )
 from isiw.studies import SimulatedSession, run_study
-from isiw.subjects import cohort
+from isiw.subjects.cohorts import cohort
 from isiw.testing import check_model
-from isiw.testing.promises import usual_trials
+from isiw.testing.requirements import usual_trials
 from isiw.window import WindowEstimate
 
 FEW = GaussianProcess(samples=64)

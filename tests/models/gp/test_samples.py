@@ -11,7 +11,7 @@ from isiw.models.gp.fit import fixed_fit
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior
 from isiw.models.gp.samples import FloorKind, Paths, ProfileSample, draw_paths
 from isiw.models.gp.scale import Scale
-from isiw.models.told import PersonTrials
+from isiw.models.shared.history import PersonTrials
 from isiw.window import Window, window_from_excess
 
 SPACE = DesignSpace(0, 320)

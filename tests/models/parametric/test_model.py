@@ -14,7 +14,6 @@ from isiw.models.parametric import ParametricModel, ParametricPosterior
 from isiw.models.parametric import sampling as parametric_sampling
 from isiw.models.parametric.importance import Effort
 from isiw.models.parametric.prior import Likelihood, WindowPrior
-from isiw.models.particles.sample import OUTCOMES
 from isiw.models.protocol import (
     Conditions,
     HasEvidence,
@@ -27,7 +26,8 @@ from isiw.models.protocol import (
     SamplesWindows,
     SimulatesPeople,
 )
-from isiw.subjects import cohort
+from isiw.models.shared.tables import OUTCOMES
+from isiw.subjects.cohorts import cohort
 from isiw.testing import check_model
 
 GRID = torch.arange(0.0, 501.0, 5.0)

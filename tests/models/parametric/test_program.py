@@ -10,7 +10,7 @@ from isiw.design import VALVE_SPACE
 from isiw.models.parametric.law import levels, log_likelihood
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
 from isiw.models.parametric.program import WindowProgram
-from isiw.models.particles.evidence import History
+from isiw.models.shared.history import History
 
 LIKELIHOODS: tuple[Likelihood, ...] = ("gamma", "log-normal", "input-noise")
 

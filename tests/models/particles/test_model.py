@@ -10,11 +10,11 @@ from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.metrics import covers
 from isiw.models.particles import ParticleModel, ParticlePosterior
-from isiw.models.particles.evidence import History, levels, total_log_likelihood
+from isiw.models.particles.likelihood import levels, total_log_likelihood
 from isiw.models.particles.moves import Mover
+from isiw.models.particles.noise import NoiseKind, draw_log_mep, log_gain, log_likelihood
+from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import LATENTS, Person, Prior
-from isiw.models.particles.response import NoiseKind, draw_log_mep, log_gain, log_likelihood
-from isiw.models.particles.sample import PersonSample
 from isiw.models.protocol import (
     Observation,
     Posterior,
@@ -23,8 +23,10 @@ from isiw.models.protocol import (
     SamplesWindows,
     SimulatesPeople,
 )
-from isiw.models.streams import systematic
-from isiw.subjects import SimulatedSubject, cohort
+from isiw.models.randomness import systematic
+from isiw.models.shared.history import History
+from isiw.subjects.cohorts import cohort
+from isiw.subjects.subject import SimulatedSubject
 from isiw.window import Window, WindowEstimate
 
 GRID = torch.arange(0.0, 501.0, 5.0)

@@ -4,8 +4,8 @@ import torch
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.beliefs import prior_with
+from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Prior
-from isiw.models.particles.response import NoiseKind
 
 MANY = 20_000
 

@@ -23,7 +23,7 @@ from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, Hyperparamet
 from isiw.models.gp.process import KernelName, Process, SingleTaskGP, correlations, regression
 from isiw.models.gp.scale import Scale
 from isiw.models.protocol import Tensor
-from isiw.models.told import PersonTrials
+from isiw.models.shared.history import PersonTrials
 from isiw.types import FloatArray
 
 __all__ = ["Fit", "Trials", "fit", "fixed_fit"]

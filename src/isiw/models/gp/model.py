@@ -22,7 +22,7 @@ from isiw.models.gp.process import KernelName, SingleTaskGP
 from isiw.models.gp.samples import FloorKind, Paths, ProfileSample, draw_paths
 from isiw.models.gp.scale import Scale, Transform, scale_of
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.told import PersonTrials, Told
+from isiw.models.shared.history import AmplitudeHistory, PersonTrials
 from isiw.models.windows import profile_grid, sampled_estimate
 from isiw.types import FloatArray
 from isiw.window import WindowEstimate
@@ -94,7 +94,7 @@ class GaussianProcess:
 
     def prior(self, space: DesignSpace, seed: int, people: int = 1) -> GaussianProcessPosterior:
         """The posterior before the first trial."""
-        return GaussianProcessPosterior(self, space, seed, Told.nothing(people))
+        return GaussianProcessPosterior(self, space, seed, AmplitudeHistory.nothing(people))
 
     def update(self, posterior: GaussianProcessPosterior, observation: Observation) -> GaussianProcessPosterior:
         """The posterior after one more trial.
@@ -145,7 +145,7 @@ class GaussianProcessPosterior:
     model: GaussianProcess
     space: DesignSpace
     seed: int
-    told: Told
+    told: AmplitudeHistory
     held: tuple[Fit, ...] | None = None
 
     @property

@@ -12,7 +12,7 @@ import torch
 from isiw.models.gp.fit import Fit
 from isiw.models.gp.scale import Transform, expected_mep_mv
 from isiw.models.protocol import Tensor
-from isiw.models.streams import systematic
+from isiw.models.randomness import systematic
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
 
 __all__ = ["FloorKind", "Paths", "ProfileSample", "draw_paths"]

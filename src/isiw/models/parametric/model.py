@@ -22,10 +22,10 @@ from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
 from isiw.models.parametric.program import WindowProgram
 from isiw.models.parametric.sampling import Method, sample_person
-from isiw.models.particles.evidence import History, observed
-from isiw.models.particles.sample import OUTCOMES, interpolated, table_levels
 from isiw.models.protocol import Observation, SimulatedPerson, Tensor
-from isiw.models.streams import SIMULATED, step_generator, systematic
+from isiw.models.randomness import SIMULATED, step_generator, systematic
+from isiw.models.shared.history import History, observed
+from isiw.models.shared.tables import OUTCOMES, interpolated, table_levels
 from isiw.models.windows import profile_grid, sampled_estimate
 from isiw.types import ArrayLike
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window, WindowEstimate

@@ -14,8 +14,8 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.particles.prior import start_ms
 from isiw.models.protocol import Tensor
+from isiw.models.shared.start import start_ms
 
 __all__ = ["OUTPUT_CV", "Likelihood", "Unknowns", "WindowPrior", "latent_names"]
 

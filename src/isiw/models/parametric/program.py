@@ -21,8 +21,9 @@ from torch.distributions import constraints
 from isiw.design import DesignSpace
 from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior, latent_names
-from isiw.models.particles.evidence import ISI_NODES, History
 from isiw.models.protocol import Tensor
+from isiw.models.shared.history import History
+from isiw.models.shared.tables import ISI_NODES
 
 __all__ = ["MepLaw", "WindowProgram", "nuts_sample"]
 

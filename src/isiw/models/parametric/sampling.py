@@ -12,9 +12,9 @@ import torch
 from isiw.models.parametric.ascent import Modes
 from isiw.models.parametric.importance import Effort, Mixture, WeightedDraws, importance_sample, worth
 from isiw.models.parametric.program import WindowProgram, nuts_sample
-from isiw.models.particles.evidence import History
 from isiw.models.protocol import Tensor
-from isiw.models.streams import systematic
+from isiw.models.randomness import systematic
+from isiw.models.shared.history import History
 
 __all__ = ["Method", "PersonDraws", "sample_person"]
 

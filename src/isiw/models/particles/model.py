@@ -15,14 +15,15 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.particles.evidence import History, levels, observed, total_log_likelihood
+from isiw.models.particles.likelihood import levels, total_log_likelihood
 from isiw.models.particles.moves import Mover
+from isiw.models.particles.noise import Response, draw_log_mep, log_gain
+from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Latents, Person, Prior
-from isiw.models.particles.response import Response, draw_log_mep, log_gain
-from isiw.models.particles.sample import PersonSample
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Observation, SimulatedPerson, Tensor
-from isiw.models.streams import SIMULATED, step_generator, systematic
+from isiw.models.randomness import SIMULATED, step_generator, systematic
+from isiw.models.shared.history import History, observed
 from isiw.models.windows import profile_grid, sampled_estimate
 from isiw.types import ArrayLike
 from isiw.window import Window, WindowEstimate

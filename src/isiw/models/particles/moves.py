@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import torch
 
 from isiw.design import DesignSpace
-from isiw.models.particles.evidence import History, total_log_likelihood
+from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.prior import LATENTS, NOISE_LATENTS, SHAPE_LATENTS, Latents, Prior
 from isiw.models.protocol import Tensor
+from isiw.models.shared.history import History
 
 __all__ = ["Mover"]
 

@@ -1,0 +1,23 @@
+"""Configuration files, and the sessions that they describe."""
+
+from isiw.config.run import (
+    RunConfig,
+    config_of_log,
+    device_for,
+    fresh_log_path,
+    load_config,
+    session_for,
+    subject_for,
+    true_window,
+)
+
+__all__ = [
+    "RunConfig",
+    "config_of_log",
+    "device_for",
+    "fresh_log_path",
+    "load_config",
+    "session_for",
+    "subject_for",
+    "true_window",
+]

@@ -1,0 +1,296 @@
+"""Configuration files: read, checked, and turned into a session.
+
+Every key may be left out. Example:
+
+    seed = 7
+    [subject]
+    kind = "recorded"
+    data = "recordings/uef"
+    [strategy]
+    settings = { max_trials = 40 }
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import itertools
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, Final, Literal, Self
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    PrivateAttr,
+    ValidationInfo,
+    create_model,
+    field_validator,
+    model_validator,
+)
+
+from isiw.design import DesignSpace
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import Device
+from isiw.devices.recorded import RecordedDevice, load_recordings
+from isiw.devices.simulated import SimulatedDevice
+from isiw.errors import ConfigError, InvalidValueError
+from isiw.log.reader import SessionRecord
+from isiw.session.loop import Session, SessionUpdate
+from isiw.strategy.catalogue import list_strategies, make_strategy, settings_of
+from isiw.subjects.cohorts import COHORTS, cohort
+from isiw.subjects.subject import SimulatedSubject
+from isiw.toml_files import checked, read_toml
+from isiw.types import Reference
+from isiw.window import Window
+
+__all__ = [
+    "RunConfig",
+    "config_of_log",
+    "device_for",
+    "fresh_log_path",
+    "load_config",
+    "session_for",
+    "subject_for",
+    "true_window",
+]
+
+SESSIONS = Path("isiw-sessions")
+"""Where sessions are logged that were given no path."""
+
+RUN_KEY = "isiw_run"
+"""What `isiw run` keeps its configuration under in a log; lab software may keep there what it likes."""
+
+
+_FILLED: Final[Any] = Field(default_factory=dict, validate_default=True)
+
+
+def _one_of(known: Iterable[str], name: str) -> str:
+    if name not in known:
+        raise InvalidValueError("the name is unknown", got=name, expected=f"one of {', '.join(known)}")
+    return name
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class SubjectConfig(_Section):
+    """Who is stimulated: a simulated person, whose MEPs may be put into recorded EMG."""
+
+    kind: Literal["simulated", "recorded"] = "simulated"
+    cohort: str = "recruitment"
+    number: int = Field(default=0, ge=0)
+    data: Path | None = None
+
+    @field_validator("cohort")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return _one_of(COHORTS, name)
+
+
+class SpaceConfig(_Section):
+    """The design space, as in `isiw.DesignSpace`."""
+
+    low_ms: float = 0.0
+    high_ms: float = 500.0
+    step_ms: float = 1.0
+    reference: Reference = "valve"
+    tolerance_ms: float = 10.0
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        self.design()
+        return self
+
+    def design(self) -> DesignSpace:
+        """The design space."""
+        return DesignSpace(**self.model_dump())
+
+
+@dataclass(frozen=True)
+class _Given:
+    """The settings that were given, without those that follow from the name; in comparisons it does not count."""
+
+    settings: Any = field(default_factory=dict, compare=False)
+
+
+class StrategyConfig(_Section):
+    """The strategy: a name from `isiw.list_strategies()`, and settings of its family."""
+
+    name: str = "default"
+    settings: Any = _FILLED
+    _given: _Given = PrivateAttr(default_factory=_Given)
+
+    @field_validator("name")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return _one_of(list_strategies(), name)
+
+    @field_validator("settings", mode="before")
+    @classmethod
+    def _as_the_name_means(cls, settings: Any, info: ValidationInfo) -> Any:
+        known = isinstance(settings, Mapping) and "name" in info.data
+        return {**settings_of(info.data["name"])[1], **settings} if known else settings
+
+    @field_validator("settings")
+    @classmethod
+    def _of_the_family(cls, settings: Any, info: ValidationInfo) -> Any:
+        known = isinstance(settings, Mapping) and "name" in info.data
+        return settings_of(info.data["name"])[0](**settings) if known else settings
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _remembering(cls, values: Any, build: ModelWrapValidatorHandler[Self]) -> Self:
+        config = build(values)
+        if isinstance(values, Mapping):
+            config._given = _Given(values.get("settings", {}))  # noqa: SLF001 - the new one of this very class
+        return config
+
+    def overridden(self, name: str | None) -> dict[str, Any]:
+        """The values of another strategy, or of this one, with the settings that were given."""
+        return {"name": self.name if name is None else name, "settings": self._given.settings}
+
+
+class LimitsConfig(_Section):
+    """The limits, as in `isiw.Limits`; the ISI is limited to the design space."""
+
+    min_iti_s: float = Field(default=5.0, ge=0.0, allow_inf_nan=False)
+    max_pulses: int = Field(default=200, ge=1)
+
+
+class RunConfig(_Section):
+    """Everything that `isiw run` can be told."""
+
+    seed: int = Field(default=0, ge=0)
+    log: Path | None = None
+    subject: SubjectConfig = SubjectConfig()
+    space: SpaceConfig = SpaceConfig()
+    strategy: StrategyConfig = StrategyConfig()
+    limits: LimitsConfig = LimitsConfig()
+
+    def with_overrides(
+        self,
+        *,
+        seed: int | None = None,
+        log: Path | None = None,
+        subject: str | None = None,
+        data: Path | None = None,
+        strategy: str | None = None,
+    ) -> RunConfig:
+        """The same, with what was given on the command line; another strategy keeps the settings that were given."""
+        values = self.model_dump()
+        values |= {key: value for key, value in {"seed": seed, "log": log}.items() if value is not None}
+        about = {"kind": subject, "data": data}
+        values["subject"] |= {key: value for key, value in about.items() if value is not None}
+        values["strategy"] = self.strategy.overridden(strategy)
+        return _validated(values, "the command line")
+
+
+def load_config(path: str | Path | None = None) -> RunConfig:
+    """Read a configuration file; without one, the defaults.
+
+    Args:
+        path: a TOML file.
+
+    Raises:
+        ConfigError: it cannot be read, or has an unknown key or a bad value; the message names file, key and value.
+    """
+    if path is None:
+        return _validated({}, "the defaults")
+    return _validated(read_toml(path), str(path))
+
+
+def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
+    return checked(_kind(_named(values)), values, source)
+
+
+def _named(values: Mapping[str, Any]) -> str:
+    """The strategy that is named, or the default where none or an unknown one is: that is told with all else."""
+    strategy = values.get("strategy")
+    name = strategy.get("name") if isinstance(strategy, Mapping) else None
+    return name if name in list_strategies() else "default"
+
+
+@cache
+def _kind(strategy: str) -> type[RunConfig]:
+    """The configuration whose strategy has the settings of its name."""
+    family, _ = settings_of(strategy)
+    settings = create_model("StrategyConfig", __base__=StrategyConfig, settings=(family, _FILLED))
+    return create_model("RunConfig", __base__=RunConfig, strategy=(settings, _FILLED))
+
+
+def config_of_log(record: SessionRecord) -> RunConfig:
+    """The configuration that a logged session was run with.
+
+    Raises:
+        ConfigError: it was run by other software than `isiw run`.
+    """
+    if RUN_KEY not in record.header.config:
+        raise ConfigError(
+            "the session was not run by isiw run, so its device is not known here",
+            got=record.header.device.name,
+            remedy="Resume it from the software that ran it: isiw.resume(path, device).run()",
+        )
+    return _validated(record.header.config[RUN_KEY], str(record.path))
+
+
+def fresh_log_path(config: RunConfig) -> Path:
+    """A path in the default folder at which there is no log yet."""
+    stem = f"{dt.datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}_seed{config.seed}"
+    names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
+    paths = (SESSIONS / f"{name}.mcap" for name in names)
+    return next(path for path in paths if not path.exists() and not path.with_name(f"{path.name}.part").exists())
+
+
+def subject_for(config: RunConfig) -> SimulatedSubject:
+    """The simulated person."""
+    return cohort(config.subject.cohort, config.subject.number + 1, config.seed)[-1]
+
+
+def true_window(record: SessionRecord) -> Window | None:
+    """The true window of the person whom `isiw run` simulated; None where it, or such a person, does not exist."""
+    if RUN_KEY not in record.header.config:
+        return None
+    return subject_for(config_of_log(record)).window(record.header.space)
+
+
+def device_for(config: RunConfig) -> Device:
+    """The device: a simulated person, in recorded EMG where asked for.
+
+    Raises:
+        ConfigError: recorded EMG without its folder.
+        DeviceError: no recordings in the folder.
+    """
+    reference = config.space.reference
+    respond = partial(subject_for(config).begin(config.seed).respond, reference=reference)
+    if config.subject.kind == "simulated":
+        return SimulatedDevice(respond, reference)
+    if config.subject.data is None:
+        raise ConfigError(
+            "subject.data is missing: recorded EMG is not part of the package",
+            expected="the folder with the recordings",
+            remedy="Give it with --data DIR.",
+        )
+    return RecordedDevice(respond, reference, load_recordings(config.subject.data), config.seed)
+
+
+def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:
+    """The session that a configuration describes, ready to run."""
+    space = config.space.design()
+    log = config.log or fresh_log_path(config)
+    kept = config.model_dump(mode="json", exclude_none=True, exclude={"log"})
+    if config.subject.data is not None:
+        kept["subject"]["data"] = str(config.subject.data.resolve())
+    return Session(
+        device_for(config),
+        make_strategy(config.strategy.name, space=space, seed=config.seed, **asdict(config.strategy.settings)),
+        log=log,
+        limits=Limits.of_space(space, **config.limits.model_dump()),
+        on_trial=on_trial,
+        subject=f"{config.subject.cohort}-{config.seed}-{config.subject.number}",
+        config={RUN_KEY: kept},
+    )

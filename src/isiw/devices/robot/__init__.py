@@ -1,0 +1,1 @@
+"""The pneumatic tapping robot with its stimulator, simulated."""

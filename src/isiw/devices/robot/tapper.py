@@ -1,0 +1,253 @@
+"""The pneumatic tapping robot with its stimulator, simulated: waveforms out, timing as good as the real one's."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol, TypeAlias
+
+import numpy as np
+
+from isiw.devices.protocol import DeviceInfo, require_staged
+from isiw.devices.robot.mechanism import Geometry, Taps, draw_taps
+from isiw.devices.robot.presets import preset
+from isiw.devices.robot.waveforms import UNITS, record_emg, record_robot, sample_times_ms
+from isiw.errors import DeviceError, InvalidValueError
+from isiw.signals.impact import DETECTION_LATENCY_MS, VALVE_MS, impact_time
+from isiw.trials import Channel, Stimulus, Sweep
+from isiw.types import FloatArray, Reference
+
+__all__ = ["HitDelay", "Tapper", "TapperSettings", "Trigger"]
+
+Trigger: TypeAlias = Literal["open-loop", "impact"]
+
+SWEEP_MS = 1000.0
+AFTER_PULSE_MS = 60.0
+ALONE_MS = 200.0  # TMS alone comes as late after the (silent) valve command as a usual pulse
+
+
+class Evoked(Protocol):
+    """What a person answers."""
+
+    @property
+    def mep_mv(self) -> float:
+        """Peak-to-peak amplitude in the MEP window, EMG at rest included [mV]."""
+
+
+@dataclass(frozen=True)
+class TapperSettings:
+    """How the robot is run.
+
+    Args:
+        reference: the event that commanded ISIs count from.
+        trigger: "open-loop" schedules the pulse from the predicted impact, "impact" triggers it by the detected one.
+        accelerometer: whether the hammer has one; without it the impact is predicted, never measured.
+        rate_hz: sampling rate of all channels [Hz].
+        expected_hit_ms: what is known of a person's hit delay before the first tap [ms].
+        expected_hit_sd_ms: SD from person to person about it [ms].
+        expected_tap_sd_ms: SD from tap to tap [ms].
+
+    Raises:
+        InvalidValueError: an unknown word, a value that is not positive, or an impact trigger without accelerometer.
+    """
+
+    reference: Reference = "impact"
+    trigger: Trigger = "open-loop"
+    accelerometer: bool = True
+    rate_hz: float = 5000.0
+    expected_hit_ms: float = 180.0
+    expected_hit_sd_ms: float = 6.0
+    expected_tap_sd_ms: float = 2.5
+
+    def __post_init__(self) -> None:
+        if self.reference not in {"impact", "valve"} or self.trigger not in {"open-loop", "impact"}:
+            raise InvalidValueError(
+                "unknown reference or trigger",
+                got=(self.reference, self.trigger),
+                expected='"impact" or "valve", and "open-loop" or "impact"',
+            )
+        for name in ("rate_hz", "expected_hit_ms", "expected_hit_sd_ms", "expected_tap_sd_ms"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise InvalidValueError(f"TapperSettings.{name} must be positive", got=getattr(self, name))
+        if self.trigger == "impact" and not self.accelerometer:
+            raise InvalidValueError("the impact cannot trigger a pulse without an accelerometer to find it")
+
+    @property
+    def blind_isi_sd_ms(self) -> float:
+        """SD of an ISI whose impact is not measured [ms]; from the valve command only the taps vary, not the person."""
+        person_ms = self.expected_hit_sd_ms if self.reference == "impact" else 0.0
+        return math.hypot(person_ms, self.expected_tap_sd_ms)
+
+
+class HitDelay:
+    """The running estimate of the delay from the valve command to the impact.
+
+    Args:
+        expected_ms: what it is taken for before the first measured hit [ms].
+    """
+
+    LAST = 21
+
+    def __init__(self, expected_ms: float) -> None:
+        self._expected_ms = expected_ms
+        self._hits_ms: deque[float] = deque(maxlen=self.LAST)
+
+    def measured(self, delay_ms: float) -> None:
+        """Learn from a measured hit [ms after the valve command]."""
+        self._hits_ms.append(delay_ms)
+
+    @property
+    def mean_ms(self) -> float:
+        """The hit delay to reckon with [ms]: the median of the last hits, which a few late valves do not move."""
+        return float(np.median(self._hits_ms)) if self._hits_ms else self._expected_ms
+
+
+class Tapper:
+    """The simulated tapping robot, its stimulator, and a person who answers.
+
+    Args:
+        respond: answers the ISI that truly came about [ms from the impact; None for TMS alone] with a MEP.
+        geometry: the person's wrist under the robot, or the name of a preset.
+        settings: how the robot is run.
+        seed: of the taps and the sensors' noise.
+    """
+
+    def __init__(
+        self,
+        respond: Callable[[float | None], Evoked],
+        geometry: Geometry | str = "subject1",
+        settings: TapperSettings | None = None,
+        *,
+        seed: int = 0,
+    ) -> None:
+        self.geometry = preset(geometry) if isinstance(geometry, str) else geometry
+        self.settings = settings or TapperSettings()
+        self.hit_delay = HitDelay(self.settings.expected_hit_ms)
+        self._respond, self._seed = respond, seed
+        self._staged, self._delivered = False, 0
+
+    def describe(self) -> DeviceInfo:
+        """What the device is."""
+        silent = {name for name, there in self._has.items() if not there}
+        channels = {name: unit for name, unit in UNITS.items() if name not in silent}
+        return DeviceInfo("simulated tapping robot", self.settings.reference, simulated=True, channels=channels)
+
+    @property
+    def _has(self) -> dict[str, bool]:
+        return {"acceleration": self.settings.accelerometer, "force": self.geometry.load_cell}
+
+    def stage(self) -> None:
+        """Arm."""
+        self._staged = True
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Sweep:  # noqa: ARG002 - answers at once
+        """Tap, pulse, and record.
+
+        Raises:
+            DeviceError: not staged, or an ISI too short to be triggered by the impact.
+        """
+        require_staged(self.describe().name, staged=self._staged)
+        refusal = self._refusal(stimulus.isi_ms)
+        if refusal is not None:
+            raise refusal
+        return self._deliver(stimulus)
+
+    def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
+        """Come into the state of having delivered these stimuli since the session's beginning."""
+        for stimulus in stimuli[self._delivered :]:
+            if self._refusal(stimulus.isi_ms) is None:
+                self._deliver(stimulus)
+
+    def stop(self) -> None:
+        """Disarm."""
+        self._staged = False
+
+    def unstage(self) -> None:
+        """Disarm."""
+        self._staged = False
+
+    def _after_impact_ms(self, isi_ms: float) -> float:
+        """The commanded ISI, counted from the impact as predicted [ms]."""
+        return isi_ms if self.settings.reference == "impact" else isi_ms - self.hit_delay.mean_ms
+
+    def _refusal(self, isi_ms: float | None) -> DeviceError | None:
+        if self.settings.trigger == "open-loop" or isi_ms is None:
+            return None
+        after_impact_ms = self._after_impact_ms(isi_ms)
+        if after_impact_ms >= DETECTION_LATENCY_MS:
+            return None
+        return DeviceError(
+            "the pulse cannot come so soon after the impact that triggers it",
+            got=f"{after_impact_ms:.1f} ms after the impact",
+            expected=f"at least {DETECTION_LATENCY_MS:g} ms",
+            remedy="Start the design space later, or use the open-loop trigger.",
+        )
+
+    def _deliver(self, stimulus: Stimulus) -> Sweep:
+        self._delivered += 1
+        rng = np.random.default_rng([self._seed, stimulus.trial])
+        taps = draw_taps(self.geometry, 1, rng)
+        return self._pulse_alone(taps, rng) if stimulus.isi_ms is None else self._pair(taps, stimulus.isi_ms, rng)
+
+    def _pulse_alone(self, taps: Taps, rng: np.random.Generator) -> Sweep:
+        silent, times = taps.none(), self._times_ms(ALONE_MS)
+        channels = self._channels(times, silent, rng)
+        channels["emg"] = self._emg(times, silent, ALONE_MS, rng)
+        return Sweep(channels, t_tms_ms=VALVE_MS + ALONE_MS)
+
+    def _pair(self, taps: Taps, isi_ms: float, rng: np.random.Generator) -> Sweep:
+        after_impact_ms = self._after_impact_ms(isi_ms)
+        predicted_ms = self.hit_delay.mean_ms
+        times = self._times_ms(predicted_ms + after_impact_ms)
+        channels = self._channels(times, taps, rng)
+        measured_ms = self._measured_hit_ms(channels)
+        start_ms = predicted_ms if self.settings.trigger == "open-loop" else measured_ms
+        pulse_ms = None if start_ms is None else start_ms + after_impact_ms
+        channels["emg"] = self._emg(times, taps, pulse_ms, rng)
+        if measured_ms is not None:
+            self.hit_delay.measured(measured_ms)
+        blind = not self.settings.accelerometer
+        return Sweep(
+            channels,
+            t_valve_ms=VALVE_MS,
+            t_tms_ms=None if pulse_ms is None else VALVE_MS + pulse_ms,
+            t_hit_ms=VALVE_MS + predicted_ms if blind else None,
+            isi_sd_ms=self.settings.blind_isi_sd_ms if blind else 0.0,
+        )
+
+    def _times_ms(self, pulse_ms: float) -> FloatArray:
+        """A sweep of 1 s, or longer where the pulse comes late [ms after the valve command]."""
+        return sample_times_ms(
+            self.settings.rate_hz, max(SWEEP_MS, VALVE_MS + pulse_ms + AFTER_PULSE_MS), valve_ms=VALVE_MS
+        )
+
+    def _channels(self, times_ms: FloatArray, taps: Taps, rng: np.random.Generator) -> dict[str, Channel]:
+        waves = record_robot(times_ms, taps, rng)
+        return {name: self._channel(name, wave[0]) for name, wave in waves.items() if self._has.get(name, True)}
+
+    def _channel(self, name: str, values: FloatArray) -> Channel:
+        return Channel(values, self.settings.rate_hz, UNITS[name])
+
+    def _measured_hit_ms(self, channels: Mapping[str, Channel]) -> float | None:
+        """The impact that the accelerometer shows [ms after the valve command]."""
+        if not self.settings.accelerometer:
+            return None
+        hit_ms = impact_time(channels["acceleration"].values, self.settings.rate_hz, VALVE_MS)
+        return None if hit_ms is None else hit_ms - VALVE_MS
+
+    def _emg(self, times_ms: FloatArray, taps: Taps, pulse_ms: float | None, rng: np.random.Generator) -> Channel:
+        hit_ms = float(taps.hit_ms[0])
+        evoked_mv = 0.0
+        if pulse_ms is not None:
+            evoked_mv = self._respond(None if math.isnan(hit_ms) else pulse_ms - hit_ms).mep_mv
+        wave = record_emg(
+            times_ms,
+            self.settings.rate_hz,
+            taps,
+            rng,
+            pulse_ms=np.array([math.nan if pulse_ms is None else pulse_ms]),
+            evoked_mv=np.array([evoked_mv]),
+        )
+        return self._channel("emg", wave[0])

@@ -1,0 +1,202 @@
+"""The bootstrap particle filter: the dissertation's PF (4.3.2), after Gordon et al., IEE Proc. F 140, 1993.
+
+Particles are ISIs that search for the best one. Each generation is diffused, measured with one MEP a particle, weighted
+by these MEPs, and resampled. Nothing is learnt before all particles of a generation have been measured.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import torch
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.models.dissertation.curves import Floor
+from isiw.models.protocol import Observation, Tensor
+from isiw.models.shared.history import AmplitudeHistory
+from isiw.types import BoolArray, FloatArray, IntArray
+from isiw.window import Window, WindowEstimate
+
+__all__ = ["BootstrapFilter", "BootstrapPosterior", "normalised", "resampled"]
+
+
+def normalised(weights: FloatArray) -> FloatArray:
+    """Weights that sum to 1; equal ones where all are 0.
+
+    Args:
+        weights: not negative, shape (b, p).
+    """
+    total = weights.sum(axis=-1, keepdims=True)
+    return np.asarray(np.where(total > 0, weights, 1.0) / np.where(total > 0, total, weights.shape[-1]))
+
+
+def resampled(particles: FloatArray, weights: FloatArray, uniform: FloatArray) -> FloatArray:
+    """Particles drawn in proportion to their weights, with replacement.
+
+    Args:
+        particles: shape (b, p).
+        weights: normalised, shape (b, p).
+        uniform: uniform draws in 0–1, shape (b, p).
+    """
+    cumulative = weights.cumsum(axis=-1)
+    cumulative[:, -1] = 1.0  # whatever rounding made of it
+    picks = (uniform[:, :, None] >= cumulative[:, None, :]).sum(axis=-1)
+    return np.take_along_axis(particles, picks, axis=-1)
+
+
+@dataclass(frozen=True)
+class BootstrapFilter:
+    """A particle filter over ISIs.
+
+    Args:
+        particles: how many particles, and so MEPs a generation (4.4.4).
+        diffusion_ms: SD of the noise that is added to each particle before it is measured (4.2); the text gives none.
+        lattice_ms: particles lie on multiples of this from the low end of the range (Fig. 4.20) [ms].
+        half_width_ms: the window is the posterior expectation plus and minus this: three SDs of 25 ms in the text
+            (4.3.2), two of them, 50 ms, in the caption of Fig. 4.13.
+        floor: what is subtracted from a MEP before it becomes a weight; the text has the MEPs as they are.
+
+    Raises:
+        InvalidValueError: a number that cannot be.
+    """
+
+    particles: int = 30
+    diffusion_ms: float = 10.0
+    lattice_ms: float = 5.0
+    half_width_ms: float = 75.0
+    floor: Floor = field(default_factory=lambda: Floor("raw"))
+
+    def __post_init__(self) -> None:
+        if isinstance(self.particles, bool) or not isinstance(self.particles, int) or self.particles < 2:
+            raise InvalidValueError("particles must be a whole number of at least 2", got=self.particles)
+        for name in ("lattice_ms", "half_width_ms"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise InvalidValueError(f"{name} must be positive", got=getattr(self, name))
+        if not (math.isfinite(self.diffusion_ms) and self.diffusion_ms >= 0):
+            raise InvalidValueError("diffusion_ms must not be negative", got=self.diffusion_ms)
+
+    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> BootstrapPosterior:
+        """The first generation: uniform over the range, diffused, not measured."""
+        rng = np.random.default_rng([seed, 1])  # [seed, 0] is the stream of seed
+        particles = self.on_lattice(space, rng.uniform(space.low_ms, space.high_ms, (people, self.particles)))
+        unknown = np.full_like(particles, np.nan)
+        return BootstrapPosterior(
+            model=self,
+            space=space,
+            seed=seed,
+            told=AmplitudeHistory.nothing(people),
+            plan_ms=self._diffused(space, particles, rng),
+            count=np.zeros(people, dtype=np.int64),
+            measured_ms=unknown,
+            mep_mv=unknown,
+            expectation_ms=np.full(people, np.nan),
+            spread_ms=particles.std(axis=-1),
+            silent=np.zeros(people, dtype=bool),
+        )
+
+    def update(self, posterior: BootstrapPosterior, observation: Observation) -> BootstrapPosterior:
+        """One more particle measured; the next generation where it was the last one of its own.
+
+        Raises:
+            StrategyError: a response without its amplitude.
+        """
+        told = posterior.told.appended(observation)
+        paired = np.flatnonzero(~np.isnan(told.isi_ms[:, -1]))
+        measured_ms, mep_mv = posterior.measured_ms.copy(), posterior.mep_mv.copy()
+        measured_ms[paired, posterior.count[paired]] = told.isi_ms[paired, -1]
+        mep_mv[paired, posterior.count[paired]] = told.mep_mv[paired, -1]
+        count = posterior.count.copy()
+        count[paired] += 1
+        after = replace(posterior, told=told, count=count, measured_ms=measured_ms, mep_mv=mep_mv)
+        complete = count == self.particles
+        return self._next_generation(after, complete) if complete.any() else after
+
+    def _next_generation(self, posterior: BootstrapPosterior, complete: BoolArray) -> BootstrapPosterior:
+        """What follows from the generation of those people for whom it is complete; nobody else notices."""
+        rng = np.random.default_rng([posterior.seed, 1 + posterior.trials])
+        floors_mv = [self.floor.level_mv(posterior.told.person(person)) for person in range(len(complete))]
+        weights = self.floor.excess_mv(posterior.mep_mv, np.array(floors_mv)[:, None]).clip(0.0)
+        # A particle is where its MEP was measured, which may not be where it was sent.
+        particles = self.on_lattice(posterior.space, posterior.measured_ms)
+        share = normalised(weights)
+        drawn = resampled(particles, share, rng.uniform(size=particles.shape))
+        plan_ms = self._diffused(posterior.space, drawn, rng)
+        row = complete[:, None]
+        return replace(
+            posterior,
+            plan_ms=np.where(row, plan_ms, posterior.plan_ms),
+            count=np.where(complete, 0, posterior.count),
+            measured_ms=np.where(row, np.nan, posterior.measured_ms),
+            mep_mv=np.where(row, np.nan, posterior.mep_mv),
+            expectation_ms=np.where(complete, (share * particles).sum(axis=-1), posterior.expectation_ms),
+            spread_ms=np.where(complete, drawn.std(axis=-1), posterior.spread_ms),
+            silent=np.where(complete, ~(weights > 0).any(axis=-1), posterior.silent),
+        )
+
+    def on_lattice(self, space: DesignSpace, isi_ms: FloatArray) -> FloatArray:
+        """The nearest ISIs [ms] of the lattice, inside the range; same shape."""
+        last = math.floor((space.high_ms - space.low_ms) / self.lattice_ms + 1e-9)
+        return space.low_ms + self.lattice_ms * ((isi_ms - space.low_ms) / self.lattice_ms).round().clip(0, last)
+
+    def _diffused(self, space: DesignSpace, particles: FloatArray, rng: np.random.Generator) -> FloatArray:
+        return self.on_lattice(space, particles + self.diffusion_ms * rng.standard_normal(particles.shape))
+
+
+@dataclass(frozen=True, eq=False)
+class BootstrapPosterior:
+    """Where b people's particles are.
+
+    Args:
+        model: the filter's settings.
+        space: the design space.
+        seed: seed of all randomness.
+        told: the trials so far.
+        plan_ms: the present generation [ms], shape (b, p).
+        count: how many of it have been measured, shape (b,).
+        measured_ms: where they were measured, NaN where they were not yet, shape (b, p).
+        mep_mv: their MEPs [mV], shape (b, p).
+        expectation_ms: the posterior expectation after the last generation [ms], NaN before, shape (b,).
+        spread_ms: SD of the particles after it [ms], shape (b,).
+        silent: whether no MEP of it had any weight, shape (b,).
+    """
+
+    model: BootstrapFilter
+    space: DesignSpace
+    seed: int
+    told: AmplitudeHistory
+    plan_ms: FloatArray
+    count: IntArray
+    measured_ms: FloatArray
+    mep_mv: FloatArray
+    expectation_ms: FloatArray
+    spread_ms: FloatArray
+    silent: BoolArray
+
+    @property
+    def trials(self) -> int:
+        """How many trials of each person it has been told."""
+        return self.told.trials
+
+    @property
+    def trouble(self) -> str | None:
+        """That a generation told nothing; see `ReportsTrouble`."""
+        if not self.silent.any():
+            return None
+        return "No MEP of the last generation was above the floor: all of its particles were given the same weight."
+
+    def proposed_isis_ms(self) -> Tensor:
+        """The particles that are not measured yet; see `ProposesIsi`."""
+        left = self.model.particles - int(self.count.max())
+        plan_ms = np.take_along_axis(self.plan_ms, self.count[:, None] + np.arange(left), axis=-1)
+        return torch.as_tensor(plan_ms, dtype=torch.float32)
+
+    def estimate(self, person: int = 0) -> WindowEstimate:
+        """The window of one person: none before the first generation is complete."""
+        expectation_ms, reach_ms = float(self.expectation_ms[person]), self.model.half_width_ms
+        window = None
+        if not math.isnan(expectation_ms):
+            window = Window(self.space.snap(expectation_ms - reach_ms), self.space.snap(expectation_ms + reach_ms))
+        return WindowEstimate(probability=None, window=window, spread_ms=float(self.spread_ms[person]))

@@ -1,0 +1,130 @@
+"""Gaussian process regression of the amplitudes with one noise for all ISIs: the dissertation's GPR (4.3).
+
+`isiw.models.gp` is what one would choose today.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+from threadpoolctl import ThreadpoolController
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.models.dissertation.curves import FittedCurve
+from isiw.types import FloatArray
+
+__all__ = ["GaussianProcessRegression"]
+
+LEAST_SCALE_MV = 1e-3
+"""Amplitudes are fitted in units of the largest excess, or of this where that is smaller [mV]."""
+
+SUPPORT_MS = 5.0
+"""Distance of the ISIs at which curves are drawn; the kernel is smooth in between."""
+
+
+@dataclass(frozen=True)
+class GaussianProcessRegression:
+    """scikit-learn's Gaussian process with a squared-exponential kernel and white noise, about the floor.
+
+    The text gives neither kernel nor hyperparameters, only that the covariance is near 1 for close ISIs and 0 for
+    distant ones, which the kernel is. Signal and noise variance, and the length, maximise the marginal likelihood.
+
+    Args:
+        length_ms: the kernel's length where the search for it starts [ms].
+        min_length_ms: shortest length that is searched [ms].
+        max_length_ms: longest length that is searched [ms].
+        noise: noise SD where the search starts, as a share of the largest excess.
+        max_iterations: iterations after which the search gives up.
+        samples: how many curves are drawn.
+
+    Raises:
+        InvalidValueError: a number that cannot be.
+    """
+
+    length_ms: float = 40.0
+    min_length_ms: float = 25.0
+    max_length_ms: float = 100.0
+    noise: float = 0.3
+    max_iterations: int = 40
+    samples: int = 64
+
+    def __post_init__(self) -> None:
+        lengths = (self.min_length_ms, self.length_ms, self.max_length_ms)
+        if not 0 < lengths[0] <= lengths[1] <= lengths[2] < math.inf:
+            raise InvalidValueError("min_length_ms, length_ms and max_length_ms ascend from above 0", got=lengths)
+        if not 0 < self.noise < 1:
+            raise InvalidValueError("noise is a share of the largest excess", got=self.noise, expected="0–1")
+        if self.max_iterations < 1 or self.samples < 2:
+            raise InvalidValueError(
+                "a search needs iterations and two samples", got=(self.max_iterations, self.samples)
+            )
+
+    def fit(
+        self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
+    ) -> FittedCurve:
+        """Fit the Gaussian process; see `RegressionMethod`."""
+        # Matrices this small gain nothing from several threads, and lose a lot where the machine is busy.
+        with _blas().limit(limits=1, user_api="blas"):
+            return self._fit(isi_ms, excess_mv, space, rng)
+
+    def _fit(
+        self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
+    ) -> FittedCurve:
+        scale_mv = max(float(np.abs(excess_mv).max(initial=0.0)), LEAST_SCALE_MV)
+        process, noise, trouble = self._process(isi_ms[:, None], excess_mv / scale_mv)
+        grid = space.grid_ms
+        support = np.linspace(space.low_ms, space.high_ms, round((space.high_ms - space.low_ms) / SUPPORT_MS) + 1)
+        mean, covariance = process.predict(support[:, None], return_cov=True)
+        values, vectors = np.linalg.eigh(covariance - noise**2 * np.eye(len(support)))
+        drawn = mean + rng.standard_normal((self.samples, len(support))) @ (vectors * np.sqrt(values.clip(0.0))).T
+        mean, sd = process.predict(grid[:, None], return_std=True)
+        return FittedCurve(
+            grid_ms=grid,
+            mean_mv=mean * scale_mv,
+            sd_mv=np.sqrt((sd**2 - noise**2).clip(0.0)) * scale_mv,
+            samples_mv=np.stack([np.interp(grid, support, curve) for curve in drawn]) * scale_mv,
+            noise_sd_mv=noise * scale_mv,
+            trouble=trouble,
+        )
+
+    def _process(self, isi: FloatArray, scaled: FloatArray) -> tuple[Any, float, str | None]:
+        """The process at its best hyperparameters, its noise SD, and what went wrong."""
+        signal = ConstantKernel(1.0, (0.01, 10.0))
+        kernel = signal * RBF(self.length_ms, (self.min_length_ms, self.max_length_ms)) + WhiteKernel(
+            self.noise**2, (1e-4, 1.0)
+        )
+        process = GaussianProcessRegressor(kernel, optimizer=None)
+        if not len(isi):
+            return process, self.noise, "There are no trials to fit yet: the Gaussian process before any stands in."
+        process.fit(isi, scaled)
+        found = minimize(
+            partial(_cost, process),
+            kernel.theta,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=kernel.bounds,
+            options={"maxiter": self.max_iterations, "ftol": 1e-5},
+        )
+        process = GaussianProcessRegressor(kernel.clone_with_theta(found.x), optimizer=None).fit(isi, scaled)
+        gave_up = f"The kernel did not converge in {self.max_iterations} iterations: its best parameters stand in."
+        return process, math.exp(0.5 * found.x[-1]), None if found.success else gave_up
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """Of the libraries that are loaded now; looking for them takes longer than a fit."""
+    return ThreadpoolController()
+
+
+def _cost(process: Any, theta: FloatArray) -> tuple[float, FloatArray]:
+    """Negative log marginal likelihood of a process, and its gradient."""
+    value, gradient = process.log_marginal_likelihood(theta, eval_gradient=True, clone_kernel=False)
+    return -float(value), -gradient

@@ -1,0 +1,159 @@
+"""The incremental sweep: the conventional search, and the dissertation's ground truth (4.2.1)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from statistics import NormalDist
+from typing import Literal, NamedTuple
+
+import numpy as np
+import torch
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.models.dissertation.curves import Floor, curve_masks
+from isiw.models.protocol import Observation, Tensor
+from isiw.models.shared.history import AmplitudeHistory, PersonTrials
+from isiw.types import FloatArray
+from isiw.window import EDGE_LEVEL, Window, WindowEstimate
+
+__all__ = ["SweepModel", "SweepPosterior", "SweepRule"]
+
+SweepRule = Literal["baseline", "share"]
+
+
+class _Means(NamedTuple):
+    """What was measured at the ISIs swept so far, in ascending order, each field of shape (t,)."""
+
+    isi_ms: FloatArray
+    mep_mv: FloatArray
+    sem_mv: FloatArray
+
+
+@dataclass(frozen=True)
+class SweepModel:
+    """The mean MEP of each ISI in turn.
+
+    Args:
+        step_ms: from one ISI to the next [ms].
+        trials_per_isi: trials at each.
+        discarded: the first trials at each ISI, which a startle may have enlarged, are left out.
+        rule: the window is the run of ISIs about the largest mean whose means exceed the `"baseline"` (the text's) or
+            the 0.135 `"share"` of the largest excess (the other methods').
+        neighbours: means are averaged over so many ISIs (an odd number) before the rule judges them,
+        evidence_se: and a window is reported where the largest exceeds the baseline by so many of its standard errors:
+            both stand for the eye of the experimenter, who expected one distribution.
+        floor: what the baseline is; without TMS alone, the median of the means.
+
+    Raises:
+        InvalidValueError: a number that cannot be, or another rule.
+    """
+
+    step_ms: float = 5.0
+    trials_per_isi: int = 12
+    discarded: int = 2
+    rule: SweepRule = "baseline"
+    neighbours: int = 3
+    evidence_se: float = 3.0
+    floor: Floor = field(default_factory=Floor)
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.step_ms) and self.step_ms > 0):
+            raise InvalidValueError("step_ms must be positive", got=self.step_ms)
+        whole = isinstance(self.trials_per_isi, int) and isinstance(self.discarded, int)
+        if not (whole and 0 <= self.discarded <= self.trials_per_isi - 2):
+            raise InvalidValueError(
+                "a mean and its error need two trials that are not discarded",
+                got=(self.trials_per_isi, self.discarded),
+                expected="trials_per_isi of at least discarded + 2",
+            )
+        if self.rule not in {"baseline", "share"}:
+            raise InvalidValueError("the rule is unknown", got=self.rule, expected="baseline or share")
+        if not isinstance(self.neighbours, int) or self.neighbours < 1 or self.neighbours % 2 == 0:
+            raise InvalidValueError("neighbours must be an odd number from 1 up", got=self.neighbours)
+        if not (math.isfinite(self.evidence_se) and self.evidence_se >= 0):
+            raise InvalidValueError("evidence_se must not be negative", got=self.evidence_se)
+
+    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> SweepPosterior:  # noqa: ARG002 - no randomness
+        """Nothing measured yet."""
+        return SweepPosterior(self, space, AmplitudeHistory.nothing(people))
+
+    def update(self, posterior: SweepPosterior, observation: Observation) -> SweepPosterior:
+        """One more trial.
+
+        Raises:
+            StrategyError: a response without its amplitude.
+        """
+        return replace(posterior, told=posterior.told.appended(observation))
+
+
+@dataclass(frozen=True, eq=False)
+class SweepPosterior:
+    """What was measured of b people.
+
+    Args:
+        model: the sweep's settings.
+        space: the design space.
+        told: the trials so far.
+    """
+
+    model: SweepModel
+    space: DesignSpace
+    told: AmplitudeHistory
+
+    @property
+    def trials(self) -> int:
+        """How many trials of each person it has been told."""
+        return self.told.trials
+
+    @cached_property
+    def _stops_ms(self) -> FloatArray:
+        """The ISIs of one sweep [ms]."""
+        stops = math.floor((self.space.high_ms - self.space.low_ms) / self.model.step_ms + 1e-9) + 1
+        return self.space.low_ms + self.model.step_ms * np.arange(stops, dtype=np.float64)
+
+    def proposed_isis_ms(self) -> Tensor:
+        """One sweep, from where it has come to; see `ProposesIsi`."""
+        sweep = self._stops_ms.repeat(self.model.trials_per_isi)
+        done = (~np.isnan(self.told.isi_ms)).sum(axis=-1, keepdims=True)
+        return torch.as_tensor(sweep[(done + np.arange(len(sweep))) % len(sweep)], dtype=torch.float32)
+
+    def _means(self, trials: PersonTrials) -> _Means:
+        """Means by the nearest stop of the realised ISI; the first trials of each block of the sweep are left out."""
+        per_isi, discarded = self.model.trials_per_isi, self.model.discarded
+        kept = np.arange(len(trials.isi_ms)) % per_isi >= discarded
+        mep_mv, last = self.model.floor.excess_mv(trials.mep_mv[kept], 0.0), len(self._stops_ms) - 1
+        stop = ((trials.isi_ms[kept] - self.space.low_ms) / self.model.step_ms).round().clip(0, last).astype(np.int64)
+        count = np.bincount(stop, minlength=last + 1)
+        # A stop that has only a stray trial or two of its neighbours would be the largest mean too often.
+        done = count >= max(2, (per_isi - discarded) // 2)
+        total, squares = (np.bincount(stop, weights=values, minlength=last + 1)[done] for values in (mep_mv, mep_mv**2))
+        n = count[done]
+        mean = total / n
+        sem = np.sqrt((squares / n - mean**2).clip(0.0) / (n - 1))
+        return _Means(self._stops_ms[done], mean, sem)
+
+    def estimate(self, person: int = 0) -> WindowEstimate:
+        """The window of one person, as far as the sweep has come."""
+        trials = self.told.person(person)
+        isi_ms, mep_mv, sem_mv = self._means(trials)
+        if not len(isi_ms):
+            return WindowEstimate(probability=None, window=None)
+        baseline_mv = self.model.floor.level_mv(PersonTrials(isi_ms, mep_mv, trials.baseline_mv))
+        near = np.ones(min(self.model.neighbours, len(isi_ms)))
+        count = np.convolve(np.ones(len(isi_ms)), near, "same")
+        excess_mv = np.convolve(mep_mv - baseline_mv, near, "same") / count
+        error_mv = np.sqrt(np.convolve(sem_mv**2, near, "same")) / count
+        level = EDGE_LEVEL if self.model.rule == "share" else 1e-9  # more than the baseline, and not as much
+        best = int(excess_mv.argmax())
+        clear = excess_mv[best] >= self.model.evidence_se * error_mv[best]
+        inside = curve_masks(excess_mv[None], baseline_mv, level=level)[0] & clear
+        reach_mv = NormalDist().inv_cdf(0.95) * sem_mv
+        return WindowEstimate(
+            probability=None,
+            window=Window.from_mask(isi_ms, inside),
+            grid_ms=isi_ms,
+            profile_quantiles_mv=np.stack((mep_mv - reach_mv, mep_mv, mep_mv + reach_mv)),
+        )

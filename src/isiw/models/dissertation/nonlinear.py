@@ -1,0 +1,182 @@
+"""Nonlinear least squares of one Gaussian or two: the dissertation's NR (4.3, 4.4.8, 5.4.2)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.models.dissertation.curves import FittedCurve
+from isiw.types import FloatArray
+
+__all__ = ["NonlinearRegression", "gaussians_mv", "gradient_mv"]
+
+LEAST_AMPLITUDE_MV = 1e-3
+"""The amplitude to start from where it is not known and all MEPs are at the floor."""
+
+LEAST_NOISE_MV = 1e-6
+"""The noise that a fit without residuals is taken to have."""
+
+MAX_CONDITION = 1e10
+"""Condition number of the parameters' information above which it counts as singular."""
+
+
+def gaussians_mv(isi_ms: FloatArray, parameters: FloatArray) -> FloatArray:
+    """A sum of Gaussians.
+
+    Args:
+        isi_ms: ISIs [ms], shape (t,).
+        parameters: amplitude [mV], mean [ms] and SD [ms] of each, shape (..., 3 k).
+
+    Returns:
+        Shape (..., t).
+    """
+    amplitude, mean, sd = (parameters[..., i::3, None] for i in range(3))
+    return np.asarray((amplitude * np.exp(-0.5 * ((isi_ms - mean) / sd) ** 2)).sum(axis=-2))
+
+
+def gradient_mv(isi_ms: FloatArray, parameters: FloatArray) -> FloatArray:
+    """Derivatives of a sum of Gaussians with respect to its parameters, shape (t, 3 k)."""
+    amplitude, mean, sd = (parameters[i::3] for i in range(3))
+    z = (isi_ms[:, None] - mean) / sd
+    bell = np.exp(-0.5 * z**2)
+    return np.stack((bell, amplitude * bell * z / sd, amplitude * bell * z**2 / sd), axis=-1).reshape(len(isi_ms), -1)
+
+
+class _Beliefs(NamedTuple):
+    """What is known of the parameters before any trial, each field of shape (3 k,)."""
+
+    start: FloatArray
+    sd: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+class _Estimate(NamedTuple):
+    """What least squares make of the trials: parameters (3 k,), their covariance, and the noise."""
+
+    parameters: FloatArray
+    covariance: FloatArray
+    noise_sd_mv: float
+    dof: float = math.inf
+    trouble: str | None = None
+
+
+@dataclass(frozen=True)
+class NonlinearRegression:
+    """Least squares of Gaussians, from start values of prior knowledge.
+
+    The text starts the mean at mid-range and takes width and amplitude from prior knowledge (5.4.2), whose values it
+    does not give; two Gaussians start a quarter of the window's width to either side of it. Amplitudes are not
+    negative, and means stay in the range.
+
+    Args:
+        peaks: how many Gaussians, 1 or 2.
+        width_ms: width of a window before anything is known [ms]; a Gaussian's SD is a quarter of it. Table 4.1: 108.
+        min_width_ms: the narrowest window that is fitted [ms]; Table 4.1 has 60–220, and no bounds.
+        max_width_ms: the widest [ms].
+        amplitude_mv: amplitude before anything is known [mV]; the text's figures have 0.03–0.3 mV. 0: as much as the
+            largest MEP so far, where nothing is known.
+        max_evaluations: evaluations after which the search gives up.
+        samples: how many curves are drawn from the parameters' asymptotic distribution.
+
+    Raises:
+        InvalidValueError: a number that cannot be.
+    """
+
+    peaks: int = 1
+    width_ms: float = 108.0
+    min_width_ms: float = 40.0
+    max_width_ms: float = 250.0
+    amplitude_mv: float = 0.05
+    max_evaluations: int = 100
+    samples: int = 64
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.peaks, int) or self.peaks not in {1, 2}:
+            raise InvalidValueError("a nonlinear regression has 1 or 2 peaks", got=self.peaks)
+        widths = (self.min_width_ms, self.width_ms, self.max_width_ms)
+        if not 0 < widths[0] <= widths[1] <= widths[2] < math.inf or widths[0] == widths[2]:
+            raise InvalidValueError("min_width_ms, width_ms and max_width_ms ascend from above 0", got=widths)
+        if not 0 <= self.amplitude_mv < math.inf:
+            raise InvalidValueError("amplitude_mv must not be negative", got=self.amplitude_mv)
+        if self.max_evaluations < 1 or self.samples < 2:
+            raise InvalidValueError(
+                "a search needs evaluations and two samples", got=(self.max_evaluations, self.samples)
+            )
+
+    def fit(
+        self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
+    ) -> FittedCurve:
+        """Fit the Gaussians; see `RegressionMethod`."""
+        beliefs = self._beliefs(space, self.amplitude_mv or max(float(excess_mv.max(initial=0.0)), LEAST_AMPLITUDE_MV))
+        estimate = self._least_squares(isi_ms, excess_mv, beliefs)
+        values, vectors = np.linalg.eigh(estimate.covariance)
+        root = vectors * np.sqrt(values.clip(0.0))
+        drawn = estimate.parameters + rng.standard_normal((self.samples, len(root))) @ root.T
+        grid = space.grid_ms
+        return FittedCurve(
+            grid_ms=grid,
+            mean_mv=gaussians_mv(grid, estimate.parameters),
+            sd_mv=np.linalg.norm(gradient_mv(grid, estimate.parameters) @ root, axis=-1),
+            samples_mv=gaussians_mv(grid, np.clip(drawn, beliefs.low, beliefs.high)),
+            noise_sd_mv=estimate.noise_sd_mv,
+            dof=estimate.dof,
+            trouble=estimate.trouble,
+            amplitudes_mv=tuple(sorted(estimate.parameters[::3].tolist(), reverse=True)),
+        )
+
+    def _beliefs(self, space: DesignSpace, amplitude_mv: float) -> _Beliefs:
+        """Start values, SDs and bounds of the parameters."""
+        range_ms, middle_ms = space.high_ms - space.low_ms, 0.5 * (space.low_ms + space.high_ms)
+        sd_ms = self.width_ms / 4.0
+        apart_ms = 0.0 if self.peaks == 1 else self.width_ms / 4.0
+        start = [[amplitude_mv, middle_ms + side * apart_ms, sd_ms] for side in (-1, 1)[: self.peaks]]
+        sd = [amplitude_mv, range_ms / math.sqrt(12.0), 0.5 * sd_ms]
+        low = [0.0, space.low_ms, 0.25 * self.min_width_ms]
+        high = [math.inf, space.high_ms, 0.25 * self.max_width_ms]
+        return _Beliefs(np.ravel(start), *(np.tile(values, self.peaks) for values in (sd, low, high)))
+
+    def _least_squares(self, isi_ms: FloatArray, excess_mv: FloatArray, beliefs: _Beliefs) -> _Estimate:
+        """The best parameters and their asymptotic covariance; prior knowledge where the trials do not give them."""
+        free = len(isi_ms) - len(beliefs.start)
+        if free < 1:
+            flat = beliefs.start * np.tile([0.0, 1.0, 1.0], self.peaks)
+            trouble = f"{len(isi_ms)} trials do not determine {len(flat)} parameters: a flat curve stands in."
+            return _Estimate(flat, np.diag(beliefs.sd**2), float(beliefs.sd[0]), trouble=trouble)
+        found = least_squares(
+            partial(_residuals_mv, isi_ms, excess_mv),
+            beliefs.start,
+            jac=partial(gradient_mv, isi_ms),
+            bounds=(beliefs.low, beliefs.high),
+            x_scale=beliefs.sd,
+            ftol=1e-6,
+            xtol=1e-6,
+            max_nfev=self.max_evaluations,
+        )
+        noise_mv = max(math.sqrt(2.0 * found.cost / free), LEAST_NOISE_MV)
+        covariance, doubt = _covariance(gradient_mv(isi_ms, found.x) / noise_mv, beliefs.sd)
+        gave_up = f"The fit did not converge in {self.max_evaluations} evaluations: its best curve stands in."
+        trouble = " ".join(filter(None, ("" if found.success else gave_up, doubt)))
+        return _Estimate(found.x, covariance, noise_mv, free, trouble or None)
+
+
+def _residuals_mv(isi_ms: FloatArray, excess_mv: FloatArray, parameters: FloatArray) -> FloatArray:
+    return gaussians_mv(isi_ms, parameters) - excess_mv
+
+
+def _covariance(gradient: FloatArray, prior_sd: FloatArray) -> tuple[FloatArray, str | None]:
+    """Covariance of the parameters from the gradient in noise SDs; what stands in where that is singular."""
+    scaled = gradient * prior_sd
+    information = scaled.T @ scaled
+    trouble = None
+    if np.linalg.cond(information) > MAX_CONDITION:
+        information = information + np.eye(len(information))
+        trouble = "The MEPs do not determine every parameter: what was known before the first trial stands in."
+    return np.linalg.inv(information) * np.outer(prior_sd, prior_sd), trouble

@@ -1,0 +1,191 @@
+"""Regression of the MEP on the ISI, anew after each trial: what the dissertation's NR, SVMR and GPR share (4.3).
+
+A method fits a curve to what the MEPs of one person have above the floor; its window is where the curve has at least
+0.135 of its maximum.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import torch
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.models.dissertation.curves import FittedCurve, Floor, Segments, curve_masks
+from isiw.models.protocol import Observation, Tensor
+from isiw.models.shared.history import AmplitudeHistory
+from isiw.types import FloatArray
+from isiw.window import Window, WindowEstimate
+
+__all__ = ["RegressionMethod", "RegressionModel", "RegressionPosterior"]
+
+OUTCOMES = 24
+"""Values of the next MEP on which predictive distributions live."""
+
+
+class RegressionMethod(Protocol):
+    """A settings object that fits a curve."""
+
+    def fit(
+        self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
+    ) -> FittedCurve:
+        """Fit the MEPs of one person; a fit that fails says so and answers with what stands in for it.
+
+        Args:
+            isi_ms: realised ISIs [ms], shape (n,); n may be 0.
+            excess_mv: what their MEPs have above the floor [mV], shape (n,).
+            space: the design space.
+            rng: all randomness of the fit.
+        """
+
+
+@dataclass(frozen=True)
+class RegressionModel:
+    """A regression as a model: fits all trials anew after each.
+
+    Args:
+        method: what fits the curve.
+        floor: what is subtracted before.
+        segments: where the curve crosses its edges' level more than twice: the window is `"all"` that lies above it,
+            or the segment that holds the `"peak"`, since a single distribution is expected (4.2.1, 5.4.1).
+
+    Raises:
+        InvalidValueError: another word for the segments.
+    """
+
+    method: RegressionMethod
+    floor: Floor = field(default_factory=Floor)
+    segments: Segments = "peak"
+
+    def __post_init__(self) -> None:
+        if self.segments not in {"peak", "all"}:
+            raise InvalidValueError(
+                "a window has all segments or the peak's", got=self.segments, expected="peak or all"
+            )
+
+    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> RegressionPosterior:
+        """The posterior before the first trial."""
+        return self._fitted(space, seed, AmplitudeHistory.nothing(people))
+
+    def update(self, posterior: RegressionPosterior, observation: Observation) -> RegressionPosterior:
+        """The posterior after one more trial.
+
+        Raises:
+            StrategyError: a response without its amplitude.
+        """
+        return self._fitted(posterior.space, posterior.seed, posterior.told.appended(observation))
+
+    def _fitted(self, space: DesignSpace, seed: int, told: AmplitudeHistory) -> RegressionPosterior:
+        people = [told.person(person) for person in range(told.people)]
+        rng = np.random.default_rng([seed, told.trials])
+        floors_mv = np.array([self.floor.level_mv(one) for one in people])
+        curves = tuple(
+            self.method.fit(one.isi_ms, self.floor.excess_mv(one.mep_mv, floor_mv), space, rng)
+            for one, floor_mv in zip(people, floors_mv, strict=True)
+        )
+        return RegressionPosterior(self, space, seed, told, curves, floors_mv)
+
+
+@dataclass(frozen=True, eq=False)
+class RegressionPosterior:
+    """What is believed about b people.
+
+    Args:
+        model: the model's settings.
+        space: the design space.
+        seed: seed of all randomness.
+        told: the trials so far.
+        curves: what was fitted to them, one a person.
+        floors_mv: the floor of each person [mV], shape (b,).
+    """
+
+    model: RegressionModel
+    space: DesignSpace
+    seed: int
+    told: AmplitudeHistory
+    curves: tuple[FittedCurve, ...]
+    floors_mv: FloatArray
+
+    @property
+    def trials(self) -> int:
+        """How many trials of each person it has been told."""
+        return self.told.trials
+
+    @property
+    def trouble(self) -> str | None:
+        """What went wrong with the last fit; see `ReportsTrouble`."""
+        return " ".join(dict.fromkeys(curve.trouble for curve in self.curves if curve.trouble)) or None
+
+    @cached_property
+    def _samples_mv(self) -> Tensor:
+        """Sampled curves above the floor, shape (b, s, t)."""
+        return torch.as_tensor(np.stack([curve.samples_mv for curve in self.curves]), dtype=torch.float32)
+
+    @cached_property
+    def _masks(self) -> Tensor:
+        """Their windows as 0 or 1, shape (b, s, t)."""
+        pairs = zip(self.curves, self.floors_mv, strict=True)
+        masks = [curve_masks(curve.samples_mv, floor_mv, self.model.segments) for curve, floor_mv in pairs]
+        return torch.as_tensor(np.stack(masks), dtype=torch.float32)
+
+    def _nearest(self, isi_ms: Tensor) -> Tensor:
+        """Indices of the nearest grid points, shape (t,)."""
+        steps = ((isi_ms - self.space.low_ms) / self.space.step_ms).round().long()
+        return steps.clamp(0, len(self.space.grid_ms) - 1)
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows; see `SamplesWindows`."""
+        return self._masks[..., self._nearest(isi_ms)]
+
+    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+        """Sampled profiles; see `SamplesProfiles`."""
+        return self._samples_mv[..., self._nearest(isi_ms)] + self.baselines_mv().unsqueeze(-1)
+
+    def baselines_mv(self) -> Tensor:
+        """The floor, which a fit does not sample; see `SamplesProfiles`."""
+        floors = torch.as_tensor(self.floors_mv, dtype=torch.float32)
+        return floors.unsqueeze(-1).expand(self._samples_mv.shape[:2])
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Gaussian predictions about each sampled curve; see `PredictsOutcomes`."""
+        expected = self._samples_mv[..., self._nearest(isi_ms), None]
+        noise = torch.tensor([curve.noise_sd_mv for curve in self.curves], dtype=torch.float32)[:, None, None, None]
+        low, high = expected.amin((1, 2, 3), keepdim=True), expected.amax((1, 2, 3), keepdim=True)
+        share = torch.linspace(0.0, 1.0, OUTCOMES)
+        values = (low - 3.0 * noise) + share * (high - low + 6.0 * noise)
+        # Noise finer than the grid of values would fall between two of them.
+        spread = noise.maximum(values.diff(dim=-1)[..., :1]).clamp_min(1e-9)
+        return torch.softmax(-0.5 * ((values - expected) / spread).square(), dim=-1)
+
+    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> RegressionPosterior:
+        """The fit with an imagined trial as well; see `Conditions`."""
+        unknown = torch.full_like(mep_mv, torch.nan)
+        return self.model.update(self, Observation(isi_ms, mep_mv, torch.zeros_like(mep_mv), unknown))
+
+    def prediction_mv(self, level: float = 0.95, person: int = 0) -> tuple[FloatArray, FloatArray]:
+        """The interval that holds the next MEP with this probability [mV], at each ISI of the grid (4.3).
+
+        Args:
+            level: the probability.
+            person: which person.
+
+        Returns:
+            Its low and its high end, each of shape (t,).
+        """
+        low, high = self.curves[person].prediction_mv(level)
+        return low + self.floors_mv[person], high + self.floors_mv[person]
+
+    def estimate(self, person: int = 0) -> WindowEstimate:
+        """The window of one person."""
+        curve, floor_mv = self.curves[person], float(self.floors_mv[person])
+        low, high = curve.confidence_mv(0.9)
+        return WindowEstimate(
+            probability=None,
+            window=Window.from_mask(curve.grid_ms, curve_masks(curve.mean_mv[None], floor_mv, self.model.segments)[0]),
+            grid_ms=curve.grid_ms,
+            profile_quantiles_mv=np.stack((low, curve.mean_mv, high)) + floor_mv,
+        )

@@ -1,0 +1,84 @@
+"""What the trials so far say about each particle: the likelihood of their history."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import torch
+
+from isiw.models.particles.noise import NODES, Response, log_gain, log_likelihood
+from isiw.models.particles.prior import Person
+from isiw.models.particles.shapes import facilitation
+from isiw.models.protocol import Tensor
+from isiw.models.shared.history import History
+from isiw.models.shared.tables import ISI_NODES
+
+__all__ = ["in_pieces", "levels", "total_log_likelihood"]
+
+CHUNK_ELEMENTS = 1 << 20
+"""On a CPU the likelihood is worked through in pieces of this many nodes: few calls, and bounded memory."""
+
+
+def levels(person: Person, isi_ms: Tensor) -> Tensor:
+    """Facilitation of each particle, shape (b, p, n).
+
+    Args:
+        person: particles, fields of shape (b, p).
+        isi_ms: ISIs [ms], shape (b or 1, n); NaN is TMS alone.
+    """
+    level = facilitation(person.shape, isi_ms.unsqueeze(-2)).mul_(person.present.unsqueeze(-1))
+    return level.nan_to_num_(0.0)
+
+
+def total_log_likelihood(person: Person, history: History) -> Tensor:
+    """Log likelihood of a history under each particle, shape (b, p).
+
+    An ISI that is known with an SD only is integrated out on three Gauss-Hermite nodes.
+
+    Args:
+        person: particles, fields of shape (b, p).
+        history: trials of b people.
+    """
+    if not bool((history.isi_sd_ms > 0).any()):
+        return _by_trial(person, history, history.isi_ms).sum(-1)
+    nodes = [
+        _by_trial(person, history, history.isi_ms + shift * history.isi_sd_ms) + math.log(weight)
+        for shift, weight in ISI_NODES
+    ]
+    return torch.logsumexp(torch.stack(nodes), dim=0).sum(-1)
+
+
+def _by_trial(person: Person, history: History, isi_ms: Tensor) -> Tensor:
+    """Log likelihood of each trial at some ISIs, shape (b, p, n)."""
+    ends = (history.log_mep.unsqueeze(-2), history.log_mep_high.unsqueeze(-2))
+    others = (levels(person, isi_ms), *ends, log_gain(person.response, history.order.unsqueeze(-2)))
+    return in_pieces(log_likelihood, person.response, others, NODES * isi_ms.shape[-1])
+
+
+def in_pieces(function: Callable[..., Tensor], response: Response, others: tuple[Tensor, ...], elements: int) -> Tensor:
+    """Apply a function of particles piece by piece on a CPU, so that its intermediate values stay small.
+
+    Args:
+        function: maps a response (fields (b, p)) and the others to a tensor of shape (b, p, ...).
+        response: response parameters, fields of shape (b, p).
+        others: tensors of shape (b, p or 1, ...).
+        elements: size of the intermediate values for one particle.
+    """
+    if response.log_floor.is_cuda:
+        return function(response, *others)
+    people, particles = response.log_floor.shape
+    together = max(1, CHUNK_ELEMENTS // max(1, elements * particles))
+    step = max(1, CHUNK_ELEMENTS // max(1, elements))
+    rows = []
+    for some in (slice(first, first + together) for first in range(0, people, together)):
+        pieces = [slice(first, first + step) for first in range(0, particles, step)]
+        parts = [
+            function(
+                Response(*(field[some, piece] for field in response)),
+                *(x[some, piece] if x.shape[1] == particles else x[some] for x in others),
+            )
+            for piece in pieces
+        ]
+        rows.append(torch.cat(parts, dim=1))
+    return torch.cat(rows, dim=0)

@@ -1,0 +1,101 @@
+"""A sample of the posterior: predictive distributions, windows and profiles of equally weighted particles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import torch
+
+from isiw.design import DesignSpace
+from isiw.models.particles.likelihood import in_pieces, levels
+from isiw.models.particles.noise import NODES, evoked_mean, log_gain, outcome_density
+from isiw.models.particles.prior import Person
+from isiw.models.particles.shapes import highest_facilitation
+from isiw.models.protocol import Tensor
+from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
+from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
+
+__all__ = ["PersonSample"]
+
+
+@dataclass(frozen=True, eq=False)
+class PersonSample:
+    """What equally weighted particles say about the next MEP and about the window.
+
+    Args:
+        person: the particles, fields of shape (b, s).
+        space: the design space, in whose range a window is looked for.
+        order: how many trials came before the next one.
+    """
+
+    person: Person
+    space: DesignSpace
+    order: int = 0
+
+    @cached_property
+    def _levels(self) -> Tensor:
+        return table_levels(self.person.present.device)[None, None, :]
+
+    @cached_property
+    def _evoked(self) -> Tensor:
+        """Expected MEP above the floor at the tables' levels, in floors, shape (b, s, l)."""
+        return evoked_mean(self.person.response, self._levels)
+
+    @cached_property
+    def edge_level(self) -> Tensor:
+        """Facilitation at a window's edge by the 0.135 rule; above 1 where there is no window, shape (b, s)."""
+        response = self.person.response
+        excess = self._evoked - self._evoked[..., :1]
+        highest = highest_facilitation(self.person.shape, self.space.low_ms, self.space.high_ms)
+        peak = interpolated(excess.unsqueeze(-1), highest.unsqueeze(-1))[..., 0, 0]
+        least_mv = (MIN_EXCESS_OF_BASELINE * self.baselines_mv()).clamp_min(MIN_EXCESS_MV)
+        enough = peak * response.log_floor.exp() >= least_mv
+        share = (excess / peak.clamp_min(1e-12).unsqueeze(-1)).contiguous()
+        right = torch.searchsorted(share, torch.full_like(share[..., :1], EDGE_LEVEL)).clamp(1, LEVELS - 1)
+        low, high = share.gather(-1, right - 1), share.gather(-1, right)
+        position = (right - 1 + (EDGE_LEVEL - low) / (high - low).clamp_min(1e-12)).squeeze(-1) / (LEVELS - 1)
+        return torch.where(enough & self.person.present, position.square(), 2.0)
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows as 0 or 1, shape (b, s, t)."""
+        level = levels(self.person, isi_ms.unsqueeze(0))
+        return (level >= self.edge_level.unsqueeze(-1)).to(level.dtype)
+
+    def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
+        """Expected MEP [mV], shape (b, s, t)."""
+        evoked = interpolated(self._evoked.unsqueeze(-1), levels(self.person, isi_ms.unsqueeze(0)))
+        return self._with_floor_mv(evoked.squeeze(-1))
+
+    def baselines_mv(self) -> Tensor:
+        """Expected MEP without a tap [mV], shape (b, s)."""
+        return self._with_floor_mv(self._evoked[..., :1]).squeeze(-1)
+
+    def _with_floor_mv(self, evoked: Tensor) -> Tensor:
+        """From an expected MEP above the floor, in floors, to mV, shape (b, s, ...)."""
+        response = self.person.response
+        rest = torch.exp(0.5 * response.floor_log_sd.square()).unsqueeze(-1)
+        return response.log_floor.exp().unsqueeze(-1) * (evoked + rest)
+
+    @cached_property
+    def _outcome_table(self) -> Tensor:
+        """Probability of each outcome of the next trial at the tables' levels, shape (b, s, l, y)."""
+        response = self.person.response
+        gain = log_gain(response, torch.full_like(response.drift, self.order).unsqueeze(-1)).squeeze(-1)
+        response = response._replace(log_ratio=response.log_ratio + gain)
+        top = response.log_floor + torch.log1p(self._evoked.amax(-1))
+        low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
+        high = torch.quantile(top, 0.95, dim=-1) + 1.5
+        # Cells are narrow where MEPs are as small as the floor, which varies little.
+        ends = torch.linspace(0.0, 1.0, OUTCOMES + 1, device=low.device).pow(1.5)
+        middle, width = 0.5 * (ends[1:] + ends[:-1]), ends.diff()
+        log_mep = (low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)).unsqueeze(-2)
+        density = in_pieces(
+            lambda r, grid: outcome_density(r, self._levels, grid), response, (log_mep,), LEVELS * OUTCOMES * NODES
+        )
+        mass = density * width
+        return mass / mass.sum(-1, keepdim=True)
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
+        return interpolated(self._outcome_table, levels(self.person, isi_ms.unsqueeze(0)))

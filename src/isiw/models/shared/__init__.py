@@ -1,0 +1,1 @@
+"""What families of models have in common; the families do not know each other."""

@@ -1,0 +1,135 @@
+"""The trials told so far: as intervals of the log MEP, or as amplitudes for models that learn from nothing else."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+
+from isiw.errors import StrategyError
+from isiw.models.protocol import Observation, Tensor
+from isiw.types import FloatArray
+
+__all__ = ["AmplitudeHistory", "History", "PersonTrials", "observed"]
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """The trials told so far; amplitudes are intervals of log mV, which are points where the amplitude is known.
+
+    Args:
+        isi_ms: realised ISIs [ms]; NaN is TMS alone, shape (b, n).
+        isi_sd_ms: their SDs [ms], shape (b, n).
+        log_mep: lower end of the log MEP, shape (b, n).
+        log_mep_high: upper end, shape (b, n).
+        order: how many trials came before each, shape (b, n).
+    """
+
+    isi_ms: Tensor
+    isi_sd_ms: Tensor
+    log_mep: Tensor
+    log_mep_high: Tensor
+    order: Tensor
+
+    @classmethod
+    def empty(cls, people: int, device: torch.device) -> History:
+        """No trials."""
+        return cls(*(torch.empty((people, 0), device=device) for _ in range(5)))
+
+    @property
+    def columns(self) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+        """All of it, in order."""
+        return self.isi_ms, self.isi_sd_ms, self.log_mep, self.log_mep_high, self.order
+
+    def to(self, device: torch.device | str, dtype: torch.dtype) -> History:
+        """The same on another device, or in another precision."""
+        return History(*(column.to(device, dtype) for column in self.columns))
+
+    def appended(self, trial: History) -> History:
+        """This history and one more trial."""
+        return History(*(torch.cat(pair, dim=-1) for pair in zip(self.columns, trial.columns, strict=True)))
+
+
+def observed(observation: Observation, detection_limit_mv: float, response_threshold_mv: float, order: int) -> History:
+    """One trial of each person as a history.
+
+    Args:
+        observation: the trial.
+        detection_limit_mv: what an amplitude of 0 is known to be below [mV].
+        response_threshold_mv: what a response is known to be above, and no response below [mV].
+        order: how many trials came before.
+    """
+    seen, silent = observation.response == 1, observation.response == 0
+    log_mep = torch.log(observation.mep_mv)
+    limit, threshold = math.log(detection_limit_mv), math.log(response_threshold_mv)
+    low = torch.where(seen, threshold, torch.where(silent, -torch.inf, log_mep))
+    high = torch.where(seen, torch.inf, torch.where(silent, threshold, log_mep))
+    high = torch.where(observation.mep_mv == 0, limit, high)
+    columns = (observation.isi_ms, observation.isi_sd_ms, low, high, torch.full_like(log_mep, order))
+    return History(*(x.unsqueeze(-1) for x in columns))
+
+
+@dataclass(frozen=True, eq=False)
+class PersonTrials:
+    """What was told of one person.
+
+    Args:
+        isi_ms: realised ISIs [ms], shape (n,).
+        mep_mv: their MEPs [mV], shape (n,).
+        baseline_mv: MEPs of TMS alone [mV], shape (m,).
+    """
+
+    isi_ms: FloatArray
+    mep_mv: FloatArray
+    baseline_mv: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class AmplitudeHistory:
+    """Trials of b people, in the order of telling.
+
+    Args:
+        isi_ms: realised ISIs [ms]; NaN is TMS alone, shape (b, n).
+        mep_mv: their MEPs [mV], shape (b, n).
+    """
+
+    isi_ms: FloatArray
+    mep_mv: FloatArray
+
+    @classmethod
+    def nothing(cls, people: int) -> AmplitudeHistory:
+        """No trials."""
+        return cls(np.empty((people, 0)), np.empty((people, 0)))
+
+    @property
+    def trials(self) -> int:
+        """How many trials of each person."""
+        return int(self.isi_ms.shape[1])
+
+    @property
+    def people(self) -> int:
+        """How many people."""
+        return int(self.isi_ms.shape[0])
+
+    def appended(self, observation: Observation) -> AmplitudeHistory:
+        """These and one more trial.
+
+        Raises:
+            StrategyError: a response without an amplitude, which a fit to amplitudes cannot learn from.
+        """
+        isi_ms, mep_mv = (x.detach().cpu().double().numpy()[:, None] for x in (observation.isi_ms, observation.mep_mv))
+        if np.isnan(mep_mv).any():
+            raise StrategyError(
+                "the model learns from amplitudes only",
+                got="a response without its amplitude",
+                remedy="Tell mep_mv, or choose a model with a likelihood for responses, as the default has.",
+            )
+        return replace(self, isi_ms=np.hstack((self.isi_ms, isi_ms)), mep_mv=np.hstack((self.mep_mv, mep_mv)))
+
+    def person(self, person: int) -> PersonTrials:
+        """What was told of one person."""
+        isi_ms, mep_mv = self.isi_ms[person], self.mep_mv[person]
+        alone = np.isnan(isi_ms)
+        return PersonTrials(isi_ms[~alone], mep_mv[~alone], mep_mv[alone])

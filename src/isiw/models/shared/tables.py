@@ -1,0 +1,43 @@
+"""Nodes and tables that several models compute with: of an uncertain ISI, and by facilitation."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+
+from isiw.models.protocol import Tensor
+
+__all__ = ["ISI_NODES", "LEVELS", "OUTCOMES", "interpolated", "table_levels"]
+
+ISI_NODES = ((-math.sqrt(3.0), 1 / 6), (0.0, 2 / 3), (math.sqrt(3.0), 1 / 6))
+"""Gauss–Hermite nodes [SD] and weights of an ISI that is known with an SD only."""
+
+LEVELS = 24
+"""Facilitations at which responses are worked out; what lies between is interpolated."""
+
+OUTCOMES = 24
+"""Cells of the log MEP in which predictive distributions live."""
+
+
+def table_levels(device: torch.device) -> Tensor:
+    """Facilitations at which tables are worked out, denser where responses begin, shape (l,)."""
+    return torch.linspace(0.0, 1.0, LEVELS, device=device).square()
+
+
+def interpolated(table: Tensor, level: Tensor) -> Tensor:
+    """What lies between the rows of a table.
+
+    Args:
+        table: a row for each of `table_levels`, shape (b, s, l, y).
+        level: facilitations, shape (b, s, t).
+
+    Returns:
+        Shape (b, s, t, y).
+    """
+    position = level.clamp(0.0, 1.0).sqrt() * (LEVELS - 1)
+    below = position.floor().clamp_max(LEVELS - 2)
+    first = LEVELS * torch.arange(table.shape[0] * table.shape[1], device=level.device).view(*table.shape[:2], 1)
+    rows, row = table.reshape(-1, table.shape[-1]), (first + below.long()).flatten()
+    between = torch.lerp(rows[row], rows[row + 1], (position - below).view(-1, 1))
+    return between.view(*level.shape, -1)

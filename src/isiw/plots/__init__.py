@@ -1,0 +1,14 @@
+"""Pictures: of a session, of a study, and of the timing of taps. They draw, and compute nothing anew."""
+
+from isiw.plots.session import save_session_plot, session_figure
+from isiw.plots.study import save_study_plot, study_figure
+from isiw.plots.timing import save_timing_plot, timing_figure
+
+__all__ = [
+    "save_session_plot",
+    "save_study_plot",
+    "save_timing_plot",
+    "session_figure",
+    "study_figure",
+    "timing_figure",
+]

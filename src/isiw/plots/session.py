@@ -1,0 +1,158 @@
+"""The picture of a session: the profile with its band, the trials, the window with its intervals, and how they came.
+
+Everything is drawn with matplotlib's object interface, so no display is needed and no global state is touched.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import Estimate
+from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, RED, save_figure, tidied
+from isiw.trials import Trial
+from isiw.types import FloatArray
+from isiw.window import Window
+
+__all__ = ["save_session_plot", "session_figure"]
+
+SMALLEST_UV = 1.0
+_AXIS_NAME = {"impact": "ISI after the impact [ms]", "valve": "ISI after the valve command [ms]"}
+
+
+def save_session_plot(record: SessionRecord, path: str | Path, *, truth: Window | None = None) -> Path:
+    """Draw a session into a file; its suffix chooses the format.
+
+    Args:
+        record: the session.
+        path: where to, such as `session.png` or `session.pdf`.
+        truth: the true window, where the person is simulated.
+
+    Raises:
+        InvalidValueError: a format that matplotlib does not know.
+    """
+    return save_figure(session_figure(record, truth=truth), path)
+
+
+def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Figure:
+    """A session as a figure.
+
+    Args:
+        record: the session.
+        truth: the true window, where the person is simulated.
+    """
+    figure = Figure(figsize=(7.2, 6.4), layout="constrained")
+    profile, edges, chance = figure.subplots(3, 1, height_ratios=(3.2, 1.5, 0.9))
+    tidied(profile, edges, chance)
+    edges.sharex(chance)
+    edges.tick_params(labelbottom=False)
+    last = record.estimates[-1] if record.estimates else None
+    _draw_window(profile, last, truth)
+    _draw_profile(profile, last)
+    _draw_trials(profile, record)
+    _finish_profile(profile, record)
+    _draw_edges(edges, record, truth)
+    _draw_probability(chance, record.estimates)
+    figure.align_ylabels((profile, edges, chance))
+    return figure
+
+
+def _draw_window(axes: Axes, estimate: Estimate | None, truth: Window | None) -> None:
+    segments = estimate.window.segments if estimate and estimate.window else ()
+    for number, (start, end) in enumerate(segments):
+        axes.axvspan(start, end, color=BLUE, alpha=0.10, lw=0, label="window" if number == 0 else None)
+    if estimate and segments:
+        space = (min(estimate.grid_ms, default=segments[0][0]), max(estimate.grid_ms, default=segments[-1][1]))
+        pairs = ((estimate.start_low_ms, estimate.start_high_ms), (estimate.end_low_ms, estimate.end_high_ms))
+        for number, pair in enumerate(pairs):
+            if None not in pair:
+                low, high = np.clip(np.asarray(pair, dtype=np.float64), *space)
+                label = "90 % interval of its edges" if number == 0 else None
+                axes.plot((low, high), (1.0, 1.0), color=BLUE, lw=5, alpha=0.8, solid_capstyle="butt",
+                          transform=axes.get_xaxis_transform(), clip_on=False, label=label)  # fmt: skip
+    for number, edge in enumerate(itertools.chain(*(truth.segments if truth else ()))):
+        axes.axvline(edge, color=INK, lw=1, ls=(0, (4, 3)), label="true window (simulated)" if number == 0 else None)
+
+
+def _draw_profile(axes: Axes, estimate: Estimate | None) -> None:
+    if estimate is None or not estimate.grid_ms:
+        return
+    low, high = (_uv(band) for band in (estimate.band_low_mv, estimate.band_high_mv))
+    axes.fill_between(estimate.grid_ms, low, high, color=BLUE, alpha=0.22, lw=0, label="90 % band")
+    axes.plot(estimate.grid_ms, _uv(estimate.profile_mv), color=BLUE, lw=1.8, label="expected MEP")
+
+
+def _draw_trials(axes: Axes, record: SessionRecord) -> None:
+    told = [trial for trial in record.table if trial.told]
+    excluded = [trial for trial in record.table if trial.excluded]
+    mistrials = [trial for trial in record.table if trial.reason is not None]
+    axes.plot(*_points(told), "o", ms=4.5, color=INK, mec="white", mew=0.5, label="trial", zorder=3)
+    if excluded:
+        axes.plot(*_points(excluded), "o", ms=4.5, mfc="none", mec=FAINT, label="excluded", zorder=3)
+    if mistrials:
+        isis = [trial.commanded_isi_ms for trial in mistrials if trial.commanded_isi_ms is not None]
+        axes.plot(isis, [0.02] * len(isis), "x", ms=5, color=RED, transform=axes.get_xaxis_transform(),
+                  label="mistrial", zorder=3)  # fmt: skip
+
+
+def _finish_profile(axes: Axes, record: SessionRecord) -> None:
+    space, window = record.header.space, record.estimates[-1].window if record.estimates else None
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlim(space.low_ms, space.high_ms)
+    axes.set_xlabel(_AXIS_NAME[space.reference], fontsize=9)
+    axes.set_ylabel("MEP [µV]", fontsize=9)
+    found = "No window" if window is None else f"Window {window}"
+    axes.set_title(f"{found} after {len(record.table)} trials", fontsize=11, loc="left", color=INK, pad=12)
+    axes.legend(fontsize=7.5, frameon=False, loc="best", handlelength=1.6)
+
+
+def _draw_edges(axes: Axes, record: SessionRecord, truth: Window | None) -> None:
+    estimates, space = record.estimates, record.header.space
+    trials = [estimate.trial + 1 for estimate in estimates]
+    for name, colour in (("start", GREEN), ("end", ORANGE)):
+        low, middle, high = (
+            np.clip(_column(estimates, f"{name}_{part}ms"), space.low_ms, space.high_ms)
+            for part in ("low_", "", "high_")
+        )
+        axes.fill_between(trials, low, high, color=colour, alpha=0.22, lw=0)
+        axes.plot(trials, middle, color=colour, lw=1.6, label=name)
+    for edge in (truth.start_ms, truth.end_ms) if truth else ():
+        axes.axhline(edge, color=INK, lw=0.8, ls=(0, (4, 3)))
+    axes.set_ylim(space.low_ms, space.high_ms)
+    axes.set_ylabel("edges [ms]", fontsize=9)
+    axes.legend(fontsize=7.5, frameon=False, ncols=2, loc="upper right")
+
+
+def _draw_probability(axes: Axes, estimates: Sequence[Estimate]) -> None:
+    axes.axhline(0.5, color=FAINT, lw=0.8, ls=":")
+    axes.plot([e.trial + 1 for e in estimates], _column(estimates, "probability"), color=INK, lw=1.6)
+    axes.set_xlim(left=0)
+    axes.set_ylim(0, 1.03)
+    axes.set_yticks((0, 0.5, 1))
+    axes.set_ylabel("P(window)", fontsize=9)
+    axes.set_xlabel("trial", fontsize=9)
+
+
+def _column(estimates: Sequence[Estimate], name: str) -> FloatArray:
+    """One figure by trial; NaN where a method does not have it."""
+    return np.asarray([np.nan if (v := getattr(e, name)) is None else v for e in estimates], dtype=np.float64)
+
+
+def _points(trials: Sequence[Trial]) -> tuple[list[float], FloatArray]:
+    placed = [t for t in trials if t.isi_ms is not None and t.mep_mv is not None]
+    return [t.isi_ms or 0.0 for t in placed], _uv([t.mep_mv or 0.0 for t in placed])
+
+
+def _uv(amplitude_mv: Sequence[float]) -> FloatArray:
+    """Amplitudes for the logarithmic axis [µV], shape as given; what is below the smallest is drawn there."""
+    return np.maximum(1e3 * np.asarray(amplitude_mv, dtype=np.float64), SMALLEST_UV)

@@ -1,0 +1,86 @@
+"""The pictures of a repeatability study: when the events come, and how far the ISIs are off."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, RED, save_figure, tidied
+
+if TYPE_CHECKING:
+    from isiw.repeatability import TimingStudy
+
+__all__ = ["save_timing_plot", "timing_figure"]
+
+_COLOURS = {"fill": FAINT, "descent": GREEN, "hit": BLUE, "away": ORANGE, "memg": RED}
+_NAMES = {
+    "fill": "chamber fills",
+    "descent": "descent",
+    "hit": "hit",
+    "away": "rebound",
+    "memg": "artefact in the EMG",
+}
+
+
+def save_timing_plot(study: TimingStudy, path: str | Path) -> Path:
+    """Draw a study into a file; its suffix chooses the format.
+
+    Args:
+        study: the study.
+        path: where to, such as `timing.png` or `timing.pdf`.
+
+    Raises:
+        InvalidValueError: a format that matplotlib does not know.
+    """
+    return save_figure(timing_figure(study), path)
+
+
+def timing_figure(study: TimingStudy) -> Figure:
+    """A study as a figure: its events, and below them the ISI errors where ISIs were commanded."""
+    errors = study.error_table
+    figure = Figure(figsize=(7.2, 5.2 if len(errors) else 2.8), layout="constrained")
+    panels = figure.subplots(2 if len(errors) else 1, 1, squeeze=False)[:, 0]
+    tidied(*panels)
+    _draw_events(panels[0], study)
+    if len(errors):
+        _draw_errors(panels[1], study)
+    return figure
+
+
+def _draw_events(axes: Axes, study: TimingStudy) -> None:
+    table = study.event_table
+    for name, times in study.events.columns().items():
+        if name in table.index:
+            mean, sd = table.loc[name, ["mean_ms", "sd_ms"]]
+            label = f"{_NAMES[name]}  {mean:.0f} ± {sd:.1f} ms"
+            bins = np.arange(np.floor(np.nanmin(times)), np.ceil(np.nanmax(times)) + 1).tolist()
+            axes.hist(times[~np.isnan(times)], bins=bins, color=_COLOURS[name], alpha=0.8, label=label)
+    axes.set_yscale("log")
+    axes.set_xlabel("time in the trial [ms]; valve command at 500", fontsize=9)
+    axes.set_ylabel("taps per ms", fontsize=9)
+    axes.set_title(f"{study.name}: {len(study.commanded_ms)} taps", fontsize=11, loc="left", color=INK)
+    axes.legend(fontsize=7.5, frameon=False, loc="upper left", bbox_to_anchor=(0.1, 1.0))
+
+
+def _draw_errors(axes: Axes, study: TimingStudy) -> None:
+    table = study.error_table
+    place = np.arange(len(table))
+    order = np.searchsorted(table.index.to_numpy(), study.commanded_ms)
+    accepted = study.realised_ms >= 0
+    beside = order + 0.3 * np.linspace(-1, 1, 17)[np.arange(len(order)) % 17]  # so that trials do not hide each other
+    errors = study.realised_ms - study.commanded_ms
+    axes.axhline(0, color=FAINT, lw=0.8, ls=":")
+    axes.plot(beside[accepted], errors[accepted], ".", ms=3, color=FAINT, alpha=0.5)
+    if study.mistrials:
+        axes.plot(beside[~accepted], errors[~accepted], "x", ms=5, color=RED, label="mistrial")
+    axes.errorbar(place, table["mean_ms"], table["sd_ms"], fmt="o", ms=4, color=BLUE, capsize=3, label="mean ± SD")
+    axes.set_xticks(place, [f"{isi:g}" for isi in table.index])
+    axes.set_xlabel("commanded ISI [ms]", fontsize=9)
+    axes.set_ylabel("ISI error [ms]", fontsize=9)
+    found = f"pooled SD {study.pooled_sd_ms:.2f} ms, mistrials: {study.mistrials} of {len(errors)}"
+    axes.set_title(found, fontsize=9, loc="left", color=INK)
+    axes.legend(fontsize=7.5, frameon=False)

@@ -1,0 +1,19 @@
+"""A session told to people."""
+
+from isiw.report.words import (
+    PROGRESS_HEADINGS,
+    TRIAL_HEADINGS,
+    final_statement,
+    progress_row,
+    trial_rows,
+    truth_sentence,
+)
+
+__all__ = [
+    "PROGRESS_HEADINGS",
+    "TRIAL_HEADINGS",
+    "final_statement",
+    "progress_row",
+    "trial_rows",
+    "truth_sentence",
+]

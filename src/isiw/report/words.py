@@ -1,0 +1,157 @@
+"""A session in plain words."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+from isiw.design import DesignSpace
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import Estimate, Event
+from isiw.metrics import f1
+from isiw.session.loop import SessionUpdate
+from isiw.trials import Trial
+from isiw.window import Interval, Window
+
+__all__ = ["PROGRESS_HEADINGS", "TRIAL_HEADINGS", "final_statement", "progress_row", "trial_rows", "truth_sentence"]
+
+PROGRESS_HEADINGS = ("trial", "ISI", "MEP", "P(window)", "window", "start", "end", "left")
+"""What `progress_row` holds; start and end are 90 % intervals, left is what the budget still allows."""
+
+TRIAL_HEADINGS = ("trial", "asked", "outcome", "realised")
+"""What `trial_rows` hold."""
+
+WORTH_SAYING = 0.1
+"""Probability from which on an unusual window is mentioned."""
+
+_AFTER = {"impact": "after the impact", "valve": "after the valve command"}
+
+
+def final_statement(record: SessionRecord) -> str:
+    """What a session found, in a few sentences.
+
+    Args:
+        record: the session.
+    """
+    if not record.estimates:
+        return "No trial has been completed."
+    last = record.estimates[-1]
+    sentences = [_finding(last, record.header.space), _edges(last, record.header.space), _counts(record), last.reason]
+    if not last.stop:
+        sentences.append(f"The session is not over; go on with: isiw resume {record.path}")
+    if _excluded_since(record):
+        sentences.append("Trials were excluded after this estimate; resume the session to have it without them.")
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _finding(estimate: Estimate, space: DesignSpace) -> str:
+    window, probability = estimate.window, estimate.probability
+    chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
+    if window is None:
+        return f"No window was found{chance}."
+    return f"The tap enhances the MEP at ISIs of {window} {_AFTER[space.reference]}{chance}."
+
+
+def _edges(estimate: Estimate, space: DesignSpace) -> str:
+    low, high = (estimate.start_low_ms, estimate.start_high_ms), (estimate.end_low_ms, estimate.end_high_ms)
+    if estimate.window is None or None in low or None in high:
+        return ""
+    edges = f"With 90 % probability each, it starts {_between(low, space)} and ends {_between(high, space)}."
+    unusual = {
+        "starts before the range": estimate.start_beyond,
+        "ends beyond the range": estimate.end_beyond,
+        "has more than one segment": estimate.split,
+    }
+    said = [f"it {what} with probability {p:.2f}" for what, p in unusual.items() if p is not None and p >= WORTH_SAYING]
+    return f"{edges} Given a window, {', '.join(said)}." if said else edges
+
+
+def _between(interval: tuple[float | None, float | None], space: DesignSpace) -> str:
+    low, high = (math.nan if edge is None else edge for edge in interval)
+    if math.isinf(low) and math.isinf(high):
+        return f"before {space.low_ms:g} ms" if low < 0 else f"after {space.high_ms:g} ms"
+    if math.isinf(low):
+        return f"before {high:.0f} ms"
+    if math.isinf(high):
+        return f"after {low:.0f} ms"
+    return f"between {low:.0f} and {high:.0f} ms"
+
+
+def _counts(record: SessionRecord) -> str:
+    mistrials = Counter(str(trial.reason) for trial in record.table if trial.reason is not None)
+    excluded = sum(trial.excluded for trial in record.table)
+    unknown = len(record.unknown)
+    if unknown:
+        mistrials["outcome unknown"] += unknown
+    told, given = len(record.table.told), len(record.table) + unknown
+    parts = [f"{given} pairs of stimuli were given; {told} count"]
+    if mistrials:
+        parts.append("mistrials: " + ", ".join(f"{count} {reason}" for reason, count in mistrials.items()))
+    if excluded:
+        parts.append(f"{excluded} excluded")
+    return "; ".join(parts) + "."
+
+
+def _excluded_since(record: SessionRecord) -> bool:
+    since = record.history[record.history.index(record.estimates[-1]) :]
+    return any(isinstance(entry, Event) and entry.kind == "exclusion" for entry in since)
+
+
+def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
+    """How near the reported window is to a simulated person's true one.
+
+    Args:
+        record: the session.
+        truth: the true window; None where there is none.
+    """
+    found = record.estimates[-1].window if record.estimates else None
+    share = f1(found, truth, record.header.space)
+    true = "has no window" if truth is None else f"has the window {truth}"
+    return f"In truth this simulated person {true}; the F1 of the reported one is {share:.2f}."
+
+
+def progress_row(update: SessionUpdate) -> tuple[str, ...]:
+    """One trial in words and figures, as in `PROGRESS_HEADINGS`.
+
+    Args:
+        update: what is known after the trial.
+    """
+    estimate = update.estimate
+    start, end = estimate.interval(0.9) or (None, None)
+    return (
+        str(update.trial.index),
+        _isi(update.trial.commanded_isi_ms),
+        _outcome(update.trial),
+        "" if estimate.probability is None else f"{estimate.probability:.2f}",
+        "none" if estimate.window is None else str(estimate.window),
+        _short(start),
+        _short(end),
+        str(update.stimuli_left),
+    )
+
+
+def trial_rows(record: SessionRecord) -> list[tuple[str, ...]]:
+    """All trials, as in `TRIAL_HEADINGS`.
+
+    Args:
+        record: the session.
+    """
+    return [(str(t.index), _isi(t.commanded_isi_ms), _outcome(t), _isi(t.isi_ms)) for t in record.table]
+
+
+def _isi(isi_ms: float | None) -> str:
+    return "–" if isi_ms is None else f"{isi_ms:.4g} ms"
+
+
+def _outcome(trial: Trial) -> str:
+    if trial.reason is not None:
+        return f"mistrial: {trial.reason}"
+    text = f"{1e3 * (trial.mep_mv or 0.0):.0f} µV"
+    return f"{text} (excluded)" if trial.excluded else text
+
+
+def _short(interval: Interval | None) -> str:
+    if interval is None:
+        return ""
+    low, high = interval
+    return f"{'<' if math.isinf(low) else f'{low:.0f}'}–{'>' if math.isinf(high) else f'{high:.0f}'}"

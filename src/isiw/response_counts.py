@@ -1,0 +1,122 @@
+"""The effective window from response counts: the dissertation's earlier, threshold-dependent definition (3.3.4).
+
+A trial responds when its MEP exceeds a threshold, and an ISI is effective when more than 40 % of its trials respond.
+Chapter 4 gives this up for amplitudes, because the window depends on the threshold (4.1.1); it is here to compare.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import pandas as pd
+
+from isiw.errors import InvalidValueError
+from isiw.subjects.profiles import PeakProfile
+from isiw.subjects.responses import EmgFloor, RecruitmentResponse
+from isiw.subjects.subject import SimulatedSubject
+from isiw.types import ArrayLike
+from isiw.window import Window
+
+__all__ = ["EFFECTIVE_SHARE", "STIMULATION", "CountStudy", "effective_window", "response_counts", "study_counts"]
+
+EFFECTIVE_SHARE = 0.40
+"""An ISI is effective when more than this share of its trials respond (3.3.4)."""
+
+_FLOOR = EmgFloor(0.008, 0.2)
+
+
+def _person(start_ms: float, width_ms: float) -> SimulatedSubject:
+    response = RecruitmentResponse(
+        _FLOOR,
+        amplitude_mv=0.16,
+        slope_per_pct=0.30,
+        x50_pct_rmt=104.0,
+        boost_pct_rmt=14.0,
+        sigma_x_pct_rmt=7.0,
+        sigma_y=0.4,
+    )
+    return SimulatedSubject(PeakProfile(start_ms, width_ms), response, hit_delay_ms=180.0, hit_delay_sd_ms=0.0)
+
+
+STIMULATION: Mapping[str, SimulatedSubject] = MappingProxyType(
+    # An electric shock excites all afferents at once; a tap's spindles fire one after the other (3.3.4).
+    {"electrical": _person(10.0, 30.0), "mechanical": _person(20.0, 78.0)}
+)
+"""One person with both kinds of peripheral stimulation, as in Fig. 3.12: about 20 ms effective against about 50 ms."""
+
+
+@dataclass(frozen=True, eq=False)
+class CountStudy:
+    """A sweep over ISIs, counted.
+
+    Args:
+        counts: as `response_counts` returns it.
+        window: the effective ISIs; None where there are none.
+    """
+
+    counts: pd.DataFrame
+    window: Window | None
+
+
+def response_counts(isi_ms: ArrayLike, mep_mv: ArrayLike, threshold_mv: float) -> pd.DataFrame:
+    """How many trials respond at each ISI.
+
+    Args:
+        isi_ms: ISI of each trial [ms], shape (n,).
+        mep_mv: its MEP [mV], shape (n,).
+        threshold_mv: a larger MEP is a response [mV].
+
+    Returns:
+        A row an ISI, ascending; columns trials, responses, share.
+
+    Raises:
+        InvalidValueError: shapes that differ, values that are not finite, or a threshold that is not positive.
+    """
+    isi, mep = np.asarray(isi_ms, dtype=np.float64), np.asarray(mep_mv, dtype=np.float64)
+    if isi.shape != mep.shape or isi.ndim != 1:
+        raise InvalidValueError("each trial has one ISI and one MEP", got=(isi.shape, mep.shape))
+    if not (np.isfinite(isi).all() and np.isfinite(mep).all()):
+        raise InvalidValueError("ISIs and MEPs must be finite", remedy="Leave mistrials out.")
+    if not 0 < threshold_mv < np.inf:
+        raise InvalidValueError("the response threshold must be positive", got=threshold_mv)
+    trials = pd.DataFrame({"isi_ms": isi, "response": mep > threshold_mv})
+    table = trials.groupby("isi_ms").agg(trials=("response", "count"), responses=("response", "sum"))
+    table["share"] = table["responses"] / table["trials"]
+    return table
+
+
+def effective_window(counts: pd.DataFrame, share: float = EFFECTIVE_SHARE) -> Window | None:
+    """The ISIs at which more than a share of the trials respond; None where there are none.
+
+    Args:
+        counts: as `response_counts` returns it.
+        share: the share that must be exceeded, in 0–1.
+    """
+    return Window.from_mask(counts.index.to_numpy(), counts["share"].to_numpy() > share)
+
+
+def study_counts(
+    subject: SimulatedSubject,
+    isi_ms: ArrayLike,
+    *,
+    trials: int = 12,
+    threshold_mv: float = 0.03,
+    seed: int = 0,
+) -> CountStudy:
+    """Sweep a simulated person over ISIs and count.
+
+    Args:
+        subject: the person; `STIMULATION` has the two of Fig. 3.12.
+        isi_ms: ISIs from the impact or the shock [ms], shape (t,).
+        trials: how many for each ISI.
+        threshold_mv: a larger MEP is a response [mV].
+        seed: of the trial noise.
+    """
+    person = subject.begin(seed)
+    isi = np.repeat(np.asarray(isi_ms, dtype=np.float64), trials)
+    mep = [person.respond(each, "impact").mep_mv for each in isi.tolist()]
+    counts = response_counts(isi, mep, threshold_mv)
+    return CountStudy(counts, effective_window(counts))

@@ -1,0 +1,6 @@
+"""A session: the closed loop from the first ask to the decision, and going on with one from its log."""
+
+from isiw.session.loop import Session, SessionResult, SessionUpdate
+from isiw.session.resume import exclude, resume
+
+__all__ = ["Session", "SessionResult", "SessionUpdate", "exclude", "resume"]

@@ -1,0 +1,218 @@
+"""Going on with a session from its log: the strategy is made again, and the loop continues where it stood."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from isiw.devices.clock import Clock
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import Device, HasMemory
+from isiw.errors import DeviceError, InvalidValueError, StrategyError
+from isiw.log.reader import SessionRecord, read_salvaged
+from isiw.log.salvage import salvage
+from isiw.log.schema import Event, Header, Intent
+from isiw.log.writer import LogWriter
+from isiw.session.loop import Session, SessionUpdate, learn
+from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.strategy import Strategy
+from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
+
+__all__ = ["Replayed", "exclude", "replay", "resume"]
+
+
+def resume(  # noqa: PLR0913 - all but three are keyword-only
+    path: str | Path,
+    device: Device,
+    strategy: Strategy | None = None,
+    *,
+    limits: Limits | None = None,
+    clock: Clock | None = None,
+    on_trial: Callable[[SessionUpdate], None] | None = None,
+    timeout_s: float | None = None,
+    ask_deadline_s: float | None = None,
+    verify: bool = True,
+) -> Session:
+    """A session that goes on where a log ends. Nothing is delivered or written before its `run`.
+
+    Stimuli whose outcome is not in the log become mistrials "outcome unknown": they count against every limit. What the
+    session goes on with is logged as a further header, and holds when it is resumed again.
+
+    Args:
+        path: the log, with or without `.part`; finished, torn or damaged.
+        device: the device to go on with; one with a memory is brought to where the logged stimuli left it.
+        strategy: needed where the session's strategy was built from a user's own objects: the same again.
+        limits: other limits than those that were logged last.
+        clock: as for `Session`.
+        on_trial: as for `Session`.
+        timeout_s: another time for one delivery than the logged one [s].
+        ask_deadline_s: another time for one ask than the logged one [s].
+        verify: whether the strategy must ask again what the log says it asked. With other versions or on another
+            machine it may not; without verification the logged trials are told as they are.
+
+    Raises:
+        LogError: no such log, or one of which not even the header can be read.
+        StrategyError: the strategy cannot be made again, or asks something else.
+        DeviceError: a simulated device for a session with a real one, or the other way round.
+    """
+    salvaged = salvage(path)
+    record = read_salvaged(salvaged)
+    header = record.header
+    _require_as_real(device, header)
+    replayed = replay(record, strategy.restarted() if strategy else _strategy_of(header), verify=verify)
+    if isinstance(device, HasMemory):
+        device.resume_after([Stimulus(trial.index, trial.commanded_isi_ms) for trial in replayed.trials])
+    session = Session(
+        device,
+        replayed.strategy,
+        log=path,
+        limits=limits or header.limits,
+        clock=clock,
+        on_trial=on_trial,
+        subject=header.subject,
+        signals=header.signals,
+        config=header.config,
+        timeout_s=header.timeout_s if timeout_s is None else timeout_s,
+        ask_deadline_s=header.ask_deadline_s if ask_deadline_s is None else ask_deadline_s,
+    )
+    last = len(replayed.trials) - 1 if replayed.trials else None
+    event = Event(kind="resume", trial=last, text=_resumption_text(record, replayed))
+
+    def open_log(as_resumed: Header) -> LogWriter:
+        as_resumed = as_resumed.model_copy(update={"created": header.created})
+        return LogWriter.continuing(path, salvaged, header, as_resumed)
+
+    session.continue_from(replayed.trials, open_log, (*replayed.unknown, event))
+    return session
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A strategy that has learned a log.
+
+    Args:
+        strategy: the strategy.
+        trials: all trials, those with unknown outcome included.
+        unknown: the trials whose outcome is not in the log.
+    """
+
+    strategy: Strategy
+    trials: TrialTable
+    unknown: tuple[Trial, ...]
+
+
+def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) -> Replayed:
+    """Tell a strategy everything that a log holds, in the order in which it was told then.
+
+    A trial that was excluded counts from its exclusion on; asks before it are compared as they were made.
+
+    Args:
+        record: the log.
+        strategy: the session's strategy before its first trial.
+        verify: whether to compare what the strategy asks with what it asked then.
+
+    Raises:
+        StrategyError: it asks something else.
+    """
+    told: list[Trial] = []
+    by_fallback = {event.trial for event in record.events if event.kind == "fallback"}
+    for entry in record.history:
+        if isinstance(entry, Intent):
+            # Behind a lost trial the strategy knew more than the log does.
+            comparable = entry.trial == len(told) and entry.trial not in by_fallback
+            if verify and comparable:
+                _verify(strategy, entry, record.header)
+        elif isinstance(entry, Trial):
+            learn(strategy, entry)
+            told.append(entry)
+        elif isinstance(entry, Event) and entry.kind == "exclusion" and entry.trial is not None:
+            # In the order of telling, in which a trial that was lost stands behind later ones.
+            told = [dataclasses.replace(t, excluded=True) if t.index == entry.trial else t for t in told]
+            strategy = strategy.restarted()
+            for trial in told:
+                learn(strategy, trial)
+    unknown = tuple(
+        Trial(intent.trial, Status.MISTRIAL, intent.isi_ms, MistrialReason.OUTCOME_UNKNOWN) for intent in record.unknown
+    )
+    for trial in unknown:
+        learn(strategy, trial)
+    table = TrialTable(tuple(sorted((*told, *unknown), key=lambda trial: trial.index)))
+    return Replayed(strategy, table, unknown)
+
+
+def exclude(path: str | Path, trial: int, reason: str) -> None:
+    """Exclude a trial afterwards: an event is appended to the log, nothing is erased. Resuming learns without it.
+
+    Args:
+        path: the log, with or without `.part`.
+        trial: the trial's number.
+        reason: why, for whoever reads the log.
+
+    Raises:
+        LogError: no such log, or it is still being written.
+        InvalidValueError: no such trial, or one that counts for nothing anyway.
+    """
+    salvaged = salvage(path)
+    record = read_salvaged(salvaged)
+    if trial not in {candidate.index for candidate in record.table.told}:
+        raise InvalidValueError(
+            "there is no such trial to exclude",
+            got=trial,
+            expected="the number of an accepted trial that is not excluded yet",
+            remedy=f"List them: isiw show {path}",
+        )
+    with LogWriter.continuing(path, salvaged, record.header) as log:
+        log.append(Event(kind="exclusion", trial=trial, text=reason))
+
+
+def _require_as_real(device: Device, header: Header) -> None:
+    """Raise where the session would go on without waiting or with answers from nobody, or a simulation on a person."""
+    info, was = device.describe(), header.device
+    if info.simulated and not was.simulated:
+        raise DeviceError(
+            "the session was run with a real device, and cannot go on with a simulated one",
+            got=info.name,
+            expected=f"a real one, as {was.name} was",
+            remedy="Describe the device with DeviceInfo(..., simulated=False), which makes the session wait between "
+            "trials in real time.",
+        )
+    if was.simulated and not info.simulated:
+        raise DeviceError(
+            "the session was run with a simulated device, and its limits and trials are no person's",
+            got=info.name,
+            expected=f"a simulated one, as {was.name} was",
+            remedy="Start a session of its own with the real device: isiw.Session(device, strategy, log=NEW_PATH).",
+        )
+
+
+def _strategy_of(header: Header) -> Strategy:
+    recipe = header.strategy
+    if not recipe.name:
+        raise StrategyError(
+            "the session's strategy was built from a user's own objects, which no log can hold",
+            remedy="Build the same strategy again and hand it over: isiw.resume(path, device, strategy).",
+        )
+    return make_strategy(recipe.name, space=header.space, seed=recipe.seed, **recipe.settings)
+
+
+def _verify(strategy: Strategy, intent: Intent, header: Header) -> None:
+    asked_ms = strategy.ask()
+    if asked_ms != intent.isi_ms:
+        versions = ", ".join(f"{name} {version}" for name, version in header.versions.items())
+        raise StrategyError(
+            f"the strategy does not ask again what was asked in trial {intent.trial}",
+            got=f"{asked_ms:g} ms",
+            expected=f"{intent.isi_ms} ms, as logged with isiw {header.isiw_version}, {versions}",
+            remedy="Resume with the same strategy, machine and versions, or without verification: the logged trials "
+            "are then told as they are.",
+        )
+
+
+def _resumption_text(record: SessionRecord, replayed: Replayed) -> str:
+    sentences = [f"Resumed after {len(replayed.trials)} trials."]
+    if replayed.unknown:
+        numbers = ", ".join(str(trial.index) for trial in replayed.unknown)
+        sentences.append(f"Outcome unknown: {numbers}.")
+    return " ".join((*sentences, *record.losses))

@@ -1,0 +1,8 @@
+from . import catalogue as catalogue
+from . import choosing as choosing
+from . import settings as settings
+from . import stopping as stopping
+from .catalogue import list_strategies as list_strategies
+from .catalogue import make_strategy as make_strategy
+from .strategy import Recipe as Recipe
+from .strategy import Strategy as Strategy

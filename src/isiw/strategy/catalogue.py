@@ -1,0 +1,145 @@
+"""The named strategies: documented, ready, and rebuilt from a log by name, seed and settings."""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, Final
+
+import numpy as np
+
+from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.errors import InvalidValueError, StrategyError
+from isiw.strategy.settings.common import Settings
+from isiw.strategy.strategy import Recipe, Strategy
+
+__all__ = ["list_strategies", "make_strategy", "settings_of"]
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A named strategy.
+
+    Args:
+        summary: what it does, in a sentence.
+        family: where in `isiw.strategy.settings` the class of its settings is; loaded, with the libraries that its model needs,
+            only when the strategy is made.
+        meant: the settings that the name stands for.
+    """
+
+    summary: str
+    family: str
+    meant: Mapping[str, Any] = field(default_factory=dict)
+
+
+_PARTICLES, _PARAMETRIC, _GP = "particles:ParticleSettings", "parametric:ParametricSettings", "gp:GPSettings"
+
+_CATALOGUE: Final[dict[str, _Entry]] = {
+    "default": _Entry(
+        "Particle posterior with input-side noise; asks for the window and for everything in turn.", _PARTICLES
+    ),
+    "particles-window": _Entry(
+        "Particle posterior; asks where the window's membership will be learnt best.",
+        _PARTICLES,
+        {"acquisition": "window-gain"},
+    ),
+    "particles-mi": _Entry(
+        "Particle posterior; asks for the largest mutual information with all unknowns.",
+        _PARTICLES,
+        {"acquisition": "mutual-information"},
+    ),
+    "even": _Entry(
+        "Particle posterior; evenly spaced ISIs, whatever the responses.", _PARTICLES, {"acquisition": "even"}
+    ),
+    "random": _Entry("Particle posterior; random ISIs, whatever the responses.", _PARTICLES, {"acquisition": "random"}),
+    "parametric-mi": _Entry(
+        "Gaussian window in Pyro; asks for the largest mutual information with all unknowns.",
+        _PARAMETRIC,
+        {"acquisition": "mutual-information"},
+    ),
+    "parametric-window": _Entry(
+        "Gaussian window in Pyro; asks where the window's membership will be learnt best.",
+        _PARAMETRIC,
+        {"acquisition": "window-gain"},
+    ),
+    "gp-straddle": _Entry("Gaussian process; asks where it is least clear on which side of an edge it is.", _GP),
+    "gp-variance": _Entry(
+        "Gaussian process; asks for the largest reduction of the profile's variance.",
+        _GP,
+        {"acquisition": "integrated-variance"},
+    ),
+    "gp-ei": _Entry(
+        "Gaussian process; seeks the best ISI only, by expected improvement.", _GP, {"acquisition": "log-ei"}
+    ),
+    "nr": _Entry("Dissertation: nonlinear regression of one Gaussian.", "dissertation:NRSettings"),
+    "nr2": _Entry(
+        "Dissertation: nonlinear regression of two Gaussians.",
+        "dissertation:NRSettings",
+        {"peaks": 2, "initial": 7, "segments": "all"},
+    ),
+    "svmr": _Entry("Dissertation: support vector regression.", "dissertation:SVMRSettings"),
+    "gpr": _Entry("Dissertation: Gaussian process regression of the amplitudes.", "dissertation:GPRSettings"),
+    "pf": _Entry(
+        "Dissertation: bootstrap particle filter over ISIs, a generation of particles at a time.",
+        "dissertation:PFSettings",
+    ),
+    "incremental": _Entry(
+        "Conventional search: twelve trials each 5 ms, until the window was passed.", "dissertation:SweepSettings"
+    ),
+}
+
+
+def list_strategies() -> dict[str, str]:
+    """The named strategies and what each does in a sentence."""
+    return {name: entry.summary for name, entry in _CATALOGUE.items()}
+
+
+def settings_of(name: str) -> tuple[type[Settings], Mapping[str, Any]]:
+    """What can be set about a named strategy: its settings class, and the settings that its name stands for.
+
+    Raises:
+        StrategyError: an unknown name.
+    """
+    if name not in _CATALOGUE:
+        raise StrategyError("unknown strategy", got=name, expected=", ".join(_CATALOGUE))
+    entry = _CATALOGUE[name]
+    return pkgutil.resolve_name(f"isiw.strategy.settings.{entry.family}"), entry.meant
+
+
+def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed: int = 0, **settings: Any) -> Strategy:
+    """Make a named strategy.
+
+    Args:
+        name: one of `list_strategies()`.
+        space: the ISIs that may be asked; by default what can be searched without an accelerometer.
+        seed: seed of all randomness, not negative.
+        **settings: fields of the strategy's settings class, in `isiw.strategy.settings`.
+
+    Raises:
+        StrategyError: an unknown name or setting, or an acquisition function that cannot work with the model.
+        InvalidValueError: a seed or a setting that cannot be.
+    """
+    family, meant = settings_of(name)
+    if seed < 0:
+        raise InvalidValueError("a seed must not be negative", got=seed)
+    known = [f.name for f in fields(family)]  # type: ignore[arg-type] # every family is a dataclass
+    unknown = sorted(set(settings) - set(known))
+    if unknown:
+        raise StrategyError(f"the strategy {name!r} has no such setting", got=unknown, expected=", ".join(known))
+    seed, settings = _plain(seed), {name: _plain(value) for name, value in settings.items()}
+    chosen = family(**{**meant, **settings})
+    return Strategy(
+        space,
+        chosen.model(),
+        chosen.acquisition_function(seed),
+        chosen.stopping(),
+        initial_ms=chosen.initial_ms(space),
+        seed=seed,
+        recipe=Recipe(name=name, seed=seed, settings=asdict(chosen)),  # type: ignore[call-overload]
+    )
+
+
+def _plain(value: Any) -> Any:
+    """A number of numpy's as Python's own, which a log can hold."""
+    return value.item() if isinstance(value, np.generic) else value

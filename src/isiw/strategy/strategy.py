@@ -1,0 +1,261 @@
+"""The strategy: model, acquisition function, and stopping rule, as one ask/tell object that changes over time."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, TypeVar
+
+import torch
+
+from isiw.acquisition.batch import greedy_batch, own_plan
+from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError, StrategyError
+from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel
+from isiw.strategy.choosing import Choice, Cost, best_choices, evenly_spaced, planned_choices, remembered
+from isiw.strategy.stopping import Progress, StopDecision, StoppingRule
+from isiw.window import WindowEstimate
+
+__all__ = ["Recipe", "Strategy"]
+
+_T = TypeVar("_T")
+
+
+def _fulfil(answer: Future[_T], choose: Callable[[], _T]) -> None:
+    try:
+        answer.set_result(choose())
+    except Exception as error:  # noqa: BLE001 - handed over to whoever waits for the answer
+        answer.set_exception(error)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a named strategy was made, so that a log can make it again.
+
+    Args:
+        name: its name in the catalogue; empty for a strategy built from a user's own objects.
+        seed: the seed of all its randomness.
+        settings: the settings it was made with, as TOML values.
+    """
+
+    name: str
+    seed: int
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Strategy:
+    """Proposes the next ISI and learns from each outcome. One of the two objects that change over time.
+
+    Args:
+        space: the ISIs that may be asked.
+        model: the model of the person's responses.
+        acquisition: the acquisition function that scores candidate ISIs.
+        stopping: the rule that says when to stop.
+        initial_ms: ISIs to ask for first [ms], whatever the responses; each becomes the nearest on the grid.
+        cost: what each of some ISIs [ms] (shape (t,)) costs, in the unit of the scores, shape (t,).
+        seed: seed of all randomness; the same seed and tells give the same asks.
+        recipe: how the catalogue made this strategy; None where it was built by hand.
+
+    Raises:
+        StrategyError: the model's posterior lacks a capability that the acquisition function needs.
+        InvalidValueError: an initial ISI that is no finite number.
+    """
+
+    def __init__(
+        self,
+        space: DesignSpace,
+        model: ResponseModel,
+        acquisition: AcquisitionFunction,
+        stopping: StoppingRule,
+        *,
+        initial_ms: Sequence[float] = (),
+        cost: Cost | None = None,
+        seed: int = 0,
+        recipe: Recipe | None = None,
+    ) -> None:
+        self.space, self.model, self.acquisition, self.stopping = space, model, acquisition, stopping
+        self.initial_ms = tuple(space.snap(isi_ms) for isi_ms in initial_ms)
+        self.recipe = recipe or Recipe(name="", seed=seed)
+        self.cost, self.seed = cost, seed
+        self._posterior: Posterior = model.prior(space, seed)
+        missing = [c.__name__ for c in acquisition.needs if not isinstance(self._posterior, c)]
+        if missing:
+            raise StrategyError(
+                f"{type(acquisition).__name__} cannot work with {type(model).__name__}",
+                got=f"a posterior without {', '.join(missing)}",
+                remedy="Choose another acquisition function, or a model whose posterior has the capability.",
+            )
+        self._told = 0
+        self._told_alone = 0
+        self._mistrials = 0
+        self._past: tuple[WindowEstimate, ...] = ()
+        self._choice: Choice | None = None
+        self._estimate: WindowEstimate | None = None
+        self._fallback_reason: str | None = None
+
+    def restarted(self) -> Strategy:
+        """The same strategy before its first trial."""
+        return Strategy(
+            self.space,
+            self.model,
+            self.acquisition,
+            self.stopping,
+            initial_ms=self.initial_ms,
+            cost=self.cost,
+            seed=self.seed,
+            recipe=self.recipe,
+        )
+
+    @property
+    def posterior(self) -> Posterior:
+        """What is believed after the trials told so far."""
+        return self._posterior
+
+    @property
+    def delivered(self) -> int:
+        """How many stimuli it knows of, mistrials among them."""
+        return self._told + self._mistrials
+
+    def ask(self, deadline_s: float | None = None) -> float:
+        """The next ISI [ms], on the grid; the same until the next `tell`.
+
+        Args:
+            deadline_s: answer within this time [s]: past it with an evenly spaced ISI, and a `fallback_reason`.
+                None and infinity are no deadline.
+
+        Raises:
+            InvalidValueError: a deadline that is negative or not a number.
+        """
+        if deadline_s is not None and not deadline_s >= 0:
+            raise InvalidValueError("deadline_s must be a time from 0 up", got=deadline_s)
+        if self._choice is None:
+            if planned := planned_choices(self._posterior, self.acquisition, self.space, self._initial_left):
+                self._choice = planned[0]
+            else:
+                self._choice = self._best(self._posterior) if deadline_s is None else self._best_within(deadline_s)
+            self._fallback_reason = self._fallback_reason or self._choice.fallback
+        return self._choice.isi_ms
+
+    def ask_batch(self, n: int) -> list[float]:
+        """The next n ISIs [ms], to be delivered before anything is told; the first is what `ask` answers.
+
+        Args:
+            n: how many.
+
+        Raises:
+            InvalidValueError: fewer than one.
+            StrategyError: the model cannot imagine trials, or does not plan so far ahead.
+        """
+        if n < 1:
+            raise InvalidValueError("a batch has at least one ISI", got=n)
+        chosen = (self._planned() or [self.ask()])[:n]
+        return greedy_batch(self._posterior, self.acquisition, chosen, n, self._next_of_batch)
+
+    def _next_of_batch(self, posterior: Posterior) -> float:
+        choice = self._best(posterior)
+        self._fallback_reason = self._fallback_reason or choice.fallback
+        return choice.isi_ms
+
+    @property
+    def _pairs(self) -> int:
+        """How many pairs of stimuli have been told."""
+        return self._told - self._told_alone
+
+    @property
+    def _initial_left(self) -> tuple[float, ...]:
+        """What is left of the initial ISIs [ms]."""
+        return self.initial_ms[self._pairs :]
+
+    def _planned(self) -> list[float]:
+        """What is left of the initial ISIs, and the plan of a method that has its own [ms]."""
+        return [*self._initial_left, *map(self.space.snap, own_plan(self._posterior, self.acquisition))]
+
+    @property
+    def fallback_reason(self) -> str | None:
+        """Why the current ISI, or one of the batch, is not the acquisition function's choice; None where all are."""
+        return self._fallback_reason
+
+    @property
+    def trouble(self) -> str | None:
+        """What went wrong with the last fit and what stands in for it; None where nothing did."""
+        return self._posterior.trouble if isinstance(self._posterior, ReportsTrouble) else None
+
+    def _best(self, posterior: Posterior) -> Choice:
+        return best_choices(posterior, self.acquisition, self.space, told=self._told, cost=self.cost)[0]
+
+    def _best_within(self, deadline_s: float) -> Choice:
+        answer: Future[Choice] = Future()
+        # A posterior never changes, so a late thread can go on with it and be forgotten.
+        threading.Thread(target=_fulfil, args=(answer, partial(self._best, self._posterior)), daemon=True).start()
+        try:
+            return answer.result(min(deadline_s, threading.TIMEOUT_MAX))
+        except TimeoutError:
+            reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
+            return Choice(evenly_spaced(self.space, self._told), reason)
+
+    def tell(
+        self,
+        isi_ms: float | None,
+        mep_mv: float | None = None,
+        *,
+        response: bool | None = None,
+        isi_sd_ms: float = 0.0,
+    ) -> None:
+        """Learn from one accepted trial.
+
+        Args:
+            isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone.
+            mep_mv: peak-to-peak amplitude [mV]; 0 is left-censored at the detection limit.
+            response: whether a response was seen, instead of an amplitude.
+            isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
+
+        Raises:
+            InvalidValueError: NaN, infinite or negative values, a response that is neither True nor False, or not
+                exactly one of `mep_mv` and `response`.
+            OutOfSpaceError: an ISI beyond the space and its tolerance.
+            StrategyError: a kind of outcome that the model cannot learn from.
+        """
+        if (mep_mv is None) == (response is None):
+            raise InvalidValueError("tell needs either mep_mv or response", got=(mep_mv, response))
+        if mep_mv is not None and not (math.isfinite(mep_mv) and mep_mv >= 0):
+            raise InvalidValueError(
+                "mep_mv must be a finite amplitude, not negative",
+                got=mep_mv,
+                remedy="Log a trial without a trustworthy amplitude as a mistrial instead of telling it.",
+            )
+        if response not in (None, False, True):
+            raise InvalidValueError("response must be True or False", got=response)
+        if not (math.isfinite(isi_sd_ms) and isi_sd_ms >= 0):
+            raise InvalidValueError("isi_sd_ms must be finite and not negative", got=isi_sd_ms)
+        isi = math.nan if isi_ms is None else self.space.check_realised(isi_ms)
+        observation = Observation(
+            isi_ms=torch.tensor([isi]),
+            mep_mv=torch.tensor([math.nan if mep_mv is None else mep_mv]),
+            isi_sd_ms=torch.tensor([isi_sd_ms]),
+            response=torch.tensor([math.nan if response is None else float(response)]),
+        )
+        self._posterior = self.model.update(self._posterior, observation)
+        self._told += 1
+        self._told_alone += isi_ms is None
+        self._choice = self._estimate = self._fallback_reason = None
+        if isi_ms is not None:
+            self._past = remembered(self._past, self.estimate, self.stopping, self._pairs - len(self.initial_ms))
+
+    def count_mistrial(self) -> None:
+        """Count a delivered stimulus whose outcome is not told: it uses up budget and changes nothing else."""
+        self._mistrials += 1
+
+    def estimate(self) -> WindowEstimate:
+        """What is believed about the window now."""
+        if self._estimate is None:
+            self._estimate = self._posterior.estimate()
+        return self._estimate
+
+    def decision(self) -> StopDecision:
+        """Whether to stop now, and why."""
+        return self.stopping(Progress(self.delivered, self._told, self.estimate(), past=self._past))

@@ -1,0 +1,24 @@
+"""Simulated people: the cohorts on which strategies are compared, and the truth about each person."""
+
+from isiw.subjects.cohorts import COHORTS, WIDTHS_KIM_MS, cohort
+from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
+from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
+from isiw.subjects.subject import Drift, Responder, Response, SimulatedSubject
+
+__all__ = [
+    "COHORTS",
+    "WIDTHS_KIM_MS",
+    "Drift",
+    "EmgFloor",
+    "GainResponse",
+    "PeakProfile",
+    "Profile",
+    "RecruitmentResponse",
+    "Responder",
+    "Response",
+    "ResponseCurve",
+    "SimulatedSubject",
+    "TrialNoise",
+    "TwoPeakProfile",
+    "cohort",
+]

@@ -1,0 +1,169 @@
+"""One simulated person, the truth about them, and how they answer stimuli.
+
+A `SimulatedSubject` never changes; `begin` gives a `Responder` that holds what has a memory within a session (drift,
+start-up, serial correlation).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, get_args
+
+import numpy as np
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.subjects.profiles import Profile
+from isiw.subjects.responses import ResponseCurve, TrialNoise
+from isiw.types import FloatArray, Reference
+from isiw.window import Window, window_from_excess
+
+__all__ = ["OUTLIERS_MV", "Drift", "Responder", "Response", "SimulatedSubject"]
+
+OUTLIERS_MV: Final = (0.1, 0.5)
+"""Between these an artefact's amplitude is uniform [mV]."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How a person's log gain wanders: an AR(1) walk from zero, and the start-up of the first trials.
+
+    Args:
+        persistence: AR(1) coefficient from trial to trial.
+        innovation_sd: SD of each step, natural log.
+        startup: what the first trials have on top, natural log.
+    """
+
+    persistence: float = 0.97
+    innovation_sd: float = 0.12
+    startup: tuple[float, ...] = (0.29, 0.20)
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a stimulus came to.
+
+    Args:
+        isi_ms: the ISI as told [ms]: the realised one where it is known, else the commanded; None for TMS alone.
+        mep_mv: peak-to-peak amplitude of the MEP [mV].
+        isi_sd_ms: SD of the realised ISI about the told one [ms].
+    """
+
+    isi_ms: float | None
+    mep_mv: float
+    isi_sd_ms: float = 0.0
+
+
+@dataclass(frozen=True)
+class SimulatedSubject:
+    """One simulated person.
+
+    Args:
+        profile: facilitation by ISI from the impact.
+        response: from facilitation to the MEP.
+        hit_delay_ms: mean time from the valve command to the impact [ms].
+        hit_delay_sd_ms: its SD from trial to trial [ms].
+        drift: drift of the gain; None where there is none.
+        input_correlation: lag-1 correlation of the input noise.
+        outlier_probability: share of trials replaced by an artefact of 0.1–0.5 mV.
+        isi_jitter_ms: SD of the realised about the commanded ISI, beside the hit delay's [ms].
+        jitter_told: whether the jittered ISI is told, or the commanded one with its SD.
+        scale: factor on every amplitude.
+    """
+
+    profile: Profile
+    response: ResponseCurve
+    hit_delay_ms: float
+    hit_delay_sd_ms: float
+    drift: Drift | None = None
+    input_correlation: float = 0.0
+    outlier_probability: float = 0.0
+    isi_jitter_ms: float = 0.0
+    jitter_told: bool = True
+    scale: float = 1.0
+
+    def facilitation(self, isi_ms: FloatArray, reference: Reference) -> FloatArray:
+        """Facilitation in 0–1 at ISIs on a reference [ms], at the mean hit delay; same shape."""
+        return self.profile(isi_ms if reference == "impact" else isi_ms - self.hit_delay_ms)
+
+    def expected_mep_mv(self, space: DesignSpace) -> FloatArray:
+        """Expected MEP on the space's grid [mV], drift and start-up off, shape (t,)."""
+        evoked = self.response.expected_evoked_mv(self.facilitation(space.grid_ms, space.reference))
+        return self.scale * (evoked + self.response.floor.mean_mv)
+
+    @property
+    def baseline_mv(self) -> float:
+        """Expected MEP without a tap [mV]."""
+        return self.scale * float(self.response.expected_evoked_mv(0.0) + self.response.floor.mean_mv)
+
+    def window(self, space: DesignSpace) -> Window | None:
+        """The true window on the space's grid; None where there is none."""
+        return window_from_excess(space.grid_ms, self.expected_mep_mv(space) - self.baseline_mv, self.baseline_mv)
+
+    def begin(self, seed: int) -> Responder:
+        """A session with this person, its trial noise from this seed."""
+        return Responder(self, seed)
+
+
+class Responder:
+    """One session with a simulated person: answers stimuli, and drifts as it does.
+
+    Args:
+        subject: the person.
+        seed: seed of the session's trial noise.
+    """
+
+    def __init__(self, subject: SimulatedSubject, seed: int) -> None:
+        self.subject = subject
+        self._rng = np.random.default_rng(seed)
+        self._trials = 0
+        self._input_z = self._rng.standard_normal()
+        self._walk = 0.0
+
+    def respond(self, isi_ms: float | None, reference: Reference) -> Response:
+        """Answer one pair of stimuli.
+
+        Args:
+            isi_ms: the commanded ISI on the reference [ms]; None for TMS alone.
+            reference: the event that the ISI counts from. From the valve command the hit delay's variation stays
+                unseen; from the impact it moves the realised ISI, which is told.
+
+        Raises:
+            InvalidValueError: an ISI that is not finite, or an unknown reference.
+        """
+        if isi_ms is not None and not math.isfinite(isi_ms):
+            raise InvalidValueError("an ISI must be a finite number of milliseconds", got=isi_ms)
+        if reference not in get_args(Reference):
+            raise InvalidValueError("reference is unknown", got=reference, expected=" or ".join(get_args(Reference)))
+        noise = self._next_noise()
+        told_ms, facilitation = (None, 0.0) if isi_ms is None else self._stimulate(isi_ms, reference)
+        subject, rng = self.subject, self._rng
+        floor_mv = subject.response.floor.median_mv * np.exp(subject.response.floor.log_sd * rng.standard_normal())
+        mep_mv = subject.response.sample_evoked_mv(facilitation, noise, rng) + floor_mv
+        if rng.random() < subject.outlier_probability:
+            mep_mv = rng.uniform(*OUTLIERS_MV)
+        unseen_ms = 0.0 if subject.jitter_told or isi_ms is None else subject.isi_jitter_ms
+        return Response(told_ms, float(subject.scale * mep_mv), unseen_ms)
+
+    def _stimulate(self, isi_ms: float, reference: Reference) -> tuple[float, float]:
+        subject, rng = self.subject, self._rng
+        late_ms = subject.hit_delay_sd_ms * rng.standard_normal()
+        realised_ms = isi_ms + subject.isi_jitter_ms * rng.standard_normal()
+        told_ms = realised_ms if subject.jitter_told else isi_ms
+        from_impact_ms = realised_ms - late_ms
+        if reference == "valve":
+            return told_ms, float(subject.profile(from_impact_ms - subject.hit_delay_ms))
+        return told_ms - late_ms, float(subject.profile(from_impact_ms))
+
+    def _next_noise(self) -> TrialNoise:
+        subject, rng = self.subject, self._rng
+        correlation = subject.input_correlation
+        self._input_z = correlation * self._input_z + np.sqrt(1 - correlation**2) * rng.standard_normal()
+        log_gain = 0.0
+        if subject.drift is not None:
+            self._walk = subject.drift.persistence * self._walk + subject.drift.innovation_sd * rng.standard_normal()
+            startup = subject.drift.startup
+            log_gain = self._walk + (startup[self._trials] if self._trials < len(startup) else 0.0)
+        self._trials += 1
+        return TrialNoise(float(self._input_z), float(log_gain))

@@ -1,0 +1,119 @@
+"""Designs that do not look at the responses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep, OwnProposal, RandomIsi, SobolIsi, golden_index
+from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
+from isiw.errors import InvalidValueError
+from isiw.models.protocol import ProposesIsi, Tensor
+from isiw.window import WindowEstimate
+
+CANDIDATES = 101
+ISIS_MS = torch.linspace(0.0, 500.0, CANDIDATES)
+
+
+@dataclass(frozen=True)
+class CountingPosterior:
+    """Knows how many trials there were, and nothing else."""
+
+    trials: int
+
+    def estimate(self, person: int = 0) -> WindowEstimate:
+        raise NotImplementedError(person)
+
+
+def picks(acquisition: AcquisitionFunction, trials: int) -> list[int]:
+    return [int(best_candidate(acquisition(CountingPosterior(trial), ISIS_MS))[0]) for trial in range(trials)]
+
+
+@given(st.integers(0, 100_000), st.integers(1, 2000))
+def test_the_even_order_stays_among_the_candidates(trial: int, candidates: int) -> None:
+    assert 0 <= golden_index(trial, candidates) < candidates
+
+
+def test_the_even_order_starts_in_the_middle() -> None:
+    assert picks(EvenSpacing(), 1) == [CANDIDATES // 2]
+
+
+@pytest.mark.parametrize("trials", [5, 13, 40, 80])
+def test_the_even_order_leaves_no_gap_much_wider_than_an_even_one(trials: int) -> None:
+    # Three-distance theorem: no gap exceeds phi^2 = 2.62 times the mean; one candidate is granted for rounding.
+    visited = sorted(picks(EvenSpacing(), trials))
+    gaps = np.diff([visited[-1] - CANDIDATES, *visited])
+    assert gaps.max() <= 2.62 * CANDIDATES / trials + 1
+
+
+def test_the_even_order_comes_to_every_candidate() -> None:
+    assert set(picks(EvenSpacing(), 2 * CANDIDATES)) == set(range(CANDIDATES))
+
+
+def test_the_random_order_is_uniform_over_the_candidates() -> None:
+    # 4040 draws of 101 candidates: chi-square beyond the 0.9999 quantile comes in 1 of 10,000 seeds.
+    counts = np.bincount(picks(RandomIsi(seed=3), 40 * CANDIDATES), minlength=CANDIDATES)
+    assert np.sum((counts - 40) ** 2 / 40) < 161.3
+
+
+def test_the_random_order_depends_on_its_seed_alone() -> None:
+    assert picks(RandomIsi(1), 20) == picks(RandomIsi(1), 20) != picks(RandomIsi(2), 20)
+
+
+def test_each_random_trial_is_a_new_draw() -> None:
+    order = np.array(picks(RandomIsi(1), 1000))
+    assert abs(np.corrcoef(order[1:], order[:-1])[0, 1]) < 4 / math.sqrt(1000)
+
+
+@pytest.mark.parametrize("acquisition", [EvenSpacing(), RandomIsi(7), SobolIsi(7)])
+def test_one_isi_is_scored_1_and_the_others_0(acquisition: AcquisitionFunction) -> None:
+    scores = acquisition(CountingPosterior(3), ISIS_MS)
+    assert scores.shape == (1, CANDIDATES)
+    assert sorted(scores[0].tolist()) == [0.0] * (CANDIDATES - 1) + [1.0]
+
+
+@pytest.mark.parametrize("acquisition", [EvenSpacing(), RandomIsi(7), SobolIsi(7)])
+def test_a_design_is_an_acquisition_function(acquisition: AcquisitionFunction) -> None:
+    assert isinstance(acquisition, AcquisitionFunction)
+
+
+@pytest.mark.parametrize("acquisition", [EvenSpacing(), RandomIsi(), SobolIsi(), IncrementalSweep()])
+def test_a_design_needs_nothing_of_the_posterior(acquisition: AcquisitionFunction) -> None:
+    assert acquisition.needs == ()
+
+
+@pytest.mark.parametrize("trials", [8, 16, 32])
+def test_the_sobol_order_has_one_isi_in_each_of_as_many_equal_parts(trials: int) -> None:
+    isis_ms = torch.arange(128.0)
+    order = [int(SobolIsi(3)(CountingPosterior(trial), isis_ms).argmax()) for trial in range(trials)]
+    assert {index * trials // 128 for index in order} == set(range(trials))
+
+
+def test_the_sweep_stays_at_each_isi_for_its_trials_and_begins_again_at_the_end() -> None:
+    order = picks(IncrementalSweep(step_ms=100.0, trials_per_isi=3), 21)
+    assert order == [k for k in (0, 20, 40, 60, 80, 100, 0) for _ in range(3)]
+
+
+@pytest.mark.parametrize("settings", [{"step_ms": 0.0}, {"trials_per_isi": 0}])
+def test_a_sweep_without_step_or_trials_is_refused(settings: dict[str, float]) -> None:
+    with pytest.raises(InvalidValueError, match="sweep"):
+        IncrementalSweep(**settings)
+
+
+class Planner(CountingPosterior):
+    """Wants two ISIs."""
+
+    def proposed_isis_ms(self) -> Tensor:
+        return torch.tensor([[253.0, 10.0], [6.0, 400.0]])
+
+
+def test_what_the_method_wants_first_is_asked_as_nearly_as_can_be() -> None:
+    planner = Planner(0)
+    assert isinstance(planner, ProposesIsi)
+    assert ISIS_MS[best_candidate(OwnProposal()(planner, ISIS_MS))].tolist() == [255.0, 5.0]

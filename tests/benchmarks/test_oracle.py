@@ -1,0 +1,56 @@
+"""The benchmarks' oracle knows the cohort's windows, and the rule."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benchmarks.oracle import OTHER_SPANS, USUAL_SPANS, Oracle, Spans, outcome_table
+
+from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.metrics import f1
+from isiw.subjects.cohorts import cohort
+from isiw.subjects.profiles import PeakProfile
+from isiw.subjects.subject import SimulatedSubject
+
+
+def told_everything(person: SimulatedSubject, space: DesignSpace) -> Oracle:
+    assert isinstance(person.profile, PeakProfile)
+    span = Spans(np.array([person.profile.start_ms]), np.array([person.profile.width_ms]), np.ones(1))
+    return Oracle(person, space, span)
+
+
+@pytest.mark.parametrize("name", ["gaussian", "recruitment"])
+@pytest.mark.parametrize("high_ms", [500, 300])
+def test_told_start_and_width_it_reports_the_true_window_wherever_the_range_ends(name: str, high_ms: int) -> None:
+    space = DesignSpace(0, high_ms, reference="valve")
+    people = cohort(name, 8, seed=1)  # of half of them a range of 300 ms holds no peak
+    scores = [f1(told_everything(person, space).estimate(), person.window(space), space) for person in people]
+    assert min(scores) > 0.97
+
+
+def test_without_a_window_it_says_so() -> None:
+    silent = cohort("nonresponder", 2, seed=1)[1]  # of recruitment noise
+    assert silent.window(VALVE_SPACE) is None
+    assert Oracle(silent, VALVE_SPACE).estimate() is None
+
+
+@pytest.mark.parametrize("name", ["gaussian", "narrow", "wide", "kim11"])
+def test_its_spans_are_those_of_the_cohort(name: str) -> None:
+    # Shares of 3,000 widths have standard errors below .01; what is left is the distance of the values.
+    widths_ms = np.array([person.profile.width_ms for person in cohort(name, 3000, seed=1)])
+    spans = OTHER_SPANS.get(name, USUAL_SPANS)
+    assert spans.shares.sum() == pytest.approx(1.0)
+    for width_ms in np.quantile(widths_ms, [0.1, 0.3, 0.5, 0.7, 0.9]):
+        assert spans.shares[spans.widths_ms <= width_ms].sum() == pytest.approx(
+            (widths_ms <= width_ms).mean(), abs=0.06
+        )
+    assert (spans.widths_ms.min(), spans.widths_ms.max()) == pytest.approx((widths_ms.min(), widths_ms.max()), abs=0.1)
+
+
+def test_its_law_of_the_mep_is_the_simulators_artefacts_included() -> None:
+    subject = replace(cohort("outliers", 1, 3)[0], outlier_probability=0.3, jitter_told=True)
+    edges_mv, mass = outcome_table(subject)
+    responder = subject.begin(5)
+    answers_mv = np.array([responder.respond(None, "valve").mep_mv for _ in range(20_000)])
+    below = (answers_mv[:, None] < edges_mv).mean(0)
+    assert np.abs(below - mass[0].cumsum()[:-1]).max() < 0.03  # floors on 24 nodes

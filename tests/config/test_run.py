@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from isiw.config.run import (
+    RunConfig,
+    config_of_log,
+    device_for,
+    fresh_log_path,
+    load_config,
+    session_for,
+    subject_for,
+    true_window,
+)
+from isiw.devices.simulated import SimulatedDevice
+from isiw.errors import ConfigError, DeviceError
+from isiw.log.reader import read_session
+from isiw.session.loop import Session
+from isiw.strategy.settings.dissertation import NRSettings, PFSettings
+from isiw.strategy.settings.particles import ParticleSettings
+
+
+@pytest.fixture
+def config_file(tmp_path):
+    def write(text):
+        path = tmp_path / "session.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_without_a_file_there_are_defaults():
+    config = load_config()
+    assert config.model_dump() == RunConfig().model_dump()
+    assert (config.space.reference, config.subject.cohort) == ("valve", "recruitment")
+
+
+def test_a_file_changes_what_it_names(config_file):
+    config = load_config(config_file('seed = 7\n[subject]\ncohort = "gaussian"\n[strategy.settings]\nmax_trials = 4\n'))
+    assert config.seed == 7
+    assert config.subject.cohort == "gaussian"
+    assert config.strategy.settings == ParticleSettings(max_trials=4)
+    assert config.limits == RunConfig().limits
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("sead = 7", ["session.toml", "sead", "7", "Did you mean seed?"]),
+        ("[subject]\ncohrt = 'x'", ["subject.cohrt", "'x'", "Did you mean cohort?", "cohort, data, kind, number"]),
+        ("seed = 'many'", ["value of seed", "'many'", "integer"]),
+        ("[strategy.settings]\nmax_trails = 9", ["strategy.settings.max_trails", "Did you mean max_trials?"]),
+        ("[strategy.settings]\nmax_trials = 'all'", ["strategy.settings.max_trials", "'all'", "integer"]),
+        ("seed = -1", ["value of seed", "-1"]),
+        ("[limits]\nmin_iti_s = nan", ["limits.min_iti_s", "nan"]),
+        ("[subject]\nkind = 'real'", ["subject.kind", "'real'", "'simulated' or 'recorded'"]),
+        ("[space]\nreference = 'coil'", ["space.reference", "'coil'", "'impact' or 'valve'"]),
+        ("[strategy]\nname = 'foo'", ["session.toml", "value of strategy.name", "'foo'", "one of default,"]),
+        ("[subject]\ncohort = 'foo'", ["session.toml", "value of subject.cohort", "'foo'", "one of ", "nonresponder"]),
+        ("[space]\nlow_ms = 10\nhigh_ms = 5", ["session.toml", "value of space", "(10.0, 5.0)", "low_ms < high_ms"]),
+        ("[space]\nlow_ms = nan", ["session.toml", "value of space", "DesignSpace.low_ms", "got nan"]),
+        ("[space]\nstep_ms = 0.3", ["session.toml", "value of space", "whole number of steps"]),
+        ("[strategy.settings]\nmax_trials = 0", ["value of strategy.settings", "max_trials", "got 0", "at least 1"]),
+        ("seed = = 7", ["session.toml", "not valid TOML", "line 1"]),
+    ],
+)
+def test_a_bad_file_is_an_error_that_names_file_key_value_and_remedy(config_file, text, parts):
+    with pytest.raises(ConfigError) as caught:
+        load_config(config_file(text))
+    for part in parts:
+        assert part in str(caught.value)
+    assert str(caught.value).endswith(".")
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(ConfigError, match=r"cannot be read.*nowhere.toml"):
+        load_config(tmp_path / "nowhere.toml")
+
+
+def test_the_command_line_wins_over_the_file(config_file):
+    config = load_config(config_file("seed = 7\n")).with_overrides(seed=8, subject="recorded", data=Path("there"))
+    assert (config.seed, config.subject.kind, config.subject.data) == (8, "recorded", Path("there"))
+    assert config.with_overrides() == config
+
+
+def test_a_bad_value_on_the_command_line_is_named():
+    with pytest.raises(ConfigError, match=r"the command line.*subject.kind.*'reel'"):
+        RunConfig().with_overrides(subject="reel")
+
+
+@pytest.mark.parametrize("given", [{"max_trials": 80}, {"max_trials": 50}, {}])
+def test_another_strategy_on_the_command_line_keeps_the_settings_that_were_given(config_file, given):
+    text = "".join(f"{key} = {value}\n" for key, value in given.items())
+    config = load_config(config_file(f"[strategy.settings]\n{text}"))
+    overridden = config.with_overrides(seed=8).with_overrides(strategy="pf")
+    assert overridden.strategy.settings == PFSettings(**given)
+    assert overridden.with_overrides(strategy="default").strategy == config.strategy
+
+
+def test_what_a_strategys_name_stands_for_is_not_kept_with_another(config_file):
+    config = load_config(config_file('[strategy]\nname = "nr2"\n'))
+    assert config.with_overrides(strategy="nr").strategy.settings == NRSettings()
+
+
+def test_the_same_seed_makes_the_same_person():
+    assert subject_for(RunConfig(seed=3)) == subject_for(RunConfig(seed=3))
+    assert subject_for(RunConfig(seed=3)) != subject_for(RunConfig(seed=4))
+
+
+def test_a_fresh_log_path_is_free(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    first = fresh_log_path(RunConfig())
+    first.parent.mkdir()
+    first.with_name(f"{first.name}.part").touch()
+    assert fresh_log_path(RunConfig()) != first
+    assert first.parts[0] == "isiw-sessions"
+
+
+def test_recorded_emg_needs_its_folder():
+    with pytest.raises(ConfigError, match=r"subject.data.*--data"):
+        device_for(RunConfig().with_overrides(subject="recorded"))
+
+
+def test_a_folder_without_recordings_is_named(tmp_path):
+    with pytest.raises(DeviceError, match="not found"):
+        device_for(RunConfig().with_overrides(subject="recorded", data=tmp_path))
+
+
+def test_a_simulated_device_answers_on_the_spaces_reference():
+    device = device_for(RunConfig())
+    assert isinstance(device, SimulatedDevice)
+    assert device.describe().reference == "valve"
+
+
+def test_a_log_holds_the_configuration_it_was_run_with(tmp_path, config_file):
+    config = load_config(config_file("seed = 5\n[strategy.settings]\nmax_trials = 2\n"))
+    config = config.with_overrides(log=tmp_path / "s.mcap")
+    session_for(config).run()
+    record = read_session(tmp_path / "s.mcap")
+    assert config_of_log(record) == config.model_copy(update={"log": None})
+    assert true_window(record) == subject_for(config).window(record.header.space)
+    assert len(record.table) == 2
+
+
+@pytest.mark.parametrize("config", [{}, {"rig": "A"}, {"seed": 3}])
+def test_a_log_of_other_software_has_no_configuration(tmp_path, scripted_strategy, scripted_device, config):
+    Session(scripted_device(), scripted_strategy(1), log=tmp_path / "s.mcap", config=config).run()
+    with pytest.raises(ConfigError, match=r"not run by isiw run.*isiw.resume"):
+        config_of_log(read_session(tmp_path / "s.mcap"))

@@ -1,0 +1,218 @@
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from isiw.design import DesignSpace
+from isiw.devices.protocol import Device, HasMemory
+from isiw.devices.robot.presets import preset
+from isiw.devices.robot.tapper import HitDelay, Tapper, TapperSettings
+from isiw.errors import DeviceError, InvalidValueError
+from isiw.signals import impact_time, judge
+from isiw.subjects.cohorts import cohort
+from isiw.testing import check_device
+from isiw.trials import MistrialReason, Stimulus
+
+IMPACT = DesignSpace(0, 320, reference="impact")
+VALVE = DesignSpace(0, 500, reference="valve")
+
+
+@dataclass(frozen=True)
+class Answer:
+    mep_mv: float = 0.1
+
+
+def tapper(geometry="subject2", *, respond=lambda _: Answer(), seed=0, **settings) -> Tapper:
+    device = Tapper(respond, geometry, TapperSettings(**settings), seed=seed)
+    device.stage()
+    return device
+
+
+def deliver(device, isi_ms, n=1):
+    return [device.deliver(Stimulus(trial, isi_ms), 1.0) for trial in range(n)]
+
+
+def test_it_is_a_device_with_a_memory():
+    device = tapper()
+    assert isinstance(device, Device)
+    assert isinstance(device, HasMemory)
+    assert device.describe().simulated
+
+
+@pytest.mark.parametrize(("trigger", "accelerometer"), [("open-loop", True), ("open-loop", False), ("impact", True)])
+def test_it_keeps_what_every_device_promises(trigger, accelerometer):
+    def made(reference):
+        subject = cohort("recruitment", 1, 0)[0].begin(1)
+        settings = TapperSettings(reference=reference, trigger=trigger, accelerometer=accelerometer)
+        return Tapper(lambda isi_ms: subject.respond(isi_ms, "impact"), "subject3", settings)
+
+    check_device(lambda: made("impact"), DesignSpace(5, 320, reference="impact"))
+    check_device(lambda: made("valve"), DesignSpace(200, 500, reference="valve"))
+
+
+def test_it_delivers_nothing_unless_staged():
+    device = tapper()
+    device.stop()
+    with pytest.raises(DeviceError, match="not staged"):
+        deliver(device, 50.0)
+
+
+def test_its_sweep_has_the_channels_and_units_that_it_describes():
+    for geometry, accelerometer in itertools.product(("bench", "subject1"), (True, False)):
+        device = tapper(geometry, accelerometer=accelerometer)
+        sweep = deliver(device, 50.0)[0]
+        assert {name: channel.unit for name, channel in sweep.channels.items()} == device.describe().channels
+        assert all(channel.values.size == 5000 for channel in sweep.channels.values())
+
+
+def test_a_late_pulse_makes_the_sweep_longer():
+    sweep = deliver(tapper(reference="valve"), 500.0)[0]
+    assert judge(sweep, Stimulus(0, 500.0), VALVE).reason is None
+
+
+@pytest.mark.parametrize("trigger", ["open-loop", "impact"])
+@pytest.mark.parametrize("reference", ["impact", "valve"])
+def test_the_person_answers_the_isi_that_truly_came_about(reference, trigger):
+    asked = []
+    device = tapper(reference=reference, trigger=trigger, respond=lambda isi: asked.append(isi) or Answer())
+    sweeps = deliver(device, 60.0 if reference == "impact" else 240.0, n=10)
+    realised = [s.t_tms_ms - impact_time(s.channels["acceleration"].values, 5000.0) for s in sweeps]
+    np.testing.assert_allclose(asked, realised, atol=0.2)
+
+
+def test_open_loop_the_isi_varies_with_the_hit_and_triggered_it_does_not():
+    def errors(trigger):
+        sweeps = deliver(tapper("subject1", trigger=trigger), 60.0, n=60)
+        return [s.t_tms_ms - impact_time(s.channels["acceleration"].values, 5000.0) - 60.0 for s in sweeps]
+
+    assert np.std(errors("open-loop")[5:]) == pytest.approx(4.0, rel=0.3)
+    assert np.max(np.abs(errors("impact"))) <= 0.2
+
+
+def test_the_command_is_corrected_by_the_measured_hits():
+    device = tapper("subject2", expected_hit_ms=190.0)
+    deliver(device, 60.0, n=30)
+    assert device.hit_delay.mean_ms == pytest.approx(172.0, abs=1.0)
+    later = [device.deliver(Stimulus(trial, 60.0), 1.0) for trial in range(30, 90)]
+    error = [judge(sweep, Stimulus(0, 60.0), IMPACT).isi_ms - 60.0 for sweep in later]
+    assert np.mean(error) == pytest.approx(0.0, abs=0.8)
+
+
+def test_a_few_late_valves_do_not_move_the_expected_hit_delay():
+    delay = HitDelay(180.0)
+    for hit in (175.0, 176.0, 195.0, 174.0, 176.0, 193.0, 175.0):
+        delay.measured(hit)
+    assert delay.mean_ms == 176.0
+
+
+def test_an_isi_shorter_than_the_detection_is_refused_before_anything_happens():
+    asked = []
+    device = tapper(trigger="impact", respond=lambda isi: asked.append(isi) or Answer())
+    with pytest.raises(DeviceError, match="so soon"):
+        deliver(device, 3.0)
+    assert asked == []
+    deliver(device, 5.0)
+    from_valve = tapper(reference="valve", trigger="impact")
+    with pytest.raises(DeviceError, match="so soon"):
+        deliver(from_valve, 150.0)
+
+
+def test_without_an_accelerometer_the_uncertainty_of_the_isi_is_stated():
+    blind = deliver(tapper(accelerometer=False), 60.0)[0]
+    judged = judge(blind, Stimulus(0, 60.0), IMPACT)
+    assert judged.isi_ms == pytest.approx(60.0)
+    assert judged.isi_sd_ms == pytest.approx(6.5)
+    from_valve = deliver(tapper(accelerometer=False, reference="valve"), 240.0)[0]
+    assert judge(from_valve, Stimulus(0, 240.0), VALVE).isi_sd_ms == pytest.approx(2.5)
+
+
+def test_the_stated_uncertainty_covers_the_people_of_the_dissertation():
+    asked = []
+    for name in ("subject1", "subject2", "subject3", "subject4"):
+        deliver(tapper(name, accelerometer=False, respond=lambda isi: asked.append(isi) or Answer()), 60.0, n=50)
+    z = (np.array(asked) - 60.0) / 6.5
+    assert np.mean(np.abs(z) <= 2) >= 0.95
+
+
+def test_a_hammer_that_sticks_gives_no_impact_open_loop_and_no_pulse_triggered():
+    stuck = replace(preset("subject1"), stuck_probability=1.0)
+    asked = []
+    open_loop = deliver(tapper(stuck, respond=lambda isi: asked.append(isi) or Answer()), 60.0)[0]
+    assert judge(open_loop, Stimulus(0, 60.0), IMPACT).reason is MistrialReason.NO_IMPACT
+    assert asked == [None]
+    triggered = deliver(tapper(stuck, trigger="impact"), 60.0)[0]
+    assert judge(triggered, Stimulus(0, 60.0), IMPACT).reason is MistrialReason.NO_PULSE
+
+
+@pytest.mark.parametrize("reference", ["impact", "valve"])
+def test_tms_alone_taps_nobody(reference):
+    asked = []
+    device = tapper(reference=reference, respond=lambda isi: asked.append(isi) or Answer(0.05))
+    sweep = deliver(device, None)[0]
+    assert asked == [None]
+    assert impact_time(sweep.channels["acceleration"].values, 5000.0) is None
+    judged = judge(sweep, Stimulus(0, None), IMPACT if reference == "impact" else VALVE)
+    assert judged.isi_ms is None
+    assert judged.mep_mv == pytest.approx(0.05, abs=0.006)
+
+
+@pytest.mark.parametrize("mep_mv", [0.0, 0.02, 0.1, 1.0])
+def test_the_judged_amplitude_is_the_one_that_the_person_gave(mep_mv):
+    device = tapper("subject2", respond=lambda _: Answer(mep_mv))
+    judged = [judge(sweep, Stimulus(0, 80.0), IMPACT) for sweep in deliver(device, 80.0, n=40)]
+    measured = [each.mep_mv for each in judged if each.mep_mv is not None]
+    assert len(measured) >= 35
+    if mep_mv == 0:  # 1 µV RMS of EMG at rest has 3 to 9 µV of its own
+        assert 0.003 < min(measured) < max(measured) < 0.009
+    else:
+        np.testing.assert_allclose(measured, mep_mv, rtol=0.01)
+
+
+@pytest.mark.parametrize("trigger", ["open-loop", "impact"])
+@pytest.mark.parametrize("reference", ["impact", "valve"])
+def test_the_emg_floor_of_a_person_counts_once(reference, trigger):
+    person, answers = cohort("nonresponder", 2, 0)[1].begin(1), []
+    device = tapper(
+        reference=reference,
+        trigger=trigger,
+        respond=lambda isi_ms: answers.append(person.respond(isi_ms, "impact")) or answers[-1],
+    )
+    isi_ms, space = (100.0, IMPACT) if reference == "impact" else (280.0, VALVE)
+    judged = [judge(sweep, Stimulus(0, isi_ms), space) for sweep in deliver(device, isi_ms, n=60)]
+    told, given = np.array([(j.mep_mv, a.mep_mv) for j, a in zip(judged, answers, strict=True) if j.mep_mv]).T
+    assert len(told) >= 55
+    np.testing.assert_allclose(np.log(told / given).mean(), 0.0, atol=0.01)
+
+
+def test_a_trial_depends_on_the_seed_and_its_own_number():
+    first, again, other = (deliver(tapper(seed=seed), 60.0)[0] for seed in (1, 1, 2))
+    emg = [sweep.channels["emg"].values for sweep in (first, again, other)]
+    assert (emg[0] == emg[1]).all()
+    assert (emg[0] != emg[2]).any()
+
+
+def test_it_comes_into_the_state_after_stimuli_of_an_earlier_run():
+    stimuli = [Stimulus(trial, 40.0 + trial) for trial in range(8)]
+    through, resumed = tapper(seed=4), tapper(seed=4)
+    for stimulus in stimuli:
+        through.deliver(stimulus, 1.0)
+    resumed.resume_after(stimuli)
+    last = Stimulus(8, 60.0)
+    assert resumed.deliver(last, 1.0).t_tms_ms == through.deliver(last, 1.0).t_tms_ms
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"reference": "tap"},
+        {"trigger": "never"},
+        {"rate_hz": 0.0},
+        {"trigger": "impact", "accelerometer": False},
+    ],
+)
+def test_settings_that_cannot_be_are_errors(wrong):
+    with pytest.raises(InvalidValueError):
+        TapperSettings(**wrong)

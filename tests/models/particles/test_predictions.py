@@ -1,0 +1,34 @@
+"""What particles say about the window is what the rule says of their expected MEPs."""
+
+import numpy as np
+import pytest
+import torch
+
+from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.metrics import f1
+from isiw.models.particles.predictions import PersonSample
+from isiw.models.particles.prior import Prior
+from isiw.window import Window, window_from_excess
+
+
+@pytest.mark.parametrize(
+    "space",
+    [VALVE_SPACE, DesignSpace(0, 300, reference="valve"), DesignSpace(240, 300, reference="valve")],
+    ids=["whole windows", "windows cut off", "inside windows"],
+)
+def test_windows_are_those_of_the_rule_also_where_a_peak_lies_beyond_the_range(space: DesignSpace) -> None:
+    # Tables of facilitations are interpolated in windows and in MEPs; they differ where an edge or a peak lies between.
+    beliefs = Prior(p_window=0.9, p_anywhere=0.3)
+    person = beliefs.person(beliefs.sample(1, 1000, torch.Generator().manual_seed(3)), space)
+    sample = PersonSample(person, space)
+    grid_ms = torch.tensor(space.grid_ms, dtype=torch.float32)
+    masks = sample.window_masks(grid_ms)[0].numpy()
+    meps_mv, baselines_mv = (x[0].double().numpy() for x in (sample.expected_mep_mv(grid_ms), sample.baselines_mv()))
+    told = [Window.from_mask(space.grid_ms, mask) for mask in masks]
+    ruled = [
+        window_from_excess(space.grid_ms, mep_mv - baseline_mv, baseline_mv)
+        for mep_mv, baseline_mv in zip(meps_mv, baselines_mv.tolist(), strict=True)
+    ]
+    scores = np.array([f1(ours, rules, space) for ours, rules in zip(told, ruled, strict=True)])
+    assert (scores > 0).mean() > 0.995  # none against one: excesses within a hair of the least that counts
+    assert np.quantile(scores[scores > 0], 0.01) > 0.98

@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.log.reader import read_session
+from isiw.plots.session import save_session_plot, session_figure
+from isiw.session.loop import Session
+from isiw.session.resume import exclude
+from isiw.trials import Measurement
+from isiw.window import Window
+
+
+@pytest.fixture
+def record(tmp_path, scripted_strategy, scripted_device):
+    device = scripted_device(
+        lambda s: Measurement(0.02 * s.trial, s.isi_ms, background_rms_uv=50.0 if s.trial == 1 else 2.0)
+    )
+    Session(device, scripted_strategy(6), log=tmp_path / "s.mcap").run()
+    exclude(tmp_path / "s.mcap", 4, "sneezed")
+    return read_session(tmp_path / "s.mcap")
+
+
+def labels(axes):
+    return {text.get_text() for text in axes.get_legend().get_texts()}
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
+def test_a_session_is_drawn_into_a_file(record, tmp_path, suffix):
+    path = save_session_plot(record, tmp_path / "new" / f"s{suffix}")
+    assert path.stat().st_size > 5000
+
+
+def test_an_unknown_format_is_refused(record, tmp_path):
+    with pytest.raises(InvalidValueError, match="format is unknown"):
+        save_session_plot(record, tmp_path / "s.docx")
+
+
+def test_the_picture_shows_profile_trials_window_and_truth(record):
+    profile, edges, _ = session_figure(record, truth=Window(30, 80)).axes
+    assert labels(profile) == {
+        "window", "90 % interval of its edges", "true window (simulated)", "90 % band", "expected MEP", "trial",
+        "excluded", "mistrial",
+    }  # fmt: skip
+    assert labels(edges) == {"start", "end"}
+    assert profile.get_xlim() == (0, 200)
+    assert profile.get_xlabel() == "ISI after the valve command [ms]"
+    assert "after 6 trials" in profile.get_title(loc="left")
+
+
+def test_trials_lie_where_they_were_realised(record):
+    profile = session_figure(record).axes[0]
+    (trials,) = [line for line in profile.lines if line.get_label() == "trial"]
+    told = record.table.told
+    assert list(trials.get_xdata()) == [trial.isi_ms for trial in told]
+    assert trials.get_ydata().tolist() == pytest.approx([max(1.0, 1e3 * trial.mep_mv) for trial in told])
+
+
+def test_edges_beyond_the_range_are_drawn_at_its_border(record):
+    for line in session_figure(record).axes[1].lines:
+        assert all(math.isfinite(value) and 0 <= value <= 200 for value in line.get_ydata())
+
+
+def test_a_session_without_a_window_is_drawn(record):
+    entries = [e.model_copy(update={"segments_ms": ()}) if hasattr(e, "segments_ms") else e for e in record.history]
+    none = type(record)(record.path, record.header, tuple(entries), {}, (), True)
+    profile = session_figure(none).axes[0]
+    assert profile.get_title(loc="left").startswith("No window")
+    assert "window" not in labels(profile)
+
+
+def test_a_session_without_trials_is_drawn(record, tmp_path):
+    empty = type(record)(record.path, record.header, (), {}, (), False)
+    assert save_session_plot(empty, tmp_path / "empty.png").stat().st_size > 1000

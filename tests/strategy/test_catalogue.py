@@ -1,0 +1,194 @@
+"""The named strategies: each works, says what it is, and is made again from its recipe."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.errors import InvalidValueError, StrategyError
+from isiw.models.particles import ParticleModel
+from isiw.models.protocol import ResponseModel
+from isiw.strategy.catalogue import list_strategies, make_strategy, settings_of
+from isiw.strategy.settings.particles import ParticleSettings
+from isiw.strategy.strategy import Recipe
+
+NAMES = sorted(list_strategies())
+PARTICLES = [name for name in NAMES if settings_of(name)[0] is ParticleSettings]
+FEW: dict[str, Any] = {"particles": 64}
+
+
+def few(name: str) -> dict[str, Any]:
+    return FEW if name in PARTICLES else {}
+
+
+def asks(name: str, seed: int, meps_mv: tuple[float, ...] = (0.02, 0.1)) -> list[float]:
+    strategy = make_strategy(name, seed=seed, **few(name))
+    asked = []
+    for mep_mv in meps_mv:
+        asked.append(strategy.ask())
+        strategy.tell(asked[-1], mep_mv)
+    return [*asked, strategy.ask()]
+
+
+def test_every_named_strategy_is_described_in_a_sentence() -> None:
+    assert "default" in NAMES
+    assert all(text[0].isupper() and text.endswith(".") for text in list_strategies().values())
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
+def test_every_named_strategy_asks_learns_and_decides(name: str, space: Any) -> None:
+    strategy = make_strategy(name, space=space, seed=1, **few(name))
+    for mep_mv in (0.02, 0.08):
+        strategy.tell(strategy.ask(), mep_mv)
+    assert strategy.ask() in space.grid_ms
+    probability = strategy.estimate().probability
+    assert probability is None or 0 <= probability <= 1
+    assert strategy.decision().reason
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_named_strategy_is_made_again_from_its_recipe(name: str) -> None:
+    strategy = make_strategy(name, seed=5, **few(name))
+    recipe = strategy.recipe
+    again = make_strategy(recipe.name, strategy.space, recipe.seed, **recipe.settings)
+    assert again.recipe == recipe
+    assert (again.model, again.acquisition, again.stopping) == (strategy.model, strategy.acquisition, strategy.stopping)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_name_and_seed_give_the_same_asks(name: str) -> None:
+    assert asks(name, seed=2) == asks(name, seed=2)
+
+
+@pytest.mark.parametrize("name", ["default", "random"])
+def test_another_seed_gives_other_asks(name: str) -> None:
+    assert asks(name, seed=2) != asks(name, seed=3)
+
+
+def test_designs_that_do_not_look_at_the_responses_do_not() -> None:
+    for name in ("even", "random"):
+        assert asks(name, 2, (0.02, 0.02)) == asks(name, 2, (0.3, 0.3))
+
+
+@pytest.mark.parametrize("name", PARTICLES)
+def test_a_named_strategy_is_rebuilt_from_its_recipe(name: str) -> None:
+    strategy = make_strategy(name, seed=2, prior={"p_window": 0.6, "width_ms": (90.0, 0.4, 0.0)}, **FEW)
+    assert isinstance(strategy.model, ResponseModel)
+    assert isinstance(strategy.acquisition, AcquisitionFunction)
+    again = make_strategy(strategy.recipe.name, seed=strategy.recipe.seed, **strategy.recipe.settings)
+    assert again.model == strategy.model
+    assert again.acquisition == strategy.acquisition
+    assert again.stopping == strategy.stopping
+
+
+def test_settings_reach_the_parts_they_are_meant_for() -> None:
+    strategy = make_strategy(max_trials=7, particles=32, prior={"p_window": 0.6})
+    model = strategy.model
+    assert isinstance(model, ParticleModel)
+    assert (model.particles, model.beliefs.p_window) == (32, 0.6)
+    assert "7 stimuli are left" in strategy.decision().reason
+    assert strategy.recipe == Recipe(
+        "default", 0, vars(ParticleSettings(max_trials=7, particles=32, prior={"p_window": 0.6}))
+    )
+
+
+def test_the_prior_as_a_list_of_numbers_is_the_prior_as_a_pair() -> None:
+    pair, row = (make_strategy(prior={"width_ms": kind((90.0, 0.4, 0.0))}, **FEW) for kind in (tuple, list))
+    assert pair.model == row.model
+
+
+def test_an_unknown_strategy_names_the_known_ones() -> None:
+    with pytest.raises(StrategyError, match="oracle") as caught:
+        make_strategy("oracle")
+    assert all(name in str(caught.value) for name in NAMES)
+
+
+def test_an_unknown_setting_names_the_known_ones() -> None:
+    with pytest.raises(StrategyError, match="max_trails") as caught:
+        make_strategy(max_trails=5)
+    assert all(name in str(caught.value) for name in ("max_trials", "stop_width_ms", "particles", "prior"))
+
+
+def test_an_unknown_setting_of_the_prior_names_the_known_ones() -> None:
+    with pytest.raises(InvalidValueError, match="p_windows") as caught:
+        make_strategy(prior={"p_windows": 0.5})
+    assert "p_window," in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("settings", "what"),
+    [
+        ({"seed": -1}, "seed"),
+        ({"max_trials": 0}, "max_trials"),
+        ({"stop_width_ms": 0.0}, "width_ms"),
+        ({"stop_width_ms": math.nan}, "width_ms"),
+        ({"stop_no_window": 0.0}, "no window"),
+        ({"stop_no_window": 1.5}, "no window"),
+        ({"particles": 0}, "particles"),
+        ({"particles": 1}, "particles"),
+        ({"particles": 2.5}, "particles"),
+        ({"particles": "many"}, "particles"),
+    ],
+)
+@pytest.mark.parametrize("name", ["default", "random"])
+def test_a_setting_that_cannot_be_is_refused_when_the_strategy_is_made(
+    name: str, settings: dict[str, Any], what: str
+) -> None:
+    with pytest.raises(InvalidValueError, match=what):
+        make_strategy(name, **settings)
+
+
+def test_the_fewest_particles_allowed_do_learn() -> None:
+    strategy = make_strategy(particles=2)
+    for _ in range(3):
+        strategy.tell(strategy.ask(), 0.05)
+    assert 0 <= strategy.estimate().probability <= 1
+
+
+@pytest.mark.parametrize(("name", "initial"), [("nr", 6), ("nr2", 7), ("svmr", 7), ("gpr", 7)])
+def test_the_dissertations_regressions_begin_with_evenly_spaced_isis_at_both_ends(name: str, initial: int) -> None:
+    strategy = make_strategy(name, DesignSpace(0, 420))
+    assert strategy.ask_batch(initial) == [420.0 * k / (initial - 1) for k in range(initial)]
+
+
+@pytest.mark.parametrize("name", ["nr", "svmr", "gpr"])
+def test_a_regression_takes_five_values_after_its_initial_trials_at_least(name: str) -> None:
+    strategy = make_strategy(name, initial=4)
+    for trial in range(1, 9):
+        assert not strategy.decision().stop
+        strategy.tell(250.0 if trial % 2 else 50.0 * trial, 0.1 if trial % 2 else 0.01)
+
+
+@pytest.mark.parametrize("name", ["nr", "svmr", "gpr"])
+def test_a_regression_gives_up_after_99_iterations(name: str) -> None:
+    strategy = make_strategy(name)
+    for _ in range(strategy.recipe.settings["initial"] + 99):
+        assert not strategy.decision().stop
+        strategy.count_mistrial()
+    assert "budget" in strategy.decision().reason
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "what"),
+    [
+        ("nr", {"initial": 1}, "both ends"),
+        ("nr", {"initial": 6.0}, "both ends"),
+        ("svmr", {"acquisition": "best"}, "acquisition"),
+        ("gpr", {"floor": "cut"}, "floor"),
+        ("gpr", {"stop_edges": "none"}, "edges"),
+        ("pf", {"particles": 1}, "particles"),
+        ("pf", {"stop_sd_ms": 0.0}, "sd_ms"),
+        ("incremental", {"rule": "eye"}, "rule"),
+        ("incremental", {"quiet_ms": -1.0}, "quiet_ms"),
+    ],
+)
+def test_a_setting_of_the_dissertations_that_cannot_be_is_refused(
+    name: str, settings: dict[str, Any], what: str
+) -> None:
+    with pytest.raises(InvalidValueError, match=what):
+        make_strategy(name, **settings)

@@ -1,0 +1,79 @@
+"""The law of going on, for several people side by side."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import torch
+
+from isiw.acquisition.fixed import EvenSpacing
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.models.protocol import Posterior, Tensor
+from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.choosing import Choice, best_choices, candidate_isis, evenly_spaced, planned_choices, remembered
+from isiw.strategy.stopping import Budget, EdgeVariance
+from isiw.window import WindowEstimate
+
+FIVE = DesignSpace(0, 4)
+
+
+@dataclass(frozen=True)
+class Scores:
+    """An acquisition function that gives the same scores whatever is believed."""
+
+    values: Tensor
+    needs: tuple[type, ...] = ()
+
+    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+        del posterior, isi_ms
+        return self.values
+
+
+@pytest.fixture
+def three() -> Posterior:
+    """Three people of whom nothing is known."""
+    return make_strategy("pf", particles=4).model.prior(VALVE_SPACE, seed=0, people=3)
+
+
+@pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE, DesignSpace(0, 1), DesignSpace(-20, 30, step_ms=0.1)])
+def test_candidates_are_few_evenly_spaced_and_hold_both_ends(space: DesignSpace) -> None:
+    candidates = candidate_isis(space).double().numpy()
+    assert len(candidates) <= 101
+    assert (candidates[0], candidates[-1]) == pytest.approx((space.low_ms, space.high_ms))
+    steps = np.diff(candidates)
+    np.testing.assert_allclose(steps[:-1], steps[0], rtol=1e-4)
+    assert 0 < steps[-1] <= steps[0] * (1 + 1e-4)
+
+
+def test_each_person_is_asked_what_scores_best_and_falls_back_alone(three: Posterior) -> None:
+    nan = math.nan
+    scores = Scores(torch.tensor([[0.0, 1, 0, 0, 0], [nan, nan, nan, nan, nan], [nan, 0, 0, 0, 2.0]]))
+    first, second, third = best_choices(three, scores, FIVE, told=2, people=3)
+    assert (first, third) == (Choice(1.0), Choice(4.0))
+    assert second.isi_ms == evenly_spaced(FIVE, 2)
+    assert "Scores gives no ISI a finite score" in (second.fallback or "")
+
+
+def test_scores_that_are_the_same_for_all_are_everybodys(three: Posterior) -> None:
+    choices = best_choices(three, EvenSpacing(), VALVE_SPACE, told=0, people=3)
+    assert choices == [Choice(evenly_spaced(VALVE_SPACE, 0))] * 3
+
+
+def test_initial_isis_come_before_a_methods_own_plan_and_that_before_scores(three: Posterior) -> None:
+    own = make_strategy("pf", particles=4).acquisition
+    assert planned_choices(three, own, VALVE_SPACE, (7.0, 9.0), people=3) == [Choice(7.0)] * 3
+    wanted = three.proposed_isis_ms()[:, 0].tolist()
+    assert [choice.isi_ms for choice in planned_choices(three, own, VALVE_SPACE, people=3)] == wanted
+    assert planned_choices(three, EvenSpacing(), VALVE_SPACE, people=3) == []
+
+
+def test_a_rule_remembers_as_much_as_it_looks_back_on_and_nothing_is_estimated_for_others() -> None:
+    estimates = [WindowEstimate(None, None, start_ms=float(i)) for i in range(4)]
+    past: tuple[WindowEstimate, ...] = ()
+    for pairs, estimate in enumerate(estimates, start=-1):
+        past = remembered(past, lambda estimate=estimate: estimate, EdgeVariance(last=2), pairs)
+    assert past == tuple(estimates[2:])
+    assert remembered((), lambda: pytest.fail("estimated in vain"), Budget(3), 5) == ()

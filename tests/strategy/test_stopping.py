@@ -1,0 +1,252 @@
+"""Stopping rules: when they stop, what they say, and how they compose."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.strategy.stopping import (
+    AnyOf,
+    Budget,
+    CredibleWidth,
+    EdgeVariance,
+    NoWindow,
+    ParticleSpread,
+    Progress,
+    SweptPast,
+    looks_back,
+    stimuli_left,
+)
+from isiw.window import Window, WindowEstimate
+
+
+def progress(delivered: int = 3, probability: float | None = 0.95, edges_ms: object = None) -> Progress:
+    samples = None if edges_ms is None else np.asarray(edges_ms, dtype=float)
+    return Progress(delivered, delivered, WindowEstimate(probability, None, edge_samples_ms=samples))
+
+
+def edges_with_width(width_ms: float) -> list[tuple[float, float]]:
+    return [(100 + share * width_ms, 200 + share * width_ms) for share in np.linspace(0, 1, 101)]
+
+
+@pytest.mark.parametrize(("delivered", "stop"), [(0, False), (4, False), (5, True), (6, True)])
+def test_the_budget_counts_delivered_stimuli(delivered: int, *, stop: bool) -> None:
+    assert Budget(5)(progress(delivered)).stop == stop
+
+
+def test_a_mistrial_uses_up_budget_although_it_is_not_told() -> None:
+    assert Budget(5)(Progress(delivered=5, told=0, estimate=WindowEstimate(0.5, None))).stop
+
+
+def test_the_budget_says_how_many_stimuli_are_left() -> None:
+    assert Budget(5)(progress(2)).reason == "3 stimuli are left."
+
+
+@pytest.mark.parametrize(("width_ms", "stop"), [(20.0, True), (40.0, False)])
+def test_narrow_intervals_of_both_edges_stop(width_ms: float, *, stop: bool) -> None:
+    assert CredibleWidth(30)(progress(edges_ms=edges_with_width(width_ms))).stop == stop
+
+
+def test_one_wide_edge_goes_on() -> None:
+    edges = [(100 + share, 200 + 50 * share) for share in np.linspace(0, 1, 101)]
+    assert not CredibleWidth(30)(progress(edges_ms=edges)).stop
+
+
+def test_narrow_intervals_of_an_unlikely_window_go_on() -> None:
+    assert not CredibleWidth(30)(progress(probability=0.89, edges_ms=edges_with_width(1))).stop
+    assert CredibleWidth(30, min_probability=0.8)(progress(probability=0.89, edges_ms=edges_with_width(1))).stop
+
+
+def test_narrow_intervals_without_a_known_probability_go_on() -> None:
+    assert not CredibleWidth(30)(progress(probability=None, edges_ms=edges_with_width(1))).stop
+
+
+def test_an_edge_beyond_the_range_for_certain_is_known() -> None:
+    edges = [(-math.inf, 200 + share) for share in np.linspace(0, 1, 11)]
+    assert CredibleWidth(30)(progress(edges_ms=edges)).stop
+
+
+@pytest.mark.parametrize("start_ms", [[-math.inf, 10.0, 10.0], [-math.inf, -math.inf, 10.0]])
+def test_an_edge_that_may_lie_beyond_the_range_has_no_narrow_interval(start_ms: list[float]) -> None:
+    decision = CredibleWidth(30)(progress(edges_ms=[(start, 100.0) for start in start_ms]))
+    assert not decision.stop
+    assert "span inf and 0 ms" in decision.reason
+
+
+@pytest.mark.parametrize(("doubters", "stop"), [(1, True), (2, False), (30, False)])
+def test_a_hypothesis_that_is_still_likely_must_agree(doubters: int, *, stop: bool) -> None:
+    edges = np.array([(100.0, 200.0)] * (100 - doubters) + [(100.0, 240.0)] * doubters)
+    hypotheses = np.where(edges[:, 1] == 240, 2, 0)
+    estimate = WindowEstimate(0.95, None, edge_samples_ms=edges, hypotheses=hypotheses)
+    decision = CredibleWidth(30)(Progress(3, 3, estimate))
+    assert decision.stop == stop
+    assert f"span 0 and {0 if stop else 40} ms under every likely hypothesis" in decision.reason
+
+
+def test_without_intervals_the_edges_are_not_known() -> None:
+    assert not CredibleWidth(30)(progress()).stop
+
+
+@pytest.mark.parametrize(("probability", "stop"), [(0.05, True), (0.2, False), (None, False)])
+def test_no_window_stops_when_it_is_probable_enough(probability: float | None, *, stop: bool) -> None:
+    assert NoWindow(0.9)(progress(probability=probability)).stop == stop
+
+
+def test_any_of_gives_the_reason_of_the_first_rule_that_stops() -> None:
+    rule = AnyOf((NoWindow(), Budget(3), Budget(2)))
+    assert rule(progress(3)) == Budget(3)(progress(3))
+
+
+def test_any_of_goes_on_with_all_reasons() -> None:
+    rules = (NoWindow(), Budget(9))
+    decision = AnyOf(rules)(progress(3))
+    assert not decision.stop
+    assert all(rule(progress(3)).reason in decision.reason for rule in rules)
+
+
+def test_any_of_no_rules_would_never_stop_and_is_refused() -> None:
+    with pytest.raises(InvalidValueError, match="at least one rule"):
+        AnyOf(())
+
+
+@pytest.mark.parametrize(
+    "decide",
+    [
+        Budget(1),
+        Budget(9),
+        CredibleWidth(30),
+        CredibleWidth(1),
+        NoWindow(0.01),
+        NoWindow(),
+        EdgeVariance(),
+        ParticleSpread(),
+        SweptPast(),
+        AnyOf((Budget(9),)),
+    ],
+)
+@pytest.mark.parametrize("edges_ms", [None, edges_with_width(5)])
+def test_every_reason_is_a_full_sentence(decide: object, edges_ms: object) -> None:
+    reason = decide(progress(edges_ms=edges_ms)).reason
+    assert not reason[0].islower()
+    assert reason.endswith(".")
+
+
+@pytest.mark.parametrize("width_ms", [0, -1, math.nan, math.inf])
+def test_a_width_that_cannot_be_is_refused(width_ms: float) -> None:
+    with pytest.raises(InvalidValueError, match="width_ms"):
+        CredibleWidth(width_ms)
+
+
+@pytest.mark.parametrize(("level", "probability"), [(0, 0.9), (1, 0.9), (math.nan, 0.9), (0.9, -0.1), (0.9, 1.1)])
+def test_a_level_or_probability_outside_0_to_1_is_refused(level: float, probability: float) -> None:
+    with pytest.raises(InvalidValueError, match="0–1"):
+        CredibleWidth(30, level, probability)
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, math.nan])
+def test_a_share_outside_0_to_1_is_refused(share: float) -> None:
+    with pytest.raises(InvalidValueError, match="0–1"):
+        CredibleWidth(30, min_share=share)
+
+
+@pytest.mark.parametrize("probability", [0, -0.1, 1.1, math.nan])
+def test_no_window_needs_a_probability(probability: float) -> None:
+    with pytest.raises(InvalidValueError, match="0–1"):
+        NoWindow(probability)
+
+
+@pytest.mark.parametrize("max_trials", [0, -1, math.nan, math.inf, 3.0, True])
+def test_a_budget_that_is_no_count_of_at_least_1_is_refused(max_trials: int) -> None:
+    with pytest.raises(InvalidValueError, match="whole number of at least 1"):
+        Budget(max_trials)
+
+
+def test_the_smallest_budget_says_how_many_stimuli_are_left() -> None:
+    rule = AnyOf((NoWindow(), Budget(9), AnyOf((Budget(7),))))
+    assert stimuli_left(rule, 3) == 4
+    assert stimuli_left(rule, 8) == 0
+    assert stimuli_left(AnyOf((NoWindow(),)), 3) is None
+    assert stimuli_left(CredibleWidth(30), 3) is None
+
+
+def after_windows(*edges_ms: tuple[float, float] | None) -> Progress:
+    """After trials with these windows, the last of them the present one."""
+    windows = [None if edges is None else Window(*edges) for edges in edges_ms]
+    past = tuple(WindowEstimate(None, window) for window in windows)
+    return Progress(40, 40, past[-1], past)
+
+
+STEADY = [(100.0, 200.0)] * 5
+START_MOVES = [(100.0 + 20.0 * k, 200.0) for k in range(5)]
+
+
+def test_both_edges_that_have_settled_stop() -> None:
+    decision = EdgeVariance()(after_windows(*STEADY))
+    assert decision.stop
+    assert decision.reason.startswith("The window has settled")
+
+
+def test_only_the_last_five_values_count() -> None:
+    assert EdgeVariance()(after_windows((0.0, 500.0), *STEADY)).stop
+    assert not EdgeVariance(last=6)(after_windows((0.0, 500.0), *STEADY)).stop
+    assert looks_back(AnyOf((Budget(9), EdgeVariance(last=6)))) == 6
+
+
+def test_fewer_than_five_windows_do_not_settle() -> None:
+    assert not EdgeVariance()(after_windows(*STEADY[:4])).stop
+    assert not EdgeVariance()(after_windows(*STEADY[:4], None)).stop
+    assert not EdgeVariance()(after_windows(None, *STEADY[:4])).stop
+
+
+def test_both_edges_must_settle_or_either_where_so_told() -> None:
+    assert not EdgeVariance()(after_windows(*START_MOVES)).stop
+    assert EdgeVariance(edges="either")(after_windows(*START_MOVES)).stop
+    both_move = [(start, 400.0 - start) for start, _ in START_MOVES]
+    assert not EdgeVariance(edges="either")(after_windows(*both_move)).stop
+
+
+def test_the_variance_is_the_samples() -> None:
+    # 0, 0, 0, 0, x has the sample variance x²/5 and the population variance 4 x²/25.
+    moved = [(100.0, 200.0)] * 4 + [(116.0, 200.0)]
+    assert not EdgeVariance(variance_ms2=51.1)(after_windows(*moved)).stop
+    assert EdgeVariance(variance_ms2=51.3)(after_windows(*moved)).stop
+
+
+@pytest.mark.parametrize(("spread_ms", "stop"), [(25.0, True), (25.1, False)])
+def test_particles_that_have_come_together_stop(spread_ms: float, *, stop: bool) -> None:
+    estimate = WindowEstimate(None, Window(100.0, 250.0), spread_ms=spread_ms)
+    assert ParticleSpread()(Progress(30, 30, estimate)).stop == stop
+
+
+def test_particles_that_were_never_measured_go_on() -> None:
+    assert not ParticleSpread()(Progress(3, 3, WindowEstimate(None, None, spread_ms=1.0))).stop
+    assert not ParticleSpread()(Progress(3, 3, WindowEstimate(None, Window(1.0, 2.0)))).stop
+
+
+@pytest.mark.parametrize(("end_ms", "stop"), [(40.0, True), (45.0, False)])
+def test_a_sweep_that_has_left_the_window_behind_stops(end_ms: float, *, stop: bool) -> None:
+    estimate = WindowEstimate(None, Window(20.0, end_ms), grid_ms=np.arange(0.0, 66.0, 5.0))
+    assert SweptPast(25.0)(Progress(99, 99, estimate)).stop == stop
+
+
+def test_a_sweep_without_a_window_goes_on() -> None:
+    assert not SweptPast()(Progress(99, 99, WindowEstimate(None, None, grid_ms=np.arange(9.0)))).stop
+
+
+@pytest.mark.parametrize(
+    ("rule", "settings"),
+    [
+        (EdgeVariance, {"variance_ms2": 0.0}),
+        (EdgeVariance, {"last": 1}),
+        (EdgeVariance, {"last": 5.5}),
+        (EdgeVariance, {"edges": "none"}),
+        (ParticleSpread, {"sd_ms": 0.0}),
+        (SweptPast, {"quiet_ms": math.nan}),
+    ],
+)
+def test_a_rule_that_cannot_be_is_refused(rule: type, settings: dict[str, object]) -> None:
+    with pytest.raises(InvalidValueError):
+        rule(**settings)

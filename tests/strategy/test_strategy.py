@@ -1,0 +1,306 @@
+"""The strategy: what it asks, what it refuses to be told, and how it starts again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import torch
+
+from isiw.acquisition.information import MutualInformation, WindowGain
+from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.errors import InvalidValueError, OutOfSpaceError, StrategyError
+from isiw.models.protocol import Posterior, Tensor
+from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.stopping import Budget, EdgeVariance
+from isiw.strategy.strategy import Recipe, Strategy
+
+MakeStrategy = Callable[..., Strategy]
+MEPS_MV = [0.02, 0.0, 0.11, 0.05]
+
+
+def play(strategy: Strategy, meps_mv: list[float]) -> list[float]:
+    """The ISIs asked for while these amplitudes are told, and the next one."""
+    asks = []
+    for mep_mv in meps_mv:
+        asks.append(strategy.ask())
+        strategy.tell(asks[-1], mep_mv)
+    return [*asks, strategy.ask()]
+
+
+@pytest.fixture
+def particles() -> Strategy:
+    """The default strategy, with few particles."""
+    return make_strategy(particles=64, seed=3)
+
+
+@dataclass(frozen=True)
+class Scores:
+    """An acquisition function that gives the same scores whatever is believed."""
+
+    values: Tensor
+    needs: tuple[type, ...] = ()
+
+    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+        del posterior, isi_ms
+        return self.values[None]
+
+
+def test_ask_is_the_same_until_the_next_tell(scripted_strategy: MakeStrategy) -> None:
+    strategy = scripted_strategy()
+    first = strategy.ask()
+    assert [strategy.ask() for _ in range(3)] == [first] * 3
+    strategy.tell(first, 0.07)
+    assert strategy.ask() != first
+
+
+def test_every_ask_is_on_the_grid(particles: Strategy) -> None:
+    assert set(play(particles, MEPS_MV)) <= set(VALVE_SPACE.grid_ms)
+
+
+def test_the_same_seed_and_tells_give_the_same_asks() -> None:
+    runs = [play(make_strategy(particles=64, seed=seed), MEPS_MV) for seed in (3, 3, 4)]
+    assert runs[0] == runs[1] != runs[2]
+
+
+def test_other_tells_give_other_asks(scripted_strategy: MakeStrategy) -> None:
+    assert play(scripted_strategy(), [0.02, 0.05]) != play(scripted_strategy(), [0.02, 0.06])
+
+
+def test_asking_for_estimates_and_decisions_leaves_the_asks_alone() -> None:
+    quiet, watched = (make_strategy(particles=64, seed=3) for _ in range(2))
+    expected = play(quiet, MEPS_MV)
+    asks = []
+    for mep_mv in MEPS_MV:
+        watched.estimate()
+        asks.append(watched.ask())
+        watched.decision()
+        watched.tell(asks[-1], mep_mv)
+    assert [*asks, watched.ask()] == expected
+
+
+def test_a_restarted_strategy_replays_identically(particles: Strategy) -> None:
+    first = play(particles, MEPS_MV)
+    again = particles.restarted()
+    assert again.posterior.trials == 0
+    assert play(again, MEPS_MV) == first
+    np.testing.assert_array_equal(again.estimate().profile_quantiles_mv, particles.estimate().profile_quantiles_mv)
+    assert particles.posterior.trials == len(MEPS_MV)
+
+
+def test_a_restarted_strategy_keeps_its_recipe_and_forgets_its_mistrials(scripted_strategy: MakeStrategy) -> None:
+    strategy = scripted_strategy(max_trials=1)
+    strategy.count_mistrial()
+    again = strategy.restarted()
+    assert again.recipe == strategy.recipe == Recipe(name="", seed=0)
+    assert (strategy.decision().stop, again.decision().stop) == (True, False)
+
+
+REFUSED = [
+    ({"isi_ms": 250.0, "mep_mv": math.nan}, InvalidValueError, "mep_mv"),
+    ({"isi_ms": 250.0, "mep_mv": math.inf}, InvalidValueError, "mep_mv"),
+    ({"isi_ms": 250.0, "mep_mv": -0.01}, InvalidValueError, "mep_mv"),
+    ({"isi_ms": math.nan, "mep_mv": 0.1}, InvalidValueError, "realised ISI"),
+    ({"isi_ms": -math.inf, "mep_mv": 0.1}, InvalidValueError, "realised ISI"),
+    ({"isi_ms": 510.5, "mep_mv": 0.1}, OutOfSpaceError, "beyond the design space"),
+    ({"isi_ms": -10.5, "mep_mv": 0.1}, OutOfSpaceError, "beyond the design space"),
+    ({"isi_ms": 250.0}, InvalidValueError, "either mep_mv or response"),
+    ({"isi_ms": 250.0, "mep_mv": 0.1, "response": True}, InvalidValueError, "either mep_mv or response"),
+    ({"isi_ms": 250.0, "response": math.nan}, InvalidValueError, "True or False"),
+    ({"isi_ms": 250.0, "response": [True]}, InvalidValueError, "True or False"),
+    ({"isi_ms": 250.0, "response": 0.5}, InvalidValueError, "True or False"),
+    ({"isi_ms": 250.0, "mep_mv": 0.1, "isi_sd_ms": -1.0}, InvalidValueError, "isi_sd_ms"),
+    ({"isi_ms": 250.0, "mep_mv": 0.1, "isi_sd_ms": math.nan}, InvalidValueError, "isi_sd_ms"),
+    ({"isi_ms": 250.0, "response": True, "isi_sd_ms": math.inf}, InvalidValueError, "isi_sd_ms"),
+]
+
+
+@pytest.mark.parametrize(("told", "error", "what"), REFUSED)
+def test_what_cannot_be_is_refused_and_changes_nothing(
+    told: dict[str, object], error: type[Exception], what: str, particles: Strategy
+) -> None:
+    play(particles, [0.05])
+    before = particles.ask(), particles.posterior, particles.estimate(), particles.decision()
+    with pytest.raises(error, match=what):
+        particles.tell(**told)
+    assert (particles.ask(), particles.posterior, particles.estimate(), particles.decision()) == before
+
+
+def test_a_model_that_fails_leaves_the_strategy_as_it_was(
+    scripted_strategy: MakeStrategy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    strategy = scripted_strategy()
+    isi_ms, posterior = strategy.ask(), strategy.posterior
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("singular")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(type(strategy.model), "update", fail)
+        with pytest.raises(RuntimeError, match="singular"):
+            strategy.tell(isi_ms, 0.1)
+    assert strategy.posterior is posterior
+    assert strategy.decision().reason == "6 stimuli are left."
+    assert strategy.ask() == isi_ms
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        {"isi_ms": None, "mep_mv": 0.02},
+        {"isi_ms": 250.0, "mep_mv": 0.0},
+        {"isi_ms": 250.0, "response": True},
+        {"isi_ms": None, "response": False},
+        {"isi_ms": 247.3, "mep_mv": 0.05, "isi_sd_ms": 3.0},
+        {"isi_ms": 510.0, "mep_mv": 0.05},
+        {"isi_ms": -10.0, "mep_mv": 0.05},
+    ],
+)
+def test_every_legitimate_trial_is_learnt_from(told: dict[str, object], particles: Strategy) -> None:
+    untold = particles.estimate().profile_quantiles_mv
+    particles.tell(**told)
+    learnt = particles.estimate().profile_quantiles_mv
+    assert particles.posterior.trials == 1
+    assert np.isfinite(learnt).all()
+    assert not np.array_equal(learnt, untold)
+    assert particles.ask() in VALVE_SPACE.grid_ms
+
+
+def test_a_response_that_was_seen_raises_the_expected_mep_above_one_that_was_not(particles: Strategy) -> None:
+    unseen = particles.restarted()
+    for isi_ms in (240.0, 260.0, 280.0):
+        particles.tell(isi_ms, response=True)
+        unseen.tell(isi_ms, response=False)
+    seen_mv, unseen_mv = (s.estimate().profile([260.0]).median_mv[0] for s in (particles, unseen))
+    assert seen_mv > 1.5 * unseen_mv
+
+
+def test_a_mistrial_moves_the_budget_and_nothing_else(particles: Strategy) -> None:
+    play(particles, [0.05])
+    before = particles.ask(), particles.posterior, particles.estimate()
+    reason = particles.decision().reason
+    particles.count_mistrial()
+    assert (particles.ask(), particles.posterior, particles.estimate()) == before
+    assert "79 stimuli are left" in reason
+    assert particles.decision().reason == reason.replace("79 stimuli", "78 stimuli")
+
+
+def test_told_trials_and_mistrials_use_up_one_budget(scripted_strategy: MakeStrategy) -> None:
+    strategy = scripted_strategy(max_trials=3)
+    strategy.tell(strategy.ask(), 0.1)
+    strategy.count_mistrial()
+    assert not strategy.decision().stop
+    strategy.tell(None, 0.1)
+    assert strategy.decision().stop
+
+
+@pytest.mark.parametrize("acquisition", [WindowGain(), MutualInformation()])
+def test_an_acquisition_function_that_the_model_cannot_serve_is_refused_with_the_reason(
+    acquisition: WindowGain | MutualInformation, scripted_strategy: MakeStrategy
+) -> None:
+    model = scripted_strategy().model
+    with pytest.raises(StrategyError, match="cannot work with RememberingModel") as caught:
+        Strategy(VALVE_SPACE, model, acquisition, Budget(3))
+    assert all(need.__name__ in str(caught.value) for need in acquisition.needs)
+
+
+def test_a_tie_is_asked_at_the_first_isi_and_a_score_that_is_not_finite_never(scripted_strategy: MakeStrategy) -> None:
+    model = scripted_strategy().model
+    space = DesignSpace(0, 4)
+    tie = Scores(torch.tensor([math.inf, 0.0, math.nan, 2.0, 2.0]))
+    assert Strategy(space, model, tie, Budget(3)).ask() == 3.0
+
+
+def test_where_no_score_is_finite_the_isi_is_evenly_spaced_and_says_why(scripted_strategy: MakeStrategy) -> None:
+    nothing = Scores(torch.full((5,), math.nan))
+    strategy = Strategy(DesignSpace(0, 4), scripted_strategy().model, nothing, Budget(3))
+    asked = []
+    for _ in range(3):
+        asked.append(strategy.ask())
+        assert "Scores gives no ISI a finite score" in (strategy.fallback_reason or "")
+        strategy.tell(asked[-1], 0.02)
+    assert len(set(asked)) == 3
+
+
+def test_the_initial_isis_come_first_and_a_mistrial_repeats_one(scripted_strategy: MakeStrategy) -> None:
+    usual = scripted_strategy()
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, initial_ms=(0.0, 120.2, 200.0))
+    assert strategy.ask() == 0.0
+    strategy.count_mistrial()
+    assert strategy.ask() == 0.0
+    strategy.tell(1.0, 0.02)
+    strategy.tell(None, 0.02)
+    assert strategy.ask() == 120.0
+    assert strategy.restarted().ask() == 0.0
+
+
+def settled_after(strategy: Strategy, trials: int) -> bool:
+    """Whether the edges have settled after so many more pairs, each of which moves them by 1 ms."""
+    for _ in range(trials):
+        strategy.tell(strategy.ask(), 0.02)
+    return strategy.decision().stop
+
+
+def test_only_windows_after_the_initial_isis_tell_whether_the_edges_have_settled(
+    scripted_strategy: MakeStrategy,
+) -> None:
+    usual = scripted_strategy()
+    for initial_ms in ((), (0.0,), (0.0, 100.0, 200.0)):
+        strategy = Strategy(usual.space, usual.model, usual.acquisition, EdgeVariance(), initial_ms=initial_ms)
+        # The value after the last initial trial is the first.
+        assert not settled_after(strategy, max(1, len(initial_ms)) + 3)
+        assert settled_after(strategy, 1)
+
+
+def test_tms_alone_does_not_settle_the_edges(scripted_strategy: MakeStrategy) -> None:
+    usual = scripted_strategy()
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, EdgeVariance())
+    settled_after(strategy, 4)
+    for _ in range(5):
+        strategy.tell(None, 0.02)
+        assert not strategy.decision().stop
+    assert settled_after(strategy, 1)
+
+
+def test_a_cost_is_taken_off_the_scores(scripted_strategy: MakeStrategy) -> None:
+    level = Scores(torch.tensor([1.0, 2.0, 3.0, 4.0, 5.0]))
+    model = scripted_strategy().model
+    assert Strategy(DesignSpace(0, 4), model, level, Budget(3)).ask() == 4.0
+    assert Strategy(DesignSpace(0, 4), model, level, Budget(3), cost=lambda isi_ms: 2 * isi_ms).ask() == 0.0
+
+
+def test_a_batch_begins_with_what_is_asked_and_repeats_no_isi_that_has_been_learnt() -> None:
+    strategy = make_strategy("particles-window", particles=200)
+    for isi_ms, mep_mv in ((100.0, 0.01), (250.0, 0.2), (400.0, 0.01)):
+        strategy.tell(isi_ms, mep_mv)
+    batch = strategy.ask_batch(4)
+    assert batch[0] == strategy.ask()
+    assert batch == strategy.ask_batch(4)
+    assert len(set(batch)) == 4
+
+
+def test_a_batch_says_why_one_of_its_isis_is_not_the_acquisition_functions_choice() -> None:
+    model = make_strategy("default", particles=50).model
+    first = Strategy(DesignSpace(0, 4), model, Scores(torch.full((5,), math.nan)), Budget(3), initial_ms=(2.0,))
+    assert first.ask_batch(1) == [2.0]
+    assert first.fallback_reason is None
+    assert len(first.ask_batch(2)) == 2
+    assert "no ISI a finite score" in (first.fallback_reason or "")
+
+
+def test_a_batch_takes_up_the_initial_isis_first(scripted_strategy: MakeStrategy) -> None:
+    usual = scripted_strategy()
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, initial_ms=(0.0, 100.0, 200.0))
+    assert strategy.ask_batch(3) == [0.0, 100.0, 200.0]
+    assert strategy.ask_batch(2) == [0.0, 100.0]
+
+
+def test_a_batch_from_a_model_that_imagines_no_trials_is_refused(scripted_strategy: MakeStrategy) -> None:
+    with pytest.raises(StrategyError, match="cannot imagine trials"):
+        scripted_strategy().ask_batch(2)
+    assert len(scripted_strategy().ask_batch(1)) == 1
+    with pytest.raises(InvalidValueError, match="at least one"):
+        scripted_strategy().ask_batch(0)

@@ -1,0 +1,459 @@
+"""Simulated people: who is drawn, what is true of them, and how they answer.
+
+Distributions are checked with Kolmogorov–Smirnov tests at a level of 1e-5, and means within four standard errors; all
+seeds are fixed, so that a figure that fails has changed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.subjects.cohorts import COHORTS, cohort
+from isiw.subjects.profiles import PeakProfile, TwoPeakProfile
+from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
+from isiw.subjects.subject import Drift, SimulatedSubject
+from isiw.types import ArrayLike, FloatArray
+
+PEOPLE = 400
+KS_LEVEL = 1e-5
+USUAL_WIDTH = [name for name in COHORTS if name not in {"narrow", "wide", "kim11"}]
+GAIN = [name for name in COHORTS if name not in {"recruitment", "nonresponder", "kim11"}]
+SPACES = [VALVE_SPACE, IMPACT_SPACE]
+
+NO_FLOOR = EmgFloor(1e-12, 0.1)
+ALMOST_NO_NOISE = 0.01
+
+GOLDEN = {  # person 3 of seed 7: start, width, hit delay [ms]; baseline, one MEP at 250 ms after the valve command [µV]
+    "gaussian": (40.385003297, 142.605303763, 185.387790760, 9.283267197, 124.559797961),
+    "skewed": (71.838248366, 110.006953995, 182.049613457, 11.241728991, 17.141355539),
+    "plateau": (97.563982731, 156.792106940, 189.761084462, 14.992801624, 12.705447840),
+    "two-peak": (101.771074108, 85.471684805, 184.740219847, 7.509958859, 6.364284501),
+    "narrow": (15.075943097, 44.086013991, 186.396052820, 6.910930984, 17.623261535),
+    "wide": (22.701704279, 206.679454523, 185.044556284, 8.854540866, 88.836840965),
+    "low-response": (5.926701773, 124.685713882, 171.084615393, 12.755400053, 10.809392008),
+    "outliers": (37.564053483, 99.782330768, 184.525615202, 6.082426445, 27.590061987),
+    "drift": (69.012082281, 117.714815929, 171.709582996, 11.164728174, 26.665071479),
+    "jitter": (40.662382453, 76.481062757, 178.390330530, 9.113457604, 55.491849111),
+    "jitter-untold": (78.432525752, 208.300523975, 172.927639430, 9.351442068, 14.704390346),
+    "recruitment": (96.892748306, 71.935450590, 177.483696598, 21.276365608, 41.408047498),
+    "nonresponder": (26.795763804, 200.583631934, 171.477980223, 17.537323509, 27.809842272),
+    "kim11": (29.786337130, 70.000000000, 183.644876006, 27.459353025, 130.665956671),
+}
+
+
+@dataclass(frozen=True)
+class LinearProfile:
+    """A profile from whose value the ISI can be read."""
+
+    def __call__(self, isi_ms: ArrayLike) -> FloatArray:
+        return np.asarray(isi_ms, dtype=float) / 1000.0
+
+
+def people(name: str) -> list[SimulatedSubject]:
+    return cohort(name, PEOPLE, seed=3)
+
+
+def assert_uniform(values: object, low: float, high: float) -> None:
+    array = np.asarray(values, dtype=float)
+    assert low <= array.min()
+    assert array.max() <= high
+    assert stats.kstest(array, stats.uniform(low, high - low).cdf).pvalue > KS_LEVEL
+
+
+def assert_log_normal(values: object, median: float, log_sd: float) -> None:
+    z = np.log(np.asarray(values, dtype=float) / median) / log_sd
+    assert stats.kstest(z, stats.norm.cdf).pvalue > KS_LEVEL
+
+
+def bare_subject(**changes: object) -> SimulatedSubject:
+    """A person who answers with the facilitation itself, almost without noise."""
+    return SimulatedSubject(
+        LinearProfile(), GainResponse(NO_FLOOR, 1.0, 1e-6), hit_delay_ms=180.0, hit_delay_sd_ms=0.0, **changes
+    )
+
+
+def sweep_of_meps(subject: SimulatedSubject, isi_ms: float | None, trials: int, seed: int) -> np.ndarray:
+    responder = subject.begin(seed)
+    return np.array([responder.respond(isi_ms, "impact").mep_mv for _ in range(trials)])
+
+
+# Who is drawn
+
+
+@pytest.mark.parametrize("name", COHORTS)
+def test_person_3_of_seed_7_is_the_same_on_every_machine(name: str) -> None:
+    subject = cohort(name, 4, 7)[3]
+    mep_mv = subject.begin(11).respond(250.0, "valve").mep_mv
+    profile = subject.profile
+    drawn = (profile.start_ms, profile.width_ms, subject.hit_delay_ms, 1e3 * subject.baseline_mv, 1e3 * mep_mv)
+    assert drawn == pytest.approx(GOLDEN[name], rel=1e-7)
+
+
+def test_every_cohort_has_its_golden_person() -> None:
+    assert set(GOLDEN) == set(COHORTS)
+
+
+@pytest.mark.parametrize("name", COHORTS)
+def test_a_person_depends_neither_on_how_many_are_drawn_nor_on_earlier_draws(name: str) -> None:
+    assert cohort(name, 20, 5)[:3] == cohort(name, 3, 5) == cohort(name, 3, 5)
+
+
+@pytest.mark.parametrize("name", COHORTS)
+def test_people_differ_within_a_cohort(name: str) -> None:
+    assert len({subject.hit_delay_ms for subject in cohort(name, 11, 5)}) == 11
+
+
+@pytest.mark.parametrize("name", [name for name in COHORTS if name != "kim11"])
+def test_people_differ_from_seed_to_seed(name: str) -> None:
+    assert all(a != b for a, b in zip(cohort(name, 5, 5), cohort(name, 5, 6), strict=True))
+
+
+def test_cohorts_do_not_share_their_people() -> None:
+    delays = {name: cohort(name, 1, 5)[0].hit_delay_ms for name in COHORTS}
+    assert len(set(delays.values())) == len(COHORTS)
+
+
+def test_an_unknown_cohort_names_the_known_ones() -> None:
+    with pytest.raises(InvalidValueError, match="kim11") as caught:
+        cohort("martian", 1, 0)
+    assert all(name in str(caught.value) for name in COHORTS)
+
+
+@pytest.mark.parametrize(("n", "seed"), [(-1, 0), (1, -1)])
+def test_a_negative_number_of_people_or_seed_is_refused(n: int, seed: int) -> None:
+    with pytest.raises(InvalidValueError, match="not be negative"):
+        cohort("gaussian", n, seed)
+
+
+def test_nobody_is_a_cohort_too() -> None:
+    assert cohort("gaussian", 0, 0) == []
+
+
+@pytest.mark.parametrize("name", [name for name in COHORTS if name != "kim11"])
+def test_windows_start_and_taps_arrive_as_stated(name: str) -> None:
+    drawn = people(name)
+    assert_uniform([s.profile.start_ms for s in drawn], 5, 110)
+    assert_uniform([s.hit_delay_ms for s in drawn], 170, 190)
+    assert_uniform([s.hit_delay_sd_ms for s in drawn], 1, 4)
+
+
+@pytest.mark.parametrize("name", USUAL_WIDTH)
+def test_widths_are_log_normal_and_clipped(name: str) -> None:
+    widths = np.array([s.profile.width_ms for s in people(name)])
+    assert widths.min() >= 40
+    assert widths.max() <= 230
+    unclipped = widths[(widths > 40) & (widths < 230)]
+    law = stats.norm(math.log(100), 0.42)
+    low, high = law.cdf(np.log([40, 230]))
+    assert stats.kstest((law.cdf(np.log(unclipped)) - low) / (high - low), "uniform").pvalue > KS_LEVEL
+    # Of 400 people 6 and 9 are expected at the two ends; 20 or more come by chance in fewer than 1 of 1000 seeds.
+    assert (widths == 40).sum() < 20
+    assert (widths == 230).sum() < 25
+
+
+@pytest.mark.parametrize(("name", "low_ms", "high_ms"), [("narrow", 35, 50), ("wide", 180, 230)])
+def test_narrow_and_wide_windows_have_their_widths(name: str, low_ms: float, high_ms: float) -> None:
+    assert_uniform([s.profile.width_ms for s in people(name)], low_ms, high_ms)
+
+
+@pytest.mark.parametrize("name", GAIN)
+def test_gains_and_floors_are_those_of_the_kind_noise(name: str) -> None:
+    responses = [s.response for s in people(name)]
+    assert all(isinstance(r, GainResponse) and r.floor.log_sd == 0.35 for r in responses)
+    assert_log_normal([r.floor.median_mv for r in responses], 0.008, 0.3)
+    assert_log_normal([r.gain_mv for r in responses], 0.06, 0.5)
+    assert_uniform([r.cv for r in responses], 0.4, 0.9)
+
+
+@pytest.mark.parametrize("name", [name for name in COHORTS if name not in {"skewed", "plateau", "two-peak"}])
+def test_profiles_are_gaussian_unless_stated(name: str) -> None:
+    assert all(s.profile == PeakProfile(s.profile.start_ms, s.profile.width_ms) for s in people(name))
+
+
+def test_skewed_profiles_peak_early_or_late_half_of_the_time() -> None:
+    peak_at = np.array([s.profile.peak_at for s in people("skewed")])
+    late = peak_at > 0.5
+    assert_uniform(np.where(late, 1 - peak_at, peak_at), 0.22, 0.40)
+    assert late.mean() == pytest.approx(0.5, abs=4 * 0.5 / math.sqrt(PEOPLE))
+    assert {s.profile.exponent for s in people("skewed")} == {2.0}
+
+
+def test_plateaus_are_flat_topped_and_symmetric() -> None:
+    assert_uniform([s.profile.exponent for s in people("plateau")], 4, 8)
+    assert {s.profile.peak_at for s in people("plateau")} == {0.5}
+
+
+def test_two_peaks_have_one_of_height_1_and_a_lower_one_on_either_side() -> None:
+    profiles = [s.profile for s in people("two-peak")]
+    assert all(isinstance(p, TwoPeakProfile) for p in profiles)
+    assert_uniform([min(p.first, p.second) for p in profiles], 0.4, 1.0)
+    first_higher = np.mean([p.first > p.second for p in profiles])
+    assert first_higher == pytest.approx(0.5, abs=4 * 0.5 / math.sqrt(PEOPLE))
+
+
+def test_low_responders_have_a_response_probability_and_others_none() -> None:
+    assert_uniform([s.response.max_response_probability for s in people("low-response")], 0.4, 0.7)
+    others = [name for name in GAIN if name != "low-response"]
+    assert {s.response.max_response_probability for name in others for s in cohort(name, 20, 3)} == {None}
+
+
+def test_only_the_cohorts_that_say_so_have_outliers_drift_or_jitter() -> None:
+    for name in COHORTS:
+        for subject in cohort(name, 20, 3):
+            assert subject.outlier_probability == (0.06 if name == "outliers" else 0.0)
+            assert subject.drift == (Drift(0.97, 0.12, (0.29, 0.20)) if name == "drift" else None)
+            assert (subject.isi_jitter_ms > 0) == name.startswith("jitter")
+            assert subject.jitter_told == (name != "jitter-untold")
+            assert subject.scale == 1.0
+
+
+@pytest.mark.parametrize("name", ["jitter", "jitter-untold"])
+def test_jitter_has_an_sd_of_1_to_5_ms(name: str) -> None:
+    assert_uniform([s.isi_jitter_ms for s in people(name)], 1, 5)
+
+
+def test_recruitment_has_the_parameters_of_the_physiology_table() -> None:
+    drawn = people("recruitment")
+    responses = [s.response for s in drawn]
+    assert all(isinstance(r, RecruitmentResponse) for r in responses)
+    assert {(r.slope_per_pct, r.intensity_pct_rmt) for r in responses} == {(0.30, 90.0)}
+    assert_log_normal([r.amplitude_mv for r in responses], 0.16, 0.35)
+    assert_log_normal([r.floor.median_mv for r in responses], 0.010, 0.25)
+    assert_uniform([r.floor.log_sd for r in responses], 0.12, 0.25)
+    assert_uniform([r.x50_pct_rmt for r in responses], 103, 107)
+    assert_uniform([r.boost_pct_rmt for r in responses], 6, 18)
+    assert_uniform([r.sigma_x_pct_rmt for r in responses], 5, 9)
+    assert_uniform([r.sigma_y for r in responses], 0.3, 0.5)
+    assert_uniform([s.input_correlation for s in drawn], 0, 0.2)
+
+
+def test_half_of_the_nonresponders_are_of_either_kind() -> None:
+    drawn = people("nonresponder")
+    kinds = [type(s.response) for s in drawn]
+    assert kinds.count(GainResponse) == kinds.count(RecruitmentResponse) == PEOPLE // 2
+    assert {s.response.gain_mv for s in drawn if isinstance(s.response, GainResponse)} == {0.0}
+    assert {s.response.boost_pct_rmt for s in drawn if isinstance(s.response, RecruitmentResponse)} == {0.0}
+
+
+def test_kim11_has_the_eleven_widths_of_table_4_1_in_order() -> None:
+    drawn = cohort("kim11", 11, 0)
+    assert [s.profile.width_ms for s in drawn] == [75, 65, 80, 70, 110, 120, 220, 145, 135, 110, 60]
+    assert all(20 <= s.profile.start_ms <= 100 and 6 <= s.response.boost_pct_rmt <= 14 for s in drawn)
+
+
+def test_kim11_cycles_over_its_eleven_people_and_ignores_the_seed() -> None:
+    assert cohort("kim11", 25, 0) == cohort("kim11", 25, 10_000)
+    assert cohort("kim11", 25, 0)[11:22] == cohort("kim11", 11, 0)
+
+
+# What is true of them
+
+
+@pytest.mark.parametrize("space", SPACES, ids=["valve", "impact"])
+def test_a_nonresponder_has_no_window(space: DesignSpace) -> None:
+    assert {s.window(space) for s in people("nonresponder")} == {None}
+
+
+@pytest.mark.parametrize("space", SPACES, ids=["valve", "impact"])
+@pytest.mark.parametrize("name", [name for name in COHORTS if name != "nonresponder"])
+def test_everybody_else_has_one(name: str, space: DesignSpace) -> None:
+    assert all(s.window(space) is not None for s in cohort(name, 60, 3))
+
+
+@pytest.mark.parametrize("name", ["gaussian", "skewed", "narrow", "wide", "outliers", "drift", "jitter"])
+def test_the_window_of_a_gain_is_the_span_of_its_profile(name: str) -> None:
+    for subject in cohort(name, 60, 3):
+        window = subject.window(IMPACT_SPACE)
+        span = (subject.profile.start_ms, min(subject.profile.start_ms + subject.profile.width_ms, 320.0))
+        # exp(-2) is 0.1353, a little above the rule's 0.135.
+        assert (window.start_ms, window.end_ms) == pytest.approx(span, abs=1.0)
+
+
+def test_a_window_counts_from_the_valve_later_by_the_hit_delay() -> None:
+    for subject in cohort("gaussian", 60, 3):
+        by_valve, by_impact = subject.window(VALVE_SPACE), subject.window(IMPACT_SPACE)
+        assert by_valve.start_ms - by_impact.start_ms == pytest.approx(subject.hit_delay_ms, abs=1.0)
+
+
+def test_a_low_responder_has_a_narrower_window_than_the_profile_alone() -> None:
+    for subject in cohort("low-response", 60, 3):
+        whole = replace(subject, response=replace(subject.response, max_response_probability=None))
+        assert subject.window(VALVE_SPACE).width_ms < whole.window(VALVE_SPACE).width_ms
+
+
+@pytest.mark.parametrize("space", SPACES, ids=["valve", "impact"])
+def test_a_two_peaked_window_is_one_segment_where_its_valley_is_above_the_rule(space: DesignSpace) -> None:
+    # No valley of this cohort is below: its peaks are 3.45 SDs apart, so each has 0.23 of its height half way.
+    drawn = [s for s in people("two-peak") if s.profile.start_ms + s.profile.width_ms < 300]
+    assert drawn
+    for subject in drawn:
+        profile = subject.profile
+        between = np.linspace(0.27, 0.73, 500) * profile.width_ms + profile.start_ms
+        assert profile(between).min() > 0.135 * profile(between).max()
+        assert len(subject.window(space).segments) == 1
+
+
+def test_a_person_with_two_peaks_far_apart_has_a_window_of_two_segments() -> None:
+    @dataclass(frozen=True)
+    class FarPeaks:
+        def __call__(self, isi_ms: ArrayLike) -> FloatArray:
+            isi = np.asarray(isi_ms, dtype=float)
+            return np.exp(-0.5 * ((isi - 60) / 10) ** 2) + 0.6 * np.exp(-0.5 * ((isi - 160) / 10) ** 2)
+
+    subject = SimulatedSubject(FarPeaks(), GainResponse(EmgFloor(0.008, 0.3), 0.06, 0.5), 180.0, 2.0)
+    first, second = subject.window(IMPACT_SPACE).segments
+    assert first == pytest.approx((40, 80), abs=1)
+    half_ms = 10 * math.sqrt(2 * math.log(0.6 / 0.135))
+    assert second == pytest.approx((160 - half_ms, 160 + half_ms), abs=1)
+
+
+@pytest.mark.parametrize("name", ["gaussian", "recruitment", "nonresponder"])
+def test_the_window_does_not_depend_on_the_unit_above_the_least_excess(name: str) -> None:
+    for subject in cohort(name, 20, 3):
+        assert replace(subject, scale=10.0).window(VALVE_SPACE) == subject.window(VALVE_SPACE)
+
+
+def test_what_differs_from_trial_to_trial_leaves_the_truth_alone() -> None:
+    subject = cohort("gaussian", 1, 3)[0]
+    disturbed = replace(subject, drift=Drift(), outlier_probability=0.06, isi_jitter_ms=5.0, jitter_told=False)
+    np.testing.assert_array_equal(disturbed.expected_mep_mv(VALVE_SPACE), subject.expected_mep_mv(VALVE_SPACE))
+    assert disturbed.baseline_mv == subject.baseline_mv
+
+
+# How they answer
+
+
+@pytest.mark.parametrize("name", ["gaussian", "low-response", "recruitment", "nonresponder"])
+@pytest.mark.parametrize("share", [None, 0.0, 0.5])
+def test_answers_have_the_expected_mep_as_their_mean(name: str, share: float | None) -> None:
+    subject = replace(cohort(name, 1, 3)[0], hit_delay_sd_ms=0.0, input_correlation=0.0)
+    isi_ms = None if share is None else round(subject.profile.start_ms + share * subject.profile.width_ms)
+    meps = sweep_of_meps(subject, isi_ms, 8000, seed=21)
+    expected = subject.baseline_mv if isi_ms is None else subject.expected_mep_mv(IMPACT_SPACE)[isi_ms]
+    assert meps.mean() == pytest.approx(expected, abs=4 * meps.std() / math.sqrt(len(meps)))
+
+
+@pytest.mark.parametrize("name", COHORTS)
+def test_the_same_session_seed_gives_the_same_answers_and_another_does_not(name: str) -> None:
+    subject = cohort(name, 1, 3)[0]
+    runs = [
+        [responder.respond(isi_ms, "valve") for isi_ms in (200.0, None, 250.0)]
+        for responder in (subject.begin(1), subject.begin(1), subject.begin(2))
+    ]
+    assert runs[0] == runs[1] != runs[2]
+
+
+def test_two_sessions_with_one_person_do_not_disturb_each_other() -> None:
+    subject = cohort("drift", 1, 3)[0]
+    alone = subject.begin(1)
+    expected = [alone.respond(250.0, "valve") for _ in range(4)]
+    one, other = subject.begin(1), subject.begin(2)
+    answers = []
+    for _ in range(4):
+        answers.append(one.respond(250.0, "valve"))
+        other.respond(100.0, "valve")
+    assert answers == expected
+
+
+def test_tms_alone_is_told_without_an_isi() -> None:
+    for name in ("gaussian", "jitter", "jitter-untold"):
+        response = cohort(name, 1, 3)[0].begin(1).respond(None, "impact")
+        assert (response.isi_ms, response.isi_sd_ms) == (None, 0.0)
+
+
+def test_amplitudes_scale_with_the_unit() -> None:
+    subject = cohort("outliers", 1, 3)[0]
+    meps = sweep_of_meps(subject, 60.0, 200, seed=1)
+    np.testing.assert_allclose(sweep_of_meps(replace(subject, scale=10.0), 60.0, 200, seed=1), 10 * meps)
+
+
+def test_from_the_valve_the_hit_delay_varies_unseen() -> None:
+    subject = replace(bare_subject(), hit_delay_sd_ms=3.0)
+    responder = subject.begin(4)
+    answers = [responder.respond(400.0, "valve") for _ in range(4000)]
+    assert {(a.isi_ms, a.isi_sd_ms) for a in answers} == {(400.0, 0.0)}
+    from_impact_ms = 1e3 * np.array([a.mep_mv for a in answers])
+    assert from_impact_ms.mean() == pytest.approx(400.0 - 180.0, abs=4 * 3 / math.sqrt(4000))
+    assert from_impact_ms.std() == pytest.approx(3.0, rel=4 / math.sqrt(2 * 4000))
+
+
+def test_from_the_impact_the_realised_isi_varies_with_the_hit_delay_and_is_told() -> None:
+    responder = replace(bare_subject(), hit_delay_sd_ms=3.0).begin(4)
+    answers = [responder.respond(200.0, "impact") for _ in range(4000)]
+    told_ms = np.array([a.isi_ms for a in answers])
+    assert told_ms.mean() == pytest.approx(200.0, abs=4 * 3 / math.sqrt(4000))
+    assert told_ms.std() == pytest.approx(3.0, rel=4 / math.sqrt(2 * 4000))
+    np.testing.assert_allclose([1e3 * a.mep_mv for a in answers], told_ms, rtol=1e-4)
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_jitter_moves_the_realised_isi_and_is_told_or_not(*, told: bool) -> None:
+    responder = bare_subject(isi_jitter_ms=4.0, jitter_told=told).begin(5)
+    answers = [responder.respond(200.0, "impact") for _ in range(4000)]
+    realised_ms = 1e3 * np.array([a.mep_mv for a in answers])
+    assert realised_ms.std() == pytest.approx(4.0, rel=4 / math.sqrt(2 * 4000))
+    if told:
+        np.testing.assert_allclose([a.isi_ms for a in answers], realised_ms, rtol=1e-4)
+    assert {a.isi_sd_ms for a in answers} == {0.0 if told else 4.0}
+    assert ({a.isi_ms for a in answers} == {200.0}) == (not told)
+
+
+def test_6_in_100_trials_are_artefacts_of_100_to_500_uv() -> None:
+    subject = bare_subject(outlier_probability=0.06)
+    meps = sweep_of_meps(subject, None, 10_000, seed=6)
+    artefacts = meps[meps > 1e-6]
+    assert len(artefacts) / len(meps) == pytest.approx(0.06, abs=4 * math.sqrt(0.06 * 0.94 / 10_000))
+    assert_uniform(artefacts, 0.1, 0.5)
+
+
+def log_gains(trials: int, seed: int) -> np.ndarray:
+    subject = replace(bare_subject(drift=Drift()), response=GainResponse(NO_FLOOR, 1.0, ALMOST_NO_NOISE))
+    return np.log(sweep_of_meps(subject, 1000.0, trials, seed))
+
+
+def test_drift_is_an_ar_1_walk() -> None:
+    walk = log_gains(10_000, seed=7)[2:]
+    persistence = float(walk[1:] @ walk[:-1] / (walk[:-1] @ walk[:-1]))
+    assert persistence == pytest.approx(0.97, abs=4 * math.sqrt((1 - 0.97**2) / len(walk)))
+    steps = walk[1:] - 0.97 * walk[:-1]
+    assert steps.std() == pytest.approx(0.12, rel=4 / math.sqrt(2 * len(walk)))
+
+
+def test_drift_starts_from_zero_with_larger_first_trials() -> None:
+    first = np.array([log_gains(3, seed) for seed in range(1000)])
+    spread = 0.12 * np.sqrt([1, 1 + 0.97**2, 1 + 0.97**2 + 0.97**4])
+    np.testing.assert_allclose(first.mean(0), [0.29, 0.20, 0.0], atol=4 * spread.max() / math.sqrt(1000))
+    np.testing.assert_allclose(first.std(0), spread, rtol=4 / math.sqrt(2 * 1000))
+
+
+def input_noise(correlation: float, trials: int, seed: int) -> np.ndarray:
+    curve = RecruitmentResponse(NO_FLOOR, 1.0, 0.30, 104.0, 0.0, 7.2, 0.0)
+    subject = replace(bare_subject(input_correlation=correlation), response=curve)
+    meps = sweep_of_meps(subject, None, trials, seed)
+    return (np.log(meps / (1 - meps)) / 0.30 + 14.0) / 7.2
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.2])
+def test_input_noise_is_standard_normal_with_its_lag_1_correlation(correlation: float) -> None:
+    z = input_noise(correlation, 10_000, seed=8)
+    assert z.mean() == pytest.approx(0.0, abs=4 * math.sqrt((1 + correlation) / (1 - correlation) / 10_000))
+    assert z.std() == pytest.approx(1.0, abs=0.035)
+    assert np.corrcoef(z[1:], z[:-1])[0, 1] == pytest.approx(correlation, abs=0.04)
+
+
+def test_input_noise_has_its_full_spread_from_the_first_trial_on() -> None:
+    first = np.array([input_noise(0.2, 1, seed)[0] for seed in range(1000)])
+    assert stats.kstest(first, stats.norm.cdf).pvalue > KS_LEVEL
+
+
+@pytest.mark.parametrize("stimulus", [(100.0, "hit"), (100.0, "Valve"), (float("nan"), "valve")])
+def test_a_stimulus_that_means_nothing_is_refused(stimulus):
+    with pytest.raises(InvalidValueError):
+        cohort("gaussian", 1, 0)[0].begin(0).respond(*stimulus)

@@ -1,0 +1,205 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from isiw.design import DesignSpace
+from isiw.devices.robot.tapper import Tapper, TapperSettings
+from isiw.errors import InvalidValueError
+from isiw.log.reader import read_session
+from isiw.repeatability import (
+    STUDY_ISI_MS,
+    TimingStudy,
+    error_table,
+    event_table,
+    study_preset,
+    study_session,
+    study_sweeps,
+    timing_report,
+)
+from isiw.session.loop import Session
+from isiw.signals import TapEvents
+from isiw.trials import Stimulus
+
+# Table 3.2 of the dissertation: mean and SD [ms from the trial's start], number of taps.
+TABLE = {
+    "bench": ({"fill": (523, 0), "descent": (621, 2), "hit": (688, 1), "away": (690, 1)}, 50),
+    "subject1": (
+        {"fill": (523, 0), "descent": (631, 5), "hit": (683, 4), "away": (698, 4), "memg": (701, 4)},
+        538,
+    ),
+    "subject2": (
+        {"fill": (523, 0), "descent": (626, 4), "hit": (672, 2), "away": (681, 2), "memg": (695, 2)},
+        324,
+    ),
+    "subject3": (
+        {"fill": (523, 0), "descent": (615, 2), "hit": (676, 1), "away": (693, 1), "memg": (695, 1)},
+        252,
+    ),
+    "subject4": (
+        {"fill": (523, 0), "descent": (629, 2), "hit": (682, 1), "away": (697, 1), "memg": (704, 2)},
+        346,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_the_presets_reproduce_the_event_table_by_detection_on_their_waveforms(name):
+    expected, taps = TABLE[name]
+    table = study_preset(name, taps=taps, isi_ms=(), seed=1).event_table
+    assert set(table.index) == set(expected)
+    for event, (mean_ms, sd_ms) in expected.items():
+        assert table.loc[event, "mean_ms"] == pytest.approx(mean_ms, abs=1.0), event
+        assert table.loc[event, "sd_ms"] == pytest.approx(sd_ms, abs=1.0), event
+        assert table.loc[event, "n"] == taps, event
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_gaussian_preset_has_the_pooled_isi_error_and_no_mistrials(seed):
+    study = study_preset("cushion", seed=seed)
+    assert len(study.commanded_ms) == 900
+    assert study.pooled_sd_ms == pytest.approx(1.93, abs=0.3)
+    assert study.error_table["mean_ms"].abs().max() <= 1.5
+    assert study.mistrials == 0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_timing_fault_preset_has_negative_isis_at_10_ms_only(seed):
+    table = study_preset("timing-fault", seed=seed).error_table
+    assert table.loc[10.0, "mistrials"] == pytest.approx(8, abs=5)
+    assert (table.drop(10.0)["mistrials"] == 0).all()
+
+
+def test_a_mistrial_counts_and_is_left_out_of_the_statistics():
+    commanded = np.array([10.0, 10.0, 10.0, 10.0, np.nan])
+    table = error_table(commanded, np.array([11.0, 9.5, -3.0, np.nan, 5.0]))
+    assert table.loc[10.0].to_dict() == pytest.approx(
+        {"n": 2, "mean_ms": 0.25, "sd_ms": np.std([1.0, -0.5], ddof=1), "mistrials": 2}
+    )
+
+
+def test_an_event_that_was_never_found_is_not_in_the_table():
+    nowhere = np.full(3, np.nan)
+    events = TapEvents(nowhere, nowhere, np.array([680.0, 682.0, np.nan]), nowhere, nowhere)
+    table = event_table(events)
+    assert table.index.tolist() == ["hit"]
+    assert table.loc["hit", ["mean_ms", "low_ms", "high_ms", "n"]].tolist() == [681.0, 680.0, 682.0, 2.0]
+
+
+def test_the_pooled_sd_leaves_the_means_of_the_sets_out():
+    study = study_preset("subject4", taps=50, isi_ms=(30.0, 60.0), seed=3)
+    shifted = type(study)(
+        "shifted", study.events, study.commanded_ms, study.realised_ms + np.where(study.commanded_ms > 40, 7.0, 0.0)
+    )
+    assert shifted.pooled_sd_ms == pytest.approx(study.pooled_sd_ms)
+
+
+@pytest.mark.parametrize("lost", [(), (10.0,), (10.0, 20.0, 30.0)])
+def test_an_isi_of_which_every_trial_is_lost_leaves_the_pooled_sd_as_it_is(lost):
+    commanded = np.array([50.0, 50.0, 50.0, *lost])
+    realised = np.array([49.0, 50.0, 51.0, *(-1.0 for _ in lost)])
+    events = TapEvents(*(np.full(len(commanded), np.nan) for _ in range(5)))
+    assert TimingStudy("hand-made", events, commanded, realised).pooled_sd_ms == pytest.approx(1.0)
+
+
+def test_recorded_sweeps_are_studied_like_a_preset():
+    class Silent:
+        mep_mv = 0.0
+
+    device = Tapper(lambda _: Silent(), "subject4", TapperSettings(trigger="impact"))
+    device.stage()
+    sweeps = [device.deliver(Stimulus(trial, 50.0), 1.0) for trial in range(30)]
+    study = study_sweeps("thirty taps", sweeps, [50.0] * 30)
+    assert study.event_table.loc["hit", "mean_ms"] == pytest.approx(682, abs=1.0)
+    assert study.pooled_sd_ms < 0.1
+    assert study.mistrials == 0
+
+
+class TapperOnThePulsesClock(Tapper):
+    """The tapping robot, on a sweep clock that is zero at the magnetic pulse."""
+
+    def deliver(self, stimulus, timeout_s):
+        sweep = super().deliver(stimulus, timeout_s)
+        pulse_ms = sweep.t_tms_ms
+        channels = {name: replace(wave, t0_ms=wave.t0_ms - pulse_ms) for name, wave in sweep.channels.items()}
+        return replace(sweep, channels=channels, t_valve_ms=sweep.t_valve_ms - pulse_ms, t_tms_ms=0.0)
+
+
+def test_a_sweep_clock_that_begins_elsewhere_changes_nothing():
+    class Silent:
+        mep_mv = 0.0
+
+    isi_ms = [20.0, 150.0] * 5
+    studies = []
+    for kind in (Tapper, TapperOnThePulsesClock):
+        device = kind(lambda _: Silent(), "subject4", TapperSettings(trigger="impact"))
+        device.stage()
+        sweeps = [device.deliver(Stimulus(trial, isi), 1.0) for trial, isi in enumerate(isi_ms)]
+        studies.append(study_sweeps("ten taps", sweeps, isi_ms))
+    usual, other = studies
+    for name, times in usual.events.columns().items():
+        np.testing.assert_allclose(other.events.columns()[name], times, atol=1e-9, err_msg=name)
+    np.testing.assert_allclose(other.realised_ms, usual.realised_ms, atol=1e-9)
+    assert usual.event_table.loc["hit", "mean_ms"] == pytest.approx(682, abs=2.0)
+
+
+def test_a_logged_session_is_studied_like_a_preset(tmp_path, scripted_strategy):
+    class Silent:
+        mep_mv = 0.0
+
+    space = DesignSpace(0, 200, reference="impact")
+    device = Tapper(lambda _: Silent(), "subject4")
+    strategy = scripted_strategy(max_trials=12, space=space)
+    result = Session(device, strategy, log=tmp_path / "taps.mcap").run()
+    study = study_session(read_session(result.log))
+    assert len(study.commanded_ms) == 12
+    logged = [trial.t_hit_ms for trial in result.trials]
+    np.testing.assert_allclose(study.events.hit_ms, logged, atol=0.01)
+    apart = [trial.isi_ms > 14 for trial in result.trials]  # sooner, the tap shows when the MEP does
+    assert 0 < sum(apart) < 12
+    assert study.event_table.loc["memg", "n"] == sum(apart)
+
+
+@pytest.mark.parametrize("fault", [0.0, np.nan])
+@pytest.mark.parametrize("name", ["acceleration", "emg"])
+def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path, scripted_strategy, name, fault):
+    class Silent:
+        mep_mv = 0.0
+
+    class Faulty(Tapper):
+        def deliver(self, stimulus, timeout_s):
+            sweep = super().deliver(stimulus, timeout_s)
+            if stimulus.trial != 1:
+                return sweep
+            dead = replace(sweep.channels[name], values=np.full_like(sweep.channels[name].values, fault))
+            return replace(sweep, channels={**sweep.channels, name: dead})
+
+    strategy = scripted_strategy(max_trials=4, space=DesignSpace(20, 200, reference="impact"))
+    result = Session(Faulty(lambda _: Silent(), "subject4"), strategy, log=tmp_path / "taps.mcap").run()
+    study = study_session(read_session(result.log))
+    event = "hit" if name == "acceleration" else "memg"
+    assert np.isnan(study.events.columns()[event]).tolist() == [False, True, False, False]
+    assert study.mistrials == (1 if name == "acceleration" else 0)
+    assert "4 taps" in timing_report(study)
+
+
+def test_the_report_says_all_of_it():
+    study = study_preset("cushion", taps=10, seed=4)
+    report = timing_report(study)
+    assert "90 taps" in report
+    assert f"{study.pooled_sd_ms:.2f} ms" in report
+    assert all(f"\n{isi:7g}" in report for isi in STUDY_ISI_MS)
+
+
+def test_a_study_of_nothing_is_an_error():
+    with pytest.raises(InvalidValueError, match="needs taps"):
+        study_preset("bench", taps=0)
+    with pytest.raises(InvalidValueError, match="needs sweeps"):
+        study_sweeps("nothing", [], [])
+
+
+def test_a_seed_that_is_none_is_refused():
+    with pytest.raises(InvalidValueError, match="seed"):
+        study_preset("subject1", taps=1, seed=-1)
