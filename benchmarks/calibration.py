@@ -65,12 +65,11 @@ def replicate(batch: Batch) -> list[dict[str, float]]:
     people = [model.simulate(SPACE, seed, isi_ms) for seed, isi_ms in zip(seeds, isis_ms, strict=True)]
     meps_mv = np.stack([person.mep_mv for person in people])
     told = [_observation(*trial) for trial in zip(isis_ms.T, meps_mv.T, strict=True)]
-    return list(_judged(_after(model, model.prior(SPACE, batch.first_seed, batch.people), told), people, seeds))
+    return list(_judged(_after(model, model.begin(SPACE, batch.first_seed, batch.people), told), people, seeds))
 
 
 def _observation(isi_ms: np.ndarray, mep_mv: np.ndarray) -> Observation:
-    known = (torch.tensor(x, dtype=torch.float32) for x in (isi_ms, mep_mv))
-    return Observation(*known, torch.zeros(len(isi_ms)), torch.full((len(isi_ms),), math.nan))
+    return Observation.of(isi_ms.tolist(), mep_mv.tolist())
 
 
 def _after(model: ResponseModel, posterior: Posterior, told: Sequence[Observation]) -> Posterior:

@@ -23,7 +23,7 @@ from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import OUTLIERS_MV, SimulatedSubject
 from isiw.types import BoolArray, FloatArray
-from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window
+from isiw.window import Window, least_excess_mv
 
 LEVELS = np.linspace(0.0, 1.0, 61) ** 2
 BINS = 72
@@ -130,12 +130,11 @@ class Oracle:
 
     def _windows(self, facilitation: FloatArray) -> BoolArray:
         """Windows by the 0.135 rule, empty where the range reaches too little, shape of `facilitation`."""
-        response, baseline_mv = self.subject.response, self.subject.baseline_mv / self.subject.scale
+        response = self.subject.response
         excess_mv = response.expected_evoked_mv(LEVELS) - response.expected_evoked_mv(0.0)
         peak_mv = np.interp(facilitation.max(-1, keepdims=True), LEVELS, excess_mv)
-        edge = np.interp(EDGE_LEVEL * peak_mv, excess_mv, LEVELS)
-        least_mv = max(MIN_EXCESS_OF_BASELINE * baseline_mv, MIN_EXCESS_MV / self.subject.scale)
-        return (facilitation >= edge) & (peak_mv >= least_mv)
+        least_mv = least_excess_mv(self.subject.scale * peak_mv, self.subject.baseline_mv) / self.subject.scale
+        return (facilitation >= np.interp(least_mv, excess_mv, LEVELS)) & np.isfinite(least_mv)
 
     def _facilitation(self, isi_ms: FloatArray) -> FloatArray:
         return np.exp(-0.5 * ((isi_ms - self._middle[:, None]) / self._sd[:, None]) ** 2)

@@ -46,7 +46,7 @@ def seconds(work: Callable[[], object], repeats: int) -> tuple[float, float]:
 
 def main() -> None:
     """Measure and print."""
-    device, space = isiw.Tapper(lambda _: Answer(), "bench"), isiw.IMPACT_SPACE
+    device, space = isiw.SimulatedDevice(isiw.Tapper(lambda _: Answer(), "bench")), isiw.IMPACT_SPACE
     device.stage()
     stimuli = [isiw.Stimulus(trial, ISI_MS) for trial in range(SWEEPS)]
     sweeps = [device.deliver(stimulus, 1.0) for stimulus in stimuli]

@@ -31,7 +31,7 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
-from isiw.devices.robot.mechanism import Geometry, SensorNoise
+from isiw.devices.robot.mechanism import Event, Geometry, SensorNoise
 from isiw.devices.robot.tapper import Trigger
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
@@ -126,13 +126,11 @@ def by_waveform(subject: SimulatedSubject, space: isiw.DesignSpace, pair: Pair) 
     person = replace(subject, hit_delay_sd_ms=0.0).begin(pair.session_seed)
     hit_ms, sd_ms = subject.hit_delay_ms, subject.hit_delay_sd_ms
     noise = SensorNoise(emg_uv=REST_UV_PER_FLOOR_MV * subject.response.floor.median_mv)
-    geometry = Geometry(
-        hit_ms - 55, sd_ms, hit_ms, sd_ms, contact_ms=15, contact_sd_ms=0.5, memg_sd_ms=1.0, noise=noise
-    )
+    events = Event(hit_ms - 55, sd_ms), Event(hit_ms, sd_ms), Event(15.0, 0.5), Event(20.0, 1.0)
+    geometry = Geometry(*events, noise=noise)
     settings = isiw.TapperSettings(reference=space.reference, trigger=pair.trigger)
     robot = isiw.Tapper(lambda isi_ms: person.respond(isi_ms, "impact"), geometry, settings, seed=pair.session_seed)
-    robot.stage()
-    return lambda stimulus: robot.deliver(stimulus, 1.0)
+    return robot.answer
 
 
 def results(pairs: list[Pair], workers: int) -> Iterator[tuple[Pair, tuple[Examined, Examined]]]:

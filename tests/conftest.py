@@ -56,7 +56,7 @@ class RememberingPosterior:
 
 @dataclass(frozen=True)
 class RememberingModel:
-    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> RememberingPosterior:
+    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> RememberingPosterior:
         assert people == 1
         return RememberingPosterior(space, seed)
 

@@ -39,7 +39,7 @@ def test_the_configuration_is_valid(tmp_path):
     (block,) = blocks("toml")
     (tmp_path / "session.toml").write_text(block)
     config = load_config(tmp_path / "session.toml")
-    assert config.strategy.settings.max_trials == tomllib.loads(block)["strategy"]["settings"]["max_trials"]
+    assert config.strategy.settings["max_trials"] == tomllib.loads(block)["strategy"]["settings"]["max_trials"]
 
 
 def test_there_are_exactly_two_commands_to_set_up():

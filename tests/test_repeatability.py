@@ -7,6 +7,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.devices.robot.tapper import Tapper, TapperSettings
+from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session
 from isiw.repeatability import (
@@ -108,7 +109,7 @@ def test_recorded_sweeps_are_studied_like_a_preset():
     class Silent:
         mep_mv = 0.0
 
-    device = Tapper(lambda _: Silent(), "subject4", TapperSettings(trigger="impact"))
+    device = SimulatedDevice(Tapper(lambda _: Silent(), "subject4", TapperSettings(trigger="impact")))
     device.stage()
     sweeps = [device.deliver(Stimulus(trial, 50.0), 1.0) for trial in range(30)]
     study = study_sweeps("thirty taps", sweeps, [50.0] * 30)
@@ -117,14 +118,11 @@ def test_recorded_sweeps_are_studied_like_a_preset():
     assert study.mistrials == 0
 
 
-class TapperOnThePulsesClock(Tapper):
-    """The tapping robot, on a sweep clock that is zero at the magnetic pulse."""
-
-    def deliver(self, stimulus, timeout_s):
-        sweep = super().deliver(stimulus, timeout_s)
-        pulse_ms = sweep.t_tms_ms
-        channels = {name: replace(wave, t0_ms=wave.t0_ms - pulse_ms) for name, wave in sweep.channels.items()}
-        return replace(sweep, channels=channels, t_valve_ms=sweep.t_valve_ms - pulse_ms, t_tms_ms=0.0)
+def on_the_pulses_clock(sweep):
+    """The same sweep on a clock that is zero at the magnetic pulse."""
+    pulse_ms = sweep.t_tms_ms
+    channels = {name: replace(wave, t0_ms=wave.t0_ms - pulse_ms) for name, wave in sweep.channels.items()}
+    return replace(sweep, channels=channels, t_valve_ms=sweep.t_valve_ms - pulse_ms, t_tms_ms=0.0)
 
 
 def test_a_sweep_clock_that_begins_elsewhere_changes_nothing():
@@ -132,13 +130,10 @@ def test_a_sweep_clock_that_begins_elsewhere_changes_nothing():
         mep_mv = 0.0
 
     isi_ms = [20.0, 150.0] * 5
-    studies = []
-    for kind in (Tapper, TapperOnThePulsesClock):
-        device = kind(lambda _: Silent(), "subject4", TapperSettings(trigger="impact"))
-        device.stage()
-        sweeps = [device.deliver(Stimulus(trial, isi), 1.0) for trial, isi in enumerate(isi_ms)]
-        studies.append(study_sweeps("ten taps", sweeps, isi_ms))
-    usual, other = studies
+    robot = Tapper(lambda _: Silent(), "subject4", TapperSettings(trigger="impact"))
+    sweeps = [robot.answer(Stimulus(trial, isi)) for trial, isi in enumerate(isi_ms)]
+    usual = study_sweeps("ten taps", sweeps, isi_ms)
+    other = study_sweeps("ten taps", [on_the_pulses_clock(sweep) for sweep in sweeps], isi_ms)
     for name, times in usual.events.columns().items():
         np.testing.assert_allclose(other.events.columns()[name], times, atol=1e-9, err_msg=name)
     np.testing.assert_allclose(other.realised_ms, usual.realised_ms, atol=1e-9)
@@ -150,7 +145,7 @@ def test_a_logged_session_is_studied_like_a_preset(tmp_path, scripted_strategy):
         mep_mv = 0.0
 
     space = DesignSpace(0, 200, reference="impact")
-    device = Tapper(lambda _: Silent(), "subject4")
+    device = SimulatedDevice(Tapper(lambda _: Silent(), "subject4"))
     strategy = scripted_strategy(max_trials=12, space=space)
     result = Session(device, strategy, log=tmp_path / "taps.mcap").run()
     study = study_session(read_session(result.log))
@@ -169,15 +164,17 @@ def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path, scripted_st
         mep_mv = 0.0
 
     class Faulty(Tapper):
-        def deliver(self, stimulus, timeout_s):
-            sweep = super().deliver(stimulus, timeout_s)
+        def answer(self, stimulus):
+            sweep = super().answer(stimulus)
             if stimulus.trial != 1:
                 return sweep
             dead = replace(sweep.channels[name], values=np.full_like(sweep.channels[name].values, fault))
             return replace(sweep, channels={**sweep.channels, name: dead})
 
     strategy = scripted_strategy(max_trials=4, space=DesignSpace(20, 200, reference="impact"))
-    result = Session(Faulty(lambda _: Silent(), "subject4"), strategy, log=tmp_path / "taps.mcap").run()
+    result = Session(
+        SimulatedDevice(Faulty(lambda _: Silent(), "subject4")), strategy, log=tmp_path / "taps.mcap"
+    ).run()
     study = study_session(read_session(result.log))
     event = "hit" if name == "acceleration" else "memg"
     assert np.isnan(study.events.columns()[event]).tolist() == [False, True, False, False]
@@ -194,7 +191,7 @@ def test_the_report_says_all_of_it():
 
 
 def test_a_study_of_nothing_is_an_error():
-    with pytest.raises(InvalidValueError, match="needs taps"):
+    with pytest.raises(InvalidValueError, match="taps must be"):
         study_preset("bench", taps=0)
     with pytest.raises(InvalidValueError, match="needs sweeps"):
         study_sweeps("nothing", [], [])

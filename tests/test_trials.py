@@ -32,7 +32,7 @@ def test_a_stimulus_needs_a_finite_isi(isi_ms: float) -> None:
 
 
 def test_trials_count_from_0() -> None:
-    with pytest.raises(InvalidValueError, match="counts from 0"):
+    with pytest.raises(InvalidValueError, match="at least 0"):
         Stimulus(-1, 10.0)
 
 

@@ -135,7 +135,7 @@ def test_an_excess_that_is_not_finite_is_an_error_and_not_the_absence_of_a_windo
 
 @pytest.mark.parametrize("probability", [-0.01, 1.01, math.nan])
 def test_a_probability_outside_0_to_1_is_refused(probability: float) -> None:
-    with pytest.raises(InvalidValueError, match="0–1"):
+    with pytest.raises(InvalidValueError, match="from 0 to 1"):
         WindowEstimate(probability, None)
 
 
@@ -205,7 +205,7 @@ def test_edges_beyond_the_range_are_counted() -> None:
 
 @pytest.mark.parametrize("level", [0.0, 1.0, -0.1, 1.5, math.nan])
 def test_a_credible_level_lies_between_0_and_1(level: float) -> None:
-    with pytest.raises(InvalidValueError, match="between 0 and 1"):
+    with pytest.raises(InvalidValueError, match="above 0 and below 1"):
         WindowEstimate(1.0, None).interval(level)
 
 

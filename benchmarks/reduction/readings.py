@@ -7,7 +7,7 @@ from typing import Any, Final, Literal
 
 from benchmarks.reduction.dissertation import METHODS
 from isiw.errors import InvalidValueError
-from isiw.models.dissertation.curves import FloorKind
+from isiw.models.shared.floor import FloorKind
 
 TRUTHS: Final = ("measured, baseline", "measured, .135", "true")
 """What a window is judged by: the run of measured means above the baseline (the text's words, 4.2.1), those with at

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.models.dissertation.incremental import SweepPosterior, SweepRule
+from isiw.models.dissertation.incremental import SweepModel, SweepPosterior, SweepRule
 from isiw.models.shared.history import AmplitudeHistory
 from isiw.strategy.settings.dissertation import SweepSettings
 from isiw.strategy.stopping import Progress
@@ -88,7 +88,7 @@ class RecordedSweep:
 
     def _has_passed(self, first: int, last: int) -> bool:
         estimate = self._measured(first, last, "baseline")
-        return SweepSettings().stopping()(Progress(0, 0, estimate)).stop
+        return SweepSettings().stopping.rule(0)(Progress(0, 0, estimate)).stop
 
     def _measured(self, first: int, last: int, rule: SweepRule) -> WindowEstimate:
         """What the strategy `incremental` makes of a part of the sweep, TMS alone before it."""
@@ -97,7 +97,7 @@ class RecordedSweep:
             (np.full(len(self.baseline_mv), np.nan), self.isi_ms[first:last].repeat(TRIALS_PER_ISI))
         )
         mep_mv = np.concatenate((self.baseline_mv, self.trials_mv[first:last].ravel()))
-        model = SweepSettings(rule=rule).model()
+        model = SweepModel(rule=rule)
         return SweepPosterior(model, space, AmplitudeHistory(isi_ms[None], mep_mv[None])).estimate()
 
 

@@ -23,11 +23,12 @@ from .devices.clock import VirtualClock as VirtualClock
 from .devices.limits import Limits as Limits
 from .devices.protocol import Device as Device
 from .devices.protocol import DeviceInfo as DeviceInfo
-from .devices.recorded import RecordedDevice as RecordedDevice
-from .devices.replay import ReplayDevice as ReplayDevice
+from .devices.recorded import RecordedPerson as RecordedPerson
+from .devices.replay import RecordedTrials as RecordedTrials
 from .devices.robot.tapper import Tapper as Tapper
 from .devices.robot.tapper import TapperSettings as TapperSettings
 from .devices.simulated import SimulatedDevice as SimulatedDevice
+from .devices.simulated import SimulatedPerson as SimulatedPerson
 from .log.reader import read_session as read_session
 from .session.loop import Session as Session
 from .session.resume import exclude as exclude

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
-from numbers import Real
+from typing import get_args
 
 import numpy as np
 
+from isiw.checks import check_choice, check_numbers, number
 from isiw.errors import InvalidValueError, OutOfSpaceError
 from isiw.types import FloatArray, Reference
 
@@ -38,22 +38,13 @@ class DesignSpace:
     tolerance_ms: float = 10.0
 
     def __post_init__(self) -> None:
-        for name in ("low_ms", "high_ms", "step_ms", "tolerance_ms"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-                raise InvalidValueError(f"DesignSpace.{name} must be a finite number", got=value)
-            object.__setattr__(self, name, float(value))
-        if self.reference not in {"impact", "valve"}:
-            raise InvalidValueError(
-                "DesignSpace.reference is unknown", got=self.reference, expected='"impact" or "valve"'
-            )
+        check_numbers(self, "low_ms", "high_ms")
+        check_numbers(self, "step_ms", above=0)
+        check_numbers(self, "tolerance_ms", least=0)
+        check_choice(self, "reference", get_args(Reference))
         if self.high_ms <= self.low_ms:
             raise InvalidValueError(
                 "the design space is empty", got=(self.low_ms, self.high_ms), expected="low_ms < high_ms"
-            )
-        if self.step_ms <= 0 or self.tolerance_ms < 0:
-            raise InvalidValueError(
-                "step_ms must be positive and tolerance_ms not negative", got=(self.step_ms, self.tolerance_ms)
             )
         steps = (self.high_ms - self.low_ms) / self.step_ms
         if abs(steps - round(steps)) > 1e-6:
@@ -78,9 +69,8 @@ class DesignSpace:
         Raises:
             InvalidValueError: not a finite number.
         """
-        if not math.isfinite(isi_ms):
-            raise InvalidValueError("an ISI must be a finite number of milliseconds", got=isi_ms)
-        steps = round((min(max(isi_ms, self.low_ms), self.high_ms) - self.low_ms) / self.step_ms)
+        inside = min(max(number("an ISI [ms]", isi_ms), self.low_ms), self.high_ms)
+        steps = round((inside - self.low_ms) / self.step_ms)
         return float(self.grid_ms[steps])
 
     def admits(self, isi_ms: float) -> bool:
@@ -94,16 +84,15 @@ class DesignSpace:
             InvalidValueError: not a finite number.
             OutOfSpaceError: more than `tolerance_ms` beyond the range.
         """
-        if not math.isfinite(isi_ms):
-            raise InvalidValueError("a realised ISI must be a finite number of milliseconds", got=isi_ms)
-        if not self.admits(isi_ms):
+        realised_ms = number("a realised ISI [ms]", isi_ms)
+        if not self.admits(realised_ms):
             raise OutOfSpaceError(
                 "the realised ISI is beyond the design space",
                 got=isi_ms,
                 expected=f"{self.low_ms:g} to {self.high_ms:g} ms, give or take {self.tolerance_ms:g} ms",
                 remedy=f"ISIs count from the {self.reference}; check the reference, or log the trial as a mistrial.",
             )
-        return float(isi_ms)
+        return realised_ms
 
 
 VALVE_SPACE = DesignSpace(0, 500, reference="valve")

@@ -6,7 +6,7 @@ Every message says what is wrong, what was got, what was expected, and the way o
     ├── InvalidValueError (ValueError)    a value that cannot be: NaN, negative, not finite, wrong shape
     │   └── OutOfSpaceError               an ISI beyond the design space and its tolerance
     ├── ConfigError (ValueError)          a configuration file, key or value that cannot be used
-    ├── StrategyError                     a strategy that cannot be built, or not from these parts
+    ├── StrategyError (ValueError)        a strategy that cannot be built, or not from these parts
     ├── DeviceError                       a device that failed, refused, or did not answer
     │   ├── LimitExceededError            a stimulus refused by a limit, before anything was delivered
     │   └── DeviceTimeoutError            no answer within the time allowed
@@ -53,7 +53,7 @@ class ConfigError(IsiwError, ValueError):
     """A configuration file, key or value that cannot be used."""
 
 
-class StrategyError(IsiwError):
+class StrategyError(IsiwError, ValueError):
     """A strategy that cannot be built, or not from these parts."""
 
 

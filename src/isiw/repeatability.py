@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from isiw.checks import whole
 from isiw.devices.robot.mechanism import Geometry, draw_taps
 from isiw.devices.robot.presets import preset
 from isiw.devices.robot.waveforms import record_emg, record_robot, sample_times_ms
@@ -145,8 +146,7 @@ def study_preset(
     Raises:
         InvalidValueError: an unknown preset, no taps, or a negative seed.
     """
-    if taps < 1 or seed < 0:
-        raise InvalidValueError("a study needs taps, and a seed that is not negative", got=(taps, seed))
+    taps, seed = whole("taps", taps, least=1), whole("seed", seed, least=0)
     geometry, rng = preset(name), np.random.default_rng(seed)
     predicted_ms = float(np.nanmedian(_tap(geometry, np.full(CALIBRATION_TAPS, np.nan), rate_hz, rng).hit_ms))
     commanded = np.repeat(np.asarray(isi_ms, dtype=np.float64), taps) if len(isi_ms) else np.full(taps, np.nan)

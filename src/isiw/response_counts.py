@@ -13,6 +13,7 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
+from isiw.checks import number
 from isiw.errors import InvalidValueError
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
@@ -80,8 +81,7 @@ def response_counts(isi_ms: ArrayLike, mep_mv: ArrayLike, threshold_mv: float) -
         raise InvalidValueError("each trial has one ISI and one MEP", got=(isi.shape, mep.shape))
     if not (np.isfinite(isi).all() and np.isfinite(mep).all()):
         raise InvalidValueError("ISIs and MEPs must be finite", remedy="Leave mistrials out.")
-    if not 0 < threshold_mv < np.inf:
-        raise InvalidValueError("the response threshold must be positive", got=threshold_mv)
+    threshold_mv = number("threshold_mv", threshold_mv, above=0)
     trials = pd.DataFrame({"isi_ms": isi, "response": mep > threshold_mv})
     table = trials.groupby("isi_ms").agg(trials=("response", "count"), responses=("response", "sum"))
     table["share"] = table["responses"] / table["trials"]

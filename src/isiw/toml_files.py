@@ -12,7 +12,7 @@ from typing import Any, TypeVar, cast, get_args, get_type_hints
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
-from isiw.errors import ConfigError, IsiwError, StrategyError
+from isiw.errors import ConfigError, IsiwError
 
 __all__ = ["checked", "read_toml"]
 
@@ -50,10 +50,6 @@ def checked(kind: type[_T], values: Mapping[str, Any], source: str) -> _T:
     """
     try:
         return cast("_T", dict(_strict(kind).model_validate({"values": values}))["values"])
-    except StrategyError as error:  # pydantic knows ValueErrors alone
-        raise ConfigError(
-            f"{source}: {error.what}", got=error.got, expected=error.expected, remedy=error.remedy
-        ) from error
     except ValidationError as error:
         found = error.errors()
         # A key that was misspelt is reported before the one that is missing because of it.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -11,6 +10,7 @@ from enum import StrEnum
 import numpy as np
 import pandas as pd
 
+from isiw.checks import check_numbers, check_wholes
 from isiw.errors import InvalidValueError
 from isiw.types import FloatArray
 
@@ -37,21 +37,6 @@ class MistrialReason(StrEnum):
     OUTCOME_UNKNOWN = "outcome unknown"
 
 
-def _require_finite(owner: str, **values: float | None) -> None:
-    for name, value in values.items():
-        if value is not None and not math.isfinite(value):
-            raise InvalidValueError(f"{owner}.{name} must be finite", got=value)
-
-
-def _require_amplitude(owner: str, **values: float | None) -> None:
-    _require_finite(owner, **values)
-    for name, value in values.items():
-        if value is not None and value < 0:
-            raise InvalidValueError(
-                f"{owner}.{name} must not be negative", got=value, remedy="An amplitude is peak-to-peak, from 0 up."
-            )
-
-
 @dataclass(frozen=True)
 class Stimulus:
     """One pair of stimuli to deliver.
@@ -68,9 +53,8 @@ class Stimulus:
     isi_ms: float | None
 
     def __post_init__(self) -> None:
-        if self.trial < 0:
-            raise InvalidValueError("Stimulus.trial counts from 0", got=self.trial)
-        _require_finite("Stimulus", isi_ms=self.isi_ms)
+        check_wholes(self, "trial", least=0)
+        check_numbers(self, "isi_ms", optional=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +80,8 @@ class Channel:
         values = np.asarray(self.values, dtype=np.float64)
         if values.ndim != 1:
             raise InvalidValueError("a channel holds one waveform", got=values.shape, expected="shape (w,)")
-        if not (math.isfinite(self.rate_hz) and self.rate_hz > 0):
-            raise InvalidValueError("a sampling rate must be positive", got=self.rate_hz)
-        _require_finite("Channel", t0_ms=self.t0_ms)
+        check_numbers(self, "rate_hz", above=0)
+        check_numbers(self, "t0_ms")
         object.__setattr__(self, "values", values)
 
 
@@ -124,8 +107,8 @@ class Sweep:
     isi_sd_ms: float = 0.0
 
     def __post_init__(self) -> None:
-        _require_finite("Sweep", t_valve_ms=self.t_valve_ms, t_tms_ms=self.t_tms_ms, t_hit_ms=self.t_hit_ms)
-        _require_amplitude("Sweep", isi_sd_ms=self.isi_sd_ms)
+        check_numbers(self, "t_valve_ms", "t_tms_ms", "t_hit_ms", optional=True)
+        check_numbers(self, "isi_sd_ms", least=0)
 
 
 @dataclass(frozen=True)
@@ -154,16 +137,9 @@ class Measurement:
     t_tms_ms: float | None = None
 
     def __post_init__(self) -> None:
-        _require_finite(
-            "Measurement",
-            isi_ms=self.isi_ms,
-            t_valve_ms=self.t_valve_ms,
-            t_hit_ms=self.t_hit_ms,
-            t_tms_ms=self.t_tms_ms,
-        )
-        _require_amplitude(
-            "Measurement", mep_mv=self.mep_mv, isi_sd_ms=self.isi_sd_ms, background_rms_uv=self.background_rms_uv
-        )
+        check_numbers(self, "isi_ms", "t_valve_ms", "t_hit_ms", "t_tms_ms", optional=True)
+        check_numbers(self, "mep_mv", "isi_sd_ms", least=0)
+        check_numbers(self, "background_rms_uv", least=0, optional=True)
 
 
 @dataclass(frozen=True)
@@ -210,17 +186,15 @@ class Trial:
             raise InvalidValueError("a mistrial needs a reason and an accepted trial has none", got=self.reason)
         if self.status is Status.ACCEPTED and self.mep_mv is None:
             raise InvalidValueError("an accepted trial needs its MEP", got=self.index)
-        _require_finite(
-            "Trial",
-            commanded_isi_ms=self.commanded_isi_ms,
-            isi_ms=self.isi_ms,
-            t_valve_ms=self.t_valve_ms,
-            t_hit_ms=self.t_hit_ms,
-            t_tms_ms=self.t_tms_ms,
-        )
-        _require_amplitude(
-            "Trial", mep_mv=self.mep_mv, isi_sd_ms=self.isi_sd_ms, background_rms_uv=self.background_rms_uv
-        )
+        check_wholes(self, "index", least=0)
+        check_numbers(self, "commanded_isi_ms", "isi_ms", "t_valve_ms", "t_hit_ms", "t_tms_ms", optional=True)
+        check_numbers(self, "mep_mv", "background_rms_uv", least=0, optional=True)
+        check_numbers(self, "isi_sd_ms", least=0)
+
+    @classmethod
+    def unknown(cls, stimulus: Stimulus) -> Trial:
+        """A mistrial of which nothing is known but what was commanded."""
+        return cls(stimulus.trial, Status.MISTRIAL, stimulus.isi_ms, MistrialReason.OUTCOME_UNKNOWN)
 
     @property
     def told(self) -> bool:

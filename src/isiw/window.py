@@ -9,10 +9,21 @@ from typing import NamedTuple
 
 import numpy as np
 
+from isiw.checks import check_probabilities, number
 from isiw.errors import InvalidValueError
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["EDGE_LEVEL", "Interval", "ProfileBand", "Window", "WindowEstimate", "window_from_excess"]
+__all__ = [
+    "EDGE_LEVEL",
+    "MIN_EXCESS_MV",
+    "MIN_EXCESS_OF_BASELINE",
+    "Interval",
+    "ProfileBand",
+    "Window",
+    "WindowEstimate",
+    "least_excess_mv",
+    "window_from_excess",
+]
 
 EDGE_LEVEL = 0.135
 """The share of the largest excess that a window's edge has: two SDs down a Gaussian (dissertation, 4.3)."""
@@ -89,8 +100,24 @@ class Window:
         return " and ".join(f"{a:g}–{b:g} ms" for a, b in self.segments)
 
 
+def least_excess_mv(peak_mv: ArrayLike, baseline_mv: ArrayLike, share: float = EDGE_LEVEL) -> FloatArray:
+    """The least-excess rule: what the expected MEP at an ISI inside the window exceeds the baseline by, at least [mV].
+
+    It is a share of the largest excess. Where that is below 10 % of the baseline or below 2 µV nothing is enhanced, and
+    the least excess is infinite. `isiw.models.windows.least_excess_mv` is the same rule for tensors.
+
+    Args:
+        peak_mv: largest excess over the baseline in the range [mV], any shape.
+        baseline_mv: expected MEP without a tap [mV], broadcast against it.
+        share: of the largest excess, at the window's edge.
+    """
+    peak = np.asarray(peak_mv, dtype=float)
+    enough_mv = np.maximum(MIN_EXCESS_OF_BASELINE * np.asarray(baseline_mv, dtype=float), MIN_EXCESS_MV)
+    return np.where(peak >= enough_mv, share * peak, np.inf)
+
+
 def window_from_excess(grid_ms: ArrayLike, excess_mv: ArrayLike, baseline_mv: float) -> Window | None:
-    """The window by the 0.135 rule, or None where nothing is enhanced.
+    """The window by the least-excess rule, or None where nothing is enhanced.
 
     Args:
         grid_ms: ascending ISIs [ms], shape (t,).
@@ -107,10 +134,7 @@ def window_from_excess(grid_ms: ArrayLike, excess_mv: ArrayLike, baseline_mv: fl
     excess = np.asarray(excess_mv, dtype=float)
     if not (np.isfinite(excess).all() and math.isfinite(baseline_mv)):
         raise InvalidValueError("the expected MEP must be finite at every ISI", got=(float(excess.max()), baseline_mv))
-    peak = float(excess.max())
-    if peak < max(MIN_EXCESS_OF_BASELINE * baseline_mv, MIN_EXCESS_MV):
-        return None
-    return Window.from_mask(grid_ms, excess >= EDGE_LEVEL * peak)
+    return Window.from_mask(grid_ms, excess >= least_excess_mv(excess.max(), baseline_mv))
 
 
 class ProfileBand(NamedTuple):
@@ -161,8 +185,7 @@ class WindowEstimate:
             )
         if self.probability is None:
             return
-        if not 0.0 <= self.probability <= 1.0:
-            raise InvalidValueError("the probability of a window must lie in 0–1", got=self.probability)
+        check_probabilities(self, "probability")
         if self.window is not None and self.probability < 0.5:
             raise InvalidValueError("a window is reported although none is more probable", got=self.probability)
 
@@ -179,8 +202,7 @@ class WindowEstimate:
         Raises:
             InvalidValueError: a level outside 0–1.
         """
-        if not 0.0 < level < 1.0:
-            raise InvalidValueError("a credible level must lie between 0 and 1", got=level)
+        level = number("a credible level", level, above=0, below=1)
         if self.edge_samples_ms is None or not len(self.edge_samples_ms):
             return None
         (start_low, end_low), (start_high, end_high) = _central(self.edge_samples_ms, level).tolist()
@@ -199,8 +221,7 @@ class WindowEstimate:
         Raises:
             InvalidValueError: a level or a share outside 0–1.
         """
-        if not 0.0 <= min_share <= 1.0:
-            raise InvalidValueError("the least share of a hypothesis must lie in 0–1", got=min_share)
+        min_share = number("the least share of a hypothesis", min_share, least=0, most=1)
         whole = self.interval(level)
         if whole is None or self.hypotheses is None or self.edge_samples_ms is None:
             return whole

@@ -45,7 +45,7 @@ def reduced_variance(model):
 
 def after(isis_ms: list[float], meps_mv: list[float], people: int = 1) -> GaussianProcessPosterior:
     model = GaussianProcess(samples=32)
-    posterior = model.prior(VALVE_SPACE, 1, people)
+    posterior = model.begin(VALVE_SPACE, 1, people)
     for isi_ms, mep_mv in zip(isis_ms, meps_mv, strict=True):
         columns = (isi_ms, mep_mv, 0.0, math.nan)
         posterior = model.update(posterior, Observation(*(torch.full((people,), x).double() for x in columns)))

@@ -90,5 +90,5 @@ def test_the_settings_class_scores_as_its_function_does(acquisition, score) -> N
 
 
 def test_a_negative_width_is_refused() -> None:
-    with pytest.raises(InvalidValueError, match="not be negative"):
+    with pytest.raises(InvalidValueError, match="at least 0"):
         UpperConfidenceBound(-1.0)

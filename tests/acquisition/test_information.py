@@ -135,5 +135,5 @@ def test_the_window_can_be_asked_for_only_where_windows_are_sampled() -> None:
 
 
 def test_a_single_cell_would_tell_nothing_and_is_refused() -> None:
-    with pytest.raises(InvalidValueError, match="two cells"):
+    with pytest.raises(InvalidValueError, match="at least 2"):
         WindowInformation(cells=1)

@@ -82,5 +82,5 @@ def test_the_settings_class_scores_as_its_function_does(acquisition, score) -> N
 
 @pytest.mark.parametrize("kind", [Straddle, IntegratedFeasibility])
 def test_a_width_that_is_not_positive_is_refused(kind) -> None:
-    with pytest.raises(InvalidValueError, match="must be positive"):
+    with pytest.raises(InvalidValueError, match="above 0"):
         kind(0.0)

@@ -67,5 +67,5 @@ def test_candidates_off_the_shortlist_keep_their_own_gain() -> None:
 
 @pytest.mark.parametrize("wrong", [{"shortlist": 0}, {"groups": 0}, {"stride": 0}])
 def test_numbers_count_from_one(wrong: dict[str, int]) -> None:
-    with pytest.raises(InvalidValueError, match="count from one"):
+    with pytest.raises(InvalidValueError, match="whole number of at least 1"):
         TwoStep(**wrong)

@@ -6,6 +6,7 @@ from typer.testing import CliRunner
 from isiw.cli import app
 from isiw.design import DesignSpace
 from isiw.devices.robot.tapper import Tapper
+from isiw.devices.simulated import SimulatedDevice
 from isiw.session.loop import Session
 
 
@@ -39,7 +40,7 @@ class Silent:
 @pytest.mark.parametrize(("there", "asked"), [("s.mcap.part", "s.mcap"), ("s.mcap", "s.mcap.part")])
 def test_timing_of_a_log_takes_either_of_its_names(tmp_path, scripted_strategy, there, asked):
     strategy = scripted_strategy(4, space=DesignSpace(20, 200, reference="impact"))
-    log = Session(Tapper(lambda _: Silent(), "subject4"), strategy, log=tmp_path / "s.mcap").run().log
+    log = Session(SimulatedDevice(Tapper(lambda _: Silent(), "subject4")), strategy, log=tmp_path / "s.mcap").run().log
     log.rename(tmp_path / there)
     result = run(tmp_path / asked)
     assert result.exit_code == 0, result.output

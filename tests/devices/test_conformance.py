@@ -11,9 +11,9 @@ from isiw.devices.callback import CallbackDevice
 from isiw.devices.clock import MonotonicClock, VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
 from isiw.devices.protocol import DeviceInfo
-from isiw.devices.recorded import RecordedDevice, Recordings
-from isiw.devices.replay import ReplayDevice
-from isiw.devices.simulated import SimulatedDevice
+from isiw.devices.recorded import RecordedPerson, Recordings
+from isiw.devices.replay import RecordedTrials
+from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError
 from isiw.subjects.cohorts import cohort
 from isiw.testing import check_device
@@ -41,15 +41,15 @@ def table():
 
 
 def test_a_simulated_device_conforms(space):
-    check_device(lambda: SimulatedDevice(responder(), "valve"), space)
+    check_device(lambda: SimulatedDevice(SimulatedPerson(responder(), "valve")), space)
 
 
 def test_a_device_of_recorded_sweeps_conforms(space):
-    check_device(lambda: RecordedDevice(responder(), "valve", made_up_recordings(), seed=1), space)
+    check_device(lambda: SimulatedDevice(RecordedPerson(responder(), "valve", made_up_recordings(), seed=1)), space)
 
 
 def test_a_replaying_device_conforms(space):
-    check_device(lambda: ReplayDevice(table(), "valve"), space)
+    check_device(lambda: SimulatedDevice(RecordedTrials(table(), "valve")), space)
 
 
 def test_a_device_of_functions_conforms(space):
@@ -60,7 +60,7 @@ def test_a_device_of_functions_conforms(space):
 
 def test_a_limited_device_conforms(space):
     limits = Limits.of_space(space, min_iti_s=0.0)
-    device = SimulatedDevice(responder(), "valve")
+    device = SimulatedDevice(SimulatedPerson(responder(), "valve"))
     check_device(lambda: LimitedDevice(device, limits, VirtualClock()), space)
 
 
@@ -68,7 +68,7 @@ class Careless(SimulatedDevice):
     """Fires although it is stopped."""
 
     def __init__(self):
-        super().__init__(responder(), "valve")
+        super().__init__(SimulatedPerson(responder(), "valve"))
 
     def deliver(self, stimulus, timeout_s):
         del timeout_s
@@ -98,17 +98,17 @@ def test_the_suite_finds_a_device_that_fires_unarmed(space):
 
 def test_the_suite_finds_a_device_that_cannot_resume(space):
     with pytest.raises(AssertionError, match="never been interrupted"):
-        check_device(lambda: Forgetful(responder(), "valve"), space)
+        check_device(lambda: Forgetful(SimulatedPerson(responder(), "valve")), space)
 
 
 def test_the_suite_finds_a_device_with_wrong_timing(space):
     with pytest.raises(AssertionError, match=r"ISI off .* 20.* ms for 0"):
-        check_device(lambda: Inaccurate(responder(), "valve"), space)
+        check_device(lambda: Inaccurate(SimulatedPerson(responder(), "valve")), space)
 
 
 def test_the_suite_finds_a_device_on_another_reference(space):
     with pytest.raises(AssertionError, match="reference"):
-        check_device(lambda: SimulatedDevice(responder("impact"), "impact"), space)
+        check_device(lambda: SimulatedDevice(SimulatedPerson(responder("impact"), "impact")), space)
 
 
 class Hardware:

@@ -5,7 +5,8 @@ import gzip
 import numpy as np
 import pytest
 
-from isiw.devices.recorded import RecordedDevice, load_recordings
+from isiw.devices.recorded import RecordedPerson, load_recordings
+from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import DeviceError
 from isiw.signals.judgement import judge
 from isiw.subjects.subject import Response
@@ -18,7 +19,7 @@ def recordings(recordings_folder):
 
 
 def staged(recordings, mep_mv, seed=0, reference="valve"):
-    device = RecordedDevice(lambda isi_ms: Response(isi_ms, mep_mv), reference, recordings, seed)
+    device = SimulatedDevice(RecordedPerson(lambda isi_ms: Response(isi_ms, mep_mv), reference, recordings, seed))
     device.stage()
     return device
 

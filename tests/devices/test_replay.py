@@ -6,8 +6,8 @@ import pytest
 
 from isiw.design import VALVE_SPACE
 from isiw.devices.limits import Limits
-from isiw.devices.replay import ReplayDevice
-from isiw.devices.simulated import SimulatedDevice
+from isiw.devices.replay import RecordedTrials
+from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError
 from isiw.log.reader import read_session
 from isiw.metrics import f1
@@ -30,7 +30,7 @@ TABLE = TrialTable(
 
 @pytest.fixture
 def device():
-    replay = ReplayDevice(TABLE, "impact")
+    replay = SimulatedDevice(RecordedTrials(TABLE, "impact"))
     replay.stage()
     return replay
 
@@ -66,7 +66,7 @@ def person():
 def recording(person, tmp_path):
     """A logged session of a strategy that asks at random."""
     begun = person.begin(5)
-    device = SimulatedDevice(lambda isi_ms: begun.respond(isi_ms, "valve"), "valve")
+    device = SimulatedDevice(SimulatedPerson(lambda isi_ms: begun.respond(isi_ms, "valve"), "valve"))
     strategy = make_strategy("random", space=VALVE_SPACE, particles=200, max_trials=24)
     return read_session(Session(device, strategy, log=tmp_path / "first.mcap").run().log)
 
@@ -75,7 +75,7 @@ def run_again(recording, log, tolerance_ms):
     """A session of the default strategy on the recorded trials, as the device's documentation says."""
     space = replace(recording.header.space, tolerance_ms=tolerance_ms)
     pairs = sum(trial.isi_ms is not None for trial in recording.table.told)
-    device = ReplayDevice(recording.table, space.reference)
+    device = SimulatedDevice(RecordedTrials(recording.table, space.reference))
     limits = Limits.of_space(space, max_pulses=pairs)
     return Session(device, make_strategy(space=space, particles=200), log=log, limits=limits).run()
 

@@ -24,7 +24,7 @@ def observation(isi_ms: Iterable[float | None], mep_mv: Iterable[float]) -> Obse
 
 def told(model: Any, trials: Iterable[Trial], space: DesignSpace = VALVE_SPACE, seed: int = 1) -> Any:
     """The posterior of one person after some trials."""
-    posterior = model.prior(space, seed)
+    posterior = model.begin(space, seed)
     for isi_ms, mep_mv in trials:
         posterior = model.update(posterior, observation([isi_ms], [mep_mv]))
     return posterior

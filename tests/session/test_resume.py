@@ -12,7 +12,7 @@ import pytest
 from isiw.design import VALVE_SPACE
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
-from isiw.devices.simulated import SimulatedDevice
+from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError, InvalidValueError, LogError, StrategyError
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
@@ -312,7 +312,7 @@ def test_what_is_no_log_cannot_be_resumed(tmp_path, scripted_device):
 
 def simulated_person():
     person = cohort("drift", 1, 3)[0].begin(3)
-    return SimulatedDevice(lambda isi_ms: person.respond(isi_ms, "valve"), "valve")
+    return SimulatedDevice(SimulatedPerson(lambda isi_ms: person.respond(isi_ms, "valve"), "valve"))
 
 
 def test_a_default_session_with_a_drifting_person_goes_on_as_if_never_interrupted(tmp_path):

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from isiw.devices.robot.mechanism import Faults
 from isiw.errors import InvalidValueError
 from isiw.signals import detect_events, sweep_events
 from isiw.trials import Channel, Sweep
@@ -29,7 +30,7 @@ def test_events_are_found_where_the_plant_put_them(render, name):
 
 
 def test_a_sweep_without_impact_has_no_event_of_the_impact(render):
-    events = found(render("subject1", n=20, stuck_probability=1.0))
+    events = found(render("subject1", n=20, faults=Faults(stuck_probability=1.0)))
     for name in ("descent", "hit", "away", "memg"):
         assert np.isnan(events.columns()[name]).all(), name
 

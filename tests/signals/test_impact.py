@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from isiw.devices.robot.mechanism import drive
+from isiw.devices.robot.mechanism import Faults, drive
 from isiw.errors import InvalidValueError
 from isiw.signals import impact_time, impact_times
 
@@ -26,7 +26,7 @@ def test_noise_doubled_with_hum_drift_and_a_weaker_hit_leaves_95_of_100_within_1
 
 @pytest.mark.parametrize("harsh", [False, True])
 def test_a_hammer_that_sticks_is_never_given_an_impact(render, harsh):
-    still = render("subject1", n=100, seed=12, harsh=harsh, stuck_probability=1.0)
+    still = render("subject1", n=100, seed=12, harsh=harsh, faults=Faults(stuck_probability=1.0))
     assert np.isnan(impact_times(still.waves["acceleration"], 5000.0)).all()
 
 

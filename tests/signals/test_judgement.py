@@ -168,9 +168,8 @@ class Evoked:
 def told_mv(isi_ms, evoked_mv, artefact_mv, name="subject1", space=IMPACT, trials=8):
     geometry = replace(preset(name), artefact_mv=artefact_mv)
     robot = Tapper(lambda _: Evoked(evoked_mv), geometry, TapperSettings(reference=space.reference), seed=3)
-    robot.stage()
     stimuli = [Stimulus(trial, float(isi_ms)) for trial in range(trials)]
-    judged = [judge(robot.deliver(stimulus, 1.0), stimulus, space) for stimulus in stimuli]
+    judged = [judge(robot.answer(stimulus), stimulus, space) for stimulus in stimuli]
     return np.array([one.mep_mv for one in judged if one.reason is None])
 
 
@@ -199,7 +198,9 @@ def test_the_tap_of_a_silent_trial_is_never_told_as_a_mep(isi_ms, name):
 @pytest.mark.parametrize("evoked_mv", [0.0, 0.012, 0.025])
 @pytest.mark.parametrize("name", ["subject1", "subject2"])
 def test_the_tap_that_follows_the_pulse_makes_no_small_mep_large(name, evoked_mv):
-    told = [told_mv(preset(name).hit_ms + isi_ms, evoked_mv, 0.1, name, VALVE, trials=4) for isi_ms in range(-30, 0, 2)]
+    told = [
+        told_mv(preset(name).hit.mean_ms + isi_ms, evoked_mv, 0.1, name, VALVE, trials=4) for isi_ms in range(-30, 0, 2)
+    ]
     assert np.mean(np.concatenate(told) > 1.1 * max(evoked_mv, 0.008)) < 0.03
 
 

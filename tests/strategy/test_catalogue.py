@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
-from isiw.errors import InvalidValueError, StrategyError
+from isiw.errors import ConfigError, InvalidValueError, StrategyError
 from isiw.models.particles import ParticleModel
+from isiw.models.particles.prior import Prior
 from isiw.models.protocol import ResponseModel
-from isiw.strategy.catalogue import list_strategies, make_strategy, settings_of
+from isiw.models.shared.scales import Scale
+from isiw.strategy.catalogue import list_strategies, make_strategy, settings_for
 from isiw.strategy.settings.particles import ParticleSettings
-from isiw.strategy.strategy import Recipe
 
 NAMES = sorted(list_strategies())
-PARTICLES = [name for name in NAMES if settings_of(name)[0] is ParticleSettings]
+PARTICLES = [name for name in NAMES if isinstance(settings_for(name), ParticleSettings)]
 FEW: dict[str, Any] = {"particles": 64}
 
 
@@ -77,7 +79,7 @@ def test_designs_that_do_not_look_at_the_responses_do_not() -> None:
 
 @pytest.mark.parametrize("name", PARTICLES)
 def test_a_named_strategy_is_rebuilt_from_its_recipe(name: str) -> None:
-    strategy = make_strategy(name, seed=2, prior={"p_window": 0.6, "width_ms": (90.0, 0.4, 0.0)}, **FEW)
+    strategy = make_strategy(name, seed=2, prior={"profile": {"p_window": 0.6, "width_ms": (90.0, 0.4, 0.0)}}, **FEW)
     assert isinstance(strategy.model, ResponseModel)
     assert isinstance(strategy.acquisition, AcquisitionFunction)
     again = make_strategy(strategy.recipe.name, seed=strategy.recipe.seed, **strategy.recipe.settings)
@@ -87,19 +89,31 @@ def test_a_named_strategy_is_rebuilt_from_its_recipe(name: str) -> None:
 
 
 def test_settings_reach_the_parts_they_are_meant_for() -> None:
-    strategy = make_strategy(max_trials=7, particles=32, prior={"p_window": 0.6})
+    strategy = make_strategy(max_trials=7, particles=32, prior={"profile": {"p_window": 0.6}})
     model = strategy.model
     assert isinstance(model, ParticleModel)
-    assert (model.particles, model.beliefs.p_window) == (32, 0.6)
+    assert (model.particles, model.prior.profile.p_window) == (32, 0.6)
     assert "7 stimuli are left" in strategy.decision().reason
-    assert strategy.recipe == Recipe(
-        "default", 0, vars(ParticleSettings(max_trials=7, particles=32, prior={"p_window": 0.6}))
-    )
+    again = make_strategy(**strategy.recipe.settings)
+    assert (strategy.recipe.name, strategy.recipe.seed) == ("default", 0)
+    assert strategy.recipe.settings["max_trials"] == 7
+    assert again.recipe == strategy.recipe
+    assert again.model == model
 
 
 def test_the_prior_as_a_list_of_numbers_is_the_prior_as_a_pair() -> None:
-    pair, row = (make_strategy(prior={"width_ms": kind((90.0, 0.4, 0.0))}, **FEW) for kind in (tuple, list))
+    wide = {"width_ms": [90.0, 0.4, 0.0]}
+    pair, row = (make_strategy(prior={"profile": given}, **FEW) for given in ({"width_ms": (90.0, 0.4)}, wide))
     assert pair.model == row.model
+
+
+def test_a_prior_is_a_table_or_the_object_that_it_stands_for() -> None:
+    table = make_strategy(prior={"profile": {"p_window": 0.6}, "hand": {"boost": [3.0, 0.2]}}, **FEW)
+    prior = Prior()
+    prior = replace(
+        prior, profile=replace(prior.profile, p_window=0.6), hand=replace(prior.hand, boost=Scale(3.0, 0.2))
+    )
+    assert make_strategy(prior=prior, **FEW).model == table.model
 
 
 def test_an_unknown_strategy_names_the_known_ones() -> None:
@@ -115,9 +129,8 @@ def test_an_unknown_setting_names_the_known_ones() -> None:
 
 
 def test_an_unknown_setting_of_the_prior_names_the_known_ones() -> None:
-    with pytest.raises(InvalidValueError, match="p_windows") as caught:
-        make_strategy(prior={"p_windows": 0.5})
-    assert "p_window," in str(caught.value)
+    with pytest.raises(ConfigError, match=r"profile\.p_windows.*Did you mean p_window\?"):
+        make_strategy(prior={"profile": {"p_windows": 0.5}})
 
 
 @pytest.mark.parametrize(
@@ -127,8 +140,8 @@ def test_an_unknown_setting_of_the_prior_names_the_known_ones() -> None:
         ({"max_trials": 0}, "max_trials"),
         ({"stop_width_ms": 0.0}, "width_ms"),
         ({"stop_width_ms": math.nan}, "width_ms"),
-        ({"stop_no_window": 0.0}, "no window"),
-        ({"stop_no_window": 1.5}, "no window"),
+        ({"stop_no_window": 0.0}, "stop_no_window"),
+        ({"stop_no_window": 1.5}, "stop_no_window"),
         ({"particles": 0}, "particles"),
         ({"particles": 1}, "particles"),
         ({"particles": 2.5}, "particles"),
@@ -176,8 +189,8 @@ def test_a_regression_gives_up_after_99_iterations(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "settings", "what"),
     [
-        ("nr", {"initial": 1}, "both ends"),
-        ("nr", {"initial": 6.0}, "both ends"),
+        ("nr", {"initial": 1}, "at least 2"),
+        ("nr", {"initial": 6.0}, "whole number"),
         ("svmr", {"acquisition": "best"}, "acquisition"),
         ("gpr", {"floor": "cut"}, "floor"),
         ("gpr", {"stop_edges": "none"}, "edges"),

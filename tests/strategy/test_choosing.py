@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
-from isiw.acquisition.fixed import EvenSpacing
+from isiw.acquisition.fixed import EvenSpacing, RandomIsi
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
-from isiw.models.protocol import Posterior, Tensor
+from isiw.models.protocol import Observation, Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.choosing import Choice, best_choices, candidate_isis, evenly_spaced, planned_choices, remembered
+from isiw.strategy.choosing import Choice, Course, Method, best_choices, candidate_isis, evenly_spaced
 from isiw.strategy.stopping import Budget, EdgeVariance
-from isiw.window import WindowEstimate
 
 FIVE = DesignSpace(0, 4)
 
@@ -35,7 +35,7 @@ class Scores:
 @pytest.fixture
 def three() -> Posterior:
     """Three people of whom nothing is known."""
-    return make_strategy("pf", particles=4).model.prior(VALVE_SPACE, seed=0, people=3)
+    return make_strategy("pf", particles=4).model.begin(VALVE_SPACE, seed=0, people=3)
 
 
 @pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE, DesignSpace(0, 1), DesignSpace(-20, 30, step_ms=0.1)])
@@ -59,21 +59,59 @@ def test_each_person_is_asked_what_scores_best_and_falls_back_alone(three: Poste
 
 def test_scores_that_are_the_same_for_all_are_everybodys(three: Posterior) -> None:
     choices = best_choices(three, EvenSpacing(), VALVE_SPACE, told=0, people=3)
-    assert choices == [Choice(evenly_spaced(VALVE_SPACE, 0))] * 3
+    assert choices == (Choice(evenly_spaced(VALVE_SPACE, 0)),) * 3
 
 
-def test_initial_isis_come_before_a_methods_own_plan_and_that_before_scores(three: Posterior) -> None:
-    own = make_strategy("pf", particles=4).acquisition
-    assert planned_choices(three, own, VALVE_SPACE, (7.0, 9.0), people=3) == [Choice(7.0)] * 3
-    wanted = three.proposed_isis_ms()[:, 0].tolist()
-    assert [choice.isi_ms for choice in planned_choices(three, own, VALVE_SPACE, people=3)] == wanted
-    assert planned_choices(three, EvenSpacing(), VALVE_SPACE, people=3) == []
+def course(name: str, people: int = 3, **changes: Any) -> Course:
+    strategy = make_strategy(name, **({"particles": 4} if name == "pf" else {}))
+    method = Method(strategy.space, strategy.model, (strategy.acquisition,), strategy.stopping)
+    return replace(method, **changes).begin(0, people)
 
 
-def test_a_rule_remembers_as_much_as_it_looks_back_on_and_nothing_is_estimated_for_others() -> None:
-    estimates = [WindowEstimate(None, None, start_ms=float(i)) for i in range(4)]
-    past: tuple[WindowEstimate, ...] = ()
-    for pairs, estimate in enumerate(estimates, start=-1):
-        past = remembered(past, lambda estimate=estimate: estimate, EdgeVariance(last=2), pairs)
-    assert past == tuple(estimates[2:])
-    assert remembered((), lambda: pytest.fail("estimated in vain"), Budget(3), 5) == ()
+def told(before: Course, isi_ms: float | None = 250.0) -> Course:
+    return before.after(Observation.of([isi_ms] * before.people, [0.02] * before.people))
+
+
+def test_initial_isis_come_before_a_methods_own_plan_and_that_before_scores() -> None:
+    first = course("pf", initial_ms=(7.0,))
+    assert first.choices == (Choice(7.0),) * 3
+    planned = told(first)
+    wanted_ms = planned.posterior.proposed_isis_ms()[:, 0].tolist()
+    assert [choice.isi_ms for choice in planned.choices] == wanted_ms
+    scored = course("pf", acquisitions=(EvenSpacing(),))
+    assert scored.planned is None
+    assert scored.choices == (Choice(evenly_spaced(VALVE_SPACE, 0)),) * 3
+
+
+def test_tms_alone_uses_up_no_initial_isi() -> None:
+    first = course("nr", people=1, initial_ms=(7.0, 9.0))
+    assert told(first, None).choices == first.choices
+    assert (told(first, None).told, told(first, None).alone) == (1, 1)
+    assert told(told(first, None)).choices == (Choice(9.0),)
+
+
+def test_where_the_acquisition_function_draws_each_person_has_one_of_their_own() -> None:
+    several = course("even", acquisitions=tuple(RandomIsi(seed) for seed in range(3)))
+    alone = [course("even", 1, acquisitions=(RandomIsi(seed),)).choices[0] for seed in range(3)]
+    assert list(several.choices) == alone
+    assert len(set(alone)) > 1
+
+
+def test_a_rule_remembers_as_much_as_it_looks_back_on() -> None:
+    going = course("nr", people=2, initial_ms=(7.0, 9.0), stopping=EdgeVariance(last=2))
+    remembered = []
+    for _ in range(5):
+        going = told(going)
+        remembered.append([len(past) for past in going.past])
+        assert all(past[-1] is going.estimate(i) for i, past in enumerate(going.past) if past)
+    assert remembered == [[0, 0], [1, 1], [2, 2], [2, 2], [2, 2]]
+
+
+def test_a_rule_that_does_not_look_back_costs_no_estimates() -> None:
+    assert told(course("nr", stopping=Budget(3))).past == ((), (), ())
+
+
+def test_a_decision_counts_the_mistrials_of_its_person() -> None:
+    going = told(course("nr", people=2, stopping=Budget(3)))
+    assert not going.decision(0).stop
+    assert going.decision(1, mistrials=2).stop

@@ -142,19 +142,19 @@ def test_a_width_that_cannot_be_is_refused(width_ms: float) -> None:
 
 @pytest.mark.parametrize(("level", "probability"), [(0, 0.9), (1, 0.9), (math.nan, 0.9), (0.9, -0.1), (0.9, 1.1)])
 def test_a_level_or_probability_outside_0_to_1_is_refused(level: float, probability: float) -> None:
-    with pytest.raises(InvalidValueError, match="0–1"):
+    with pytest.raises(InvalidValueError, match=r"0 (to|and below) 1|above 0 and of at most 1"):
         CredibleWidth(30, level, probability)
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, math.nan])
 def test_a_share_outside_0_to_1_is_refused(share: float) -> None:
-    with pytest.raises(InvalidValueError, match="0–1"):
+    with pytest.raises(InvalidValueError, match=r"0 (to|and below) 1|above 0 and of at most 1"):
         CredibleWidth(30, min_share=share)
 
 
 @pytest.mark.parametrize("probability", [0, -0.1, 1.1, math.nan])
 def test_no_window_needs_a_probability(probability: float) -> None:
-    with pytest.raises(InvalidValueError, match="0–1"):
+    with pytest.raises(InvalidValueError, match=r"0 (to|and below) 1|above 0 and of at most 1"):
         NoWindow(probability)
 
 

@@ -302,5 +302,5 @@ def test_a_batch_from_a_model_that_imagines_no_trials_is_refused(scripted_strate
     with pytest.raises(StrategyError, match="cannot imagine trials"):
         scripted_strategy().ask_batch(2)
     assert len(scripted_strategy().ask_batch(1)) == 1
-    with pytest.raises(InvalidValueError, match="at least one"):
+    with pytest.raises(InvalidValueError, match="at least 1"):
         scripted_strategy().ask_batch(0)

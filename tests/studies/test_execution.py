@@ -59,7 +59,7 @@ def test_stopping_early_leaves_the_rest_undone():
 
 @pytest.mark.parametrize("wrong", [{"workers": 0}, {"attempts": 0}])
 def test_no_worker_or_attempt_is_refused(wrong):
-    with pytest.raises(InvalidValueError, match="at least one"):
+    with pytest.raises(InvalidValueError, match="at least 1"):
         Processes(**wrong)
 
 

@@ -128,7 +128,7 @@ def test_an_unknown_cohort_names_the_known_ones() -> None:
 
 @pytest.mark.parametrize(("n", "seed"), [(-1, 0), (1, -1)])
 def test_a_negative_number_of_people_or_seed_is_refused(n: int, seed: int) -> None:
-    with pytest.raises(InvalidValueError, match="not be negative"):
+    with pytest.raises(InvalidValueError, match="at least 0"):
         cohort("gaussian", n, seed)
 
 

@@ -69,19 +69,19 @@ def test_a_profile_keeps_the_shape_of_the_isis() -> None:
 
 @pytest.mark.parametrize("span", [(math.nan, 10), (math.inf, 10), (0, 0), (0, -1), (0, math.nan), (0, math.inf)])
 def test_a_span_that_cannot_be_is_refused(span: tuple[float, float]) -> None:
-    with pytest.raises(InvalidValueError, match="positive width"):
+    with pytest.raises(InvalidValueError, match=r"start_ms|width_ms"):
         PeakProfile(*span)
-    with pytest.raises(InvalidValueError, match="positive width"):
+    with pytest.raises(InvalidValueError, match=r"start_ms|width_ms"):
         TwoPeakProfile(*span, 1.0, 1.0)
 
 
 @pytest.mark.parametrize(("peak_at", "exponent"), [(0, 2), (1, 2), (math.nan, 2), (0.5, 0), (0.5, math.nan)])
 def test_a_peak_outside_its_span_is_refused(peak_at: float, exponent: float) -> None:
-    with pytest.raises(InvalidValueError, match="peak_at"):
+    with pytest.raises(InvalidValueError, match=r"peak_at|exponent"):
         PeakProfile(0, 10, peak_at, exponent)
 
 
 @pytest.mark.parametrize("heights", [(0.5, 0.5), (1, 1.1), (1, -0.1), (1, math.nan), (math.nan, 1)])
 def test_the_higher_of_two_peaks_has_height_1(heights: tuple[float, float]) -> None:
-    with pytest.raises(InvalidValueError, match="height 1"):
+    with pytest.raises(InvalidValueError, match=r"height 1|first|second"):
         TwoPeakProfile(0, 10, *heights)

@@ -11,12 +11,12 @@ import torch
 
 from isiw.acquisition.information import MutualInformation
 from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.acquisition.registry import ACQUISITIONS
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import StrategyError
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.protocol import Observation, ProposesIsi, Tensor
 from isiw.strategy.catalogue import list_strategies, make_strategy
-from isiw.strategy.settings.common import ACQUISITIONS
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
 from isiw.testing import check_acquisition, check_model, check_strategy
@@ -34,7 +34,7 @@ def settings_of(name: str) -> dict[str, Any]:
 
 def particles_after(trials: Trials, people: int = 1) -> ParticlePosterior:
     model = ParticleModel(particles=100)
-    posterior = model.prior(VALVE_SPACE, 1, people)
+    posterior = model.begin(VALVE_SPACE, 1, people)
     for isi_ms, mep_mv in trials:
         columns = (math.nan if isi_ms is None else isi_ms, mep_mv, 0.0, math.nan)
         posterior = model.update(posterior, Observation(*(torch.full((people,), value) for value in columns)))
@@ -94,8 +94,8 @@ class Broken:
     fault: str
     model: ParticleModel = field(default_factory=lambda: ParticleModel(particles=50))
 
-    def prior(self, space, seed, people=1):
-        return self.model.prior(space, seed, people)
+    def begin(self, space, seed, people=1):
+        return self.model.begin(space, seed, people)
 
     def update(self, posterior, observation):
         after = self.model.update(posterior, observation)

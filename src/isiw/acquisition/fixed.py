@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from scipy.stats import qmc
 
-from isiw.errors import InvalidValueError
+from isiw.checks import check_numbers, check_wholes
 from isiw.models.protocol import Posterior, ProposesIsi, Tensor
 
 __all__ = ["EvenSpacing", "IncrementalSweep", "OwnProposal", "RandomIsi", "SobolIsi", "golden_index"]
@@ -95,8 +95,8 @@ class IncrementalSweep:
     needs: ClassVar[tuple[type, ...]] = ()
 
     def __post_init__(self) -> None:
-        if not self.step_ms > 0 or self.trials_per_isi < 1:
-            raise InvalidValueError("a sweep needs a step and trials", got=(self.step_ms, self.trials_per_isi))
+        check_numbers(self, "step_ms", above=0)
+        check_wholes(self, "trials_per_isi", least=1)
 
     def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
         """Score ISIs by their distance [ms] from the one whose turn it is, negative, shape (1, t)."""

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 
 from isiw.acquisition.lookahead import lookahead
-from isiw.errors import InvalidValueError
+from isiw.checks import check_numbers
 from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesProfiles, Tensor
 
 __all__ = [
@@ -122,8 +122,7 @@ class UpperConfidenceBound:
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
     def __post_init__(self) -> None:
-        if not self.width_sd >= 0:
-            raise InvalidValueError("width_sd must not be negative", got=self.width_sd)
+        check_numbers(self, "width_sd", least=0)
 
     def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""

@@ -13,7 +13,7 @@ from typing import ClassVar, Protocol
 import torch
 
 from isiw.acquisition.lookahead import expected_variance_reduction
-from isiw.errors import InvalidValueError
+from isiw.checks import check_wholes
 from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesWindows, Tensor
 
 __all__ = [
@@ -120,8 +120,7 @@ class WindowInformation:
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
     def __post_init__(self) -> None:
-        if self.cells < 2:
-            raise InvalidValueError("an edge falls into at least two cells", got=self.cells)
+        check_wholes(self, "cells", least=2)
 
     def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""

@@ -13,7 +13,7 @@ from typing import ClassVar, Protocol
 import torch
 
 from isiw.acquisition.lookahead import lookahead
-from isiw.errors import InvalidValueError
+from isiw.checks import check_numbers
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, Tensor
 from isiw.window import EDGE_LEVEL
 
@@ -101,8 +101,7 @@ class Straddle:
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
     def __post_init__(self) -> None:
-        if not self.width_sd > 0:
-            raise InvalidValueError("width_sd must be positive", got=self.width_sd)
+        check_numbers(self, "width_sd", above=0)
 
     def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
@@ -124,8 +123,7 @@ class IntegratedFeasibility:
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
 
     def __post_init__(self) -> None:
-        if not self.band_sd > 0:
-            raise InvalidValueError("band_sd must be positive", got=self.band_sd)
+        check_numbers(self, "band_sd", above=0)
 
     def __call__(self, posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""

@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol
 import torch
 
 from isiw.acquisition.lookahead import expected_variance_reduction
-from isiw.errors import InvalidValueError
+from isiw.checks import check_wholes
 from isiw.models.protocol import PredictsOutcomes, SamplesWindows, Tensor
 
 __all__ = ["TwoStep", "two_step_gain"]
@@ -42,10 +42,7 @@ class TwoStep:
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
     def __post_init__(self) -> None:
-        if min(self.shortlist, self.groups, self.stride) < 1:
-            raise InvalidValueError(
-                "shortlist, groups and stride count from one", got=(self.shortlist, self.groups, self.stride)
-            )
+        check_wholes(self, "shortlist", "groups", "stride", least=1)
 
     def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""

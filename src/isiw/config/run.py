@@ -14,33 +14,23 @@ from __future__ import annotations
 
 import datetime as dt
 import itertools
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field
-from functools import cache, partial
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    ModelWrapValidatorHandler,
-    PrivateAttr,
-    ValidationInfo,
-    create_model,
-    field_validator,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
+from isiw.checks import choice
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
-from isiw.devices.recorded import RecordedDevice, load_recordings
-from isiw.devices.simulated import SimulatedDevice
-from isiw.errors import ConfigError, InvalidValueError
+from isiw.devices.recorded import RecordedPerson, load_recordings
+from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
+from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord
 from isiw.session.loop import Session, SessionUpdate
-from isiw.strategy.catalogue import list_strategies, make_strategy, settings_of
+from isiw.strategy.catalogue import list_strategies, make_strategy, settings_for
 from isiw.subjects.cohorts import COHORTS, cohort
 from isiw.subjects.subject import SimulatedSubject
 from isiw.toml_files import checked, read_toml
@@ -65,15 +55,6 @@ RUN_KEY = "isiw_run"
 """What `isiw run` keeps its configuration under in a log; lab software may keep there what it likes."""
 
 
-_FILLED: Final[Any] = Field(default_factory=dict, validate_default=True)
-
-
-def _one_of(known: Iterable[str], name: str) -> str:
-    if name not in known:
-        raise InvalidValueError("the name is unknown", got=name, expected=f"one of {', '.join(known)}")
-    return name
-
-
 class _Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -89,7 +70,7 @@ class SubjectConfig(_Section):
     @field_validator("cohort")
     @classmethod
     def _known(cls, name: str) -> str:
-        return _one_of(COHORTS, name)
+        return str(choice("the cohort", name, COHORTS))
 
 
 class SpaceConfig(_Section):
@@ -111,48 +92,23 @@ class SpaceConfig(_Section):
         return DesignSpace(**self.model_dump())
 
 
-@dataclass(frozen=True)
-class _Given:
-    """The settings that were given, without those that follow from the name; in comparisons it does not count."""
-
-    settings: Any = field(default_factory=dict, compare=False)
-
-
 class StrategyConfig(_Section):
-    """The strategy: a name from `isiw.list_strategies()`, and settings of its family."""
+    """The strategy: a name from `isiw.list_strategies()`, and its settings by key."""
 
     name: str = "default"
-    settings: Any = _FILLED
-    _given: _Given = PrivateAttr(default_factory=_Given)
+    settings: dict[str, Any] = Field(default_factory=dict)
 
     @field_validator("name")
     @classmethod
     def _known(cls, name: str) -> str:
-        return _one_of(list_strategies(), name)
-
-    @field_validator("settings", mode="before")
-    @classmethod
-    def _as_the_name_means(cls, settings: Any, info: ValidationInfo) -> Any:
-        known = isinstance(settings, Mapping) and "name" in info.data
-        return {**settings_of(info.data["name"])[1], **settings} if known else settings
+        return str(choice("the strategy", name, list_strategies()))
 
     @field_validator("settings")
     @classmethod
-    def _of_the_family(cls, settings: Any, info: ValidationInfo) -> Any:
-        known = isinstance(settings, Mapping) and "name" in info.data
-        return settings_of(info.data["name"])[0](**settings) if known else settings
-
-    @model_validator(mode="wrap")
-    @classmethod
-    def _remembering(cls, values: Any, build: ModelWrapValidatorHandler[Self]) -> Self:
-        config = build(values)
-        if isinstance(values, Mapping):
-            config._given = _Given(values.get("settings", {}))  # noqa: SLF001 - the new one of this very class
-        return config
-
-    def overridden(self, name: str | None) -> dict[str, Any]:
-        """The values of another strategy, or of this one, with the settings that were given."""
-        return {"name": self.name if name is None else name, "settings": self._given.settings}
+    def _possible(cls, settings: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        if "name" in info.data:
+            settings_for(info.data["name"], **settings)
+        return settings
 
 
 class LimitsConfig(_Section):
@@ -186,7 +142,7 @@ class RunConfig(_Section):
         values |= {key: value for key, value in {"seed": seed, "log": log}.items() if value is not None}
         about = {"kind": subject, "data": data}
         values["subject"] |= {key: value for key, value in about.items() if value is not None}
-        values["strategy"] = self.strategy.overridden(strategy)
+        values["strategy"] |= {} if strategy is None else {"name": strategy}
         return _validated(values, "the command line")
 
 
@@ -205,22 +161,7 @@ def load_config(path: str | Path | None = None) -> RunConfig:
 
 
 def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
-    return checked(_kind(_named(values)), values, source)
-
-
-def _named(values: Mapping[str, Any]) -> str:
-    """The strategy that is named, or the default where none or an unknown one is: that is told with all else."""
-    strategy = values.get("strategy")
-    name = strategy.get("name") if isinstance(strategy, Mapping) else None
-    return name if name in list_strategies() else "default"
-
-
-@cache
-def _kind(strategy: str) -> type[RunConfig]:
-    """The configuration whose strategy has the settings of its name."""
-    family, _ = settings_of(strategy)
-    settings = create_model("StrategyConfig", __base__=StrategyConfig, settings=(family, _FILLED))
-    return create_model("RunConfig", __base__=RunConfig, strategy=(settings, _FILLED))
+    return checked(RunConfig, values, source)
 
 
 def config_of_log(record: SessionRecord) -> RunConfig:
@@ -268,14 +209,15 @@ def device_for(config: RunConfig) -> Device:
     reference = config.space.reference
     respond = partial(subject_for(config).begin(config.seed).respond, reference=reference)
     if config.subject.kind == "simulated":
-        return SimulatedDevice(respond, reference)
+        return SimulatedDevice(SimulatedPerson(respond, reference))
     if config.subject.data is None:
         raise ConfigError(
             "subject.data is missing: recorded EMG is not part of the package",
             expected="the folder with the recordings",
             remedy="Give it with --data DIR.",
         )
-    return RecordedDevice(respond, reference, load_recordings(config.subject.data), config.seed)
+    recordings = load_recordings(config.subject.data)
+    return SimulatedDevice(RecordedPerson(respond, reference, recordings, config.seed))
 
 
 def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:
@@ -287,7 +229,7 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         kept["subject"]["data"] = str(config.subject.data.resolve())
     return Session(
         device_for(config),
-        make_strategy(config.strategy.name, space=space, seed=config.seed, **asdict(config.strategy.settings)),
+        make_strategy(config.strategy.name, space=space, seed=config.seed, **config.strategy.settings),
         log=log,
         limits=Limits.of_space(space, **config.limits.model_dump()),
         on_trial=on_trial,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Integral
 
+from isiw.checks import check_numbers, check_wholes
 from isiw.design import DesignSpace
 from isiw.devices.clock import Clock
 from isiw.devices.protocol import Answer, Device, DeviceInfo, require_staged
@@ -35,15 +35,11 @@ class Limits:
     max_pulses: int = 200
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.low_ms) and math.isfinite(self.high_ms) and self.low_ms <= self.high_ms):
-            raise InvalidValueError("the limits of the ISI must be finite and ascend", got=(self.low_ms, self.high_ms))
-        if not (math.isfinite(self.min_iti_s) and self.min_iti_s >= 0):
-            raise InvalidValueError("min_iti_s must be finite and not negative", got=self.min_iti_s)
-        # A NaN compares as false with any count, and so would limit nothing.
-        if isinstance(self.max_pulses, bool) or not isinstance(self.max_pulses, Integral) or self.max_pulses < 1:
-            raise InvalidValueError("max_pulses must be a whole number of at least 1", got=self.max_pulses)
-        for name, kind in (("low_ms", float), ("high_ms", float), ("min_iti_s", float), ("max_pulses", int)):
-            object.__setattr__(self, name, kind(getattr(self, name)))
+        check_numbers(self, "low_ms", "high_ms")
+        check_numbers(self, "min_iti_s", least=0)
+        check_wholes(self, "max_pulses", least=1)
+        if self.low_ms > self.high_ms:
+            raise InvalidValueError("the limits of the ISI must ascend", got=(self.low_ms, self.high_ms))
 
     @classmethod
     def of_space(cls, space: DesignSpace, *, min_iti_s: float = 5.0, max_pulses: int = 200) -> Limits:

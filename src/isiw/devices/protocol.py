@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Protocol, TypeAlias, get_args, runtime_checkable
 
-from isiw.errors import DeviceError, InvalidValueError
+from isiw.checks import check_choice, check_numbers
+from isiw.errors import DeviceError
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Reference
 
@@ -40,12 +41,8 @@ class DeviceInfo:
     detection_limit_mv: float | None = None
 
     def __post_init__(self) -> None:
-        if self.reference not in {"impact", "valve"}:
-            raise InvalidValueError(
-                "DeviceInfo.reference is unknown", got=self.reference, expected='"impact" or "valve"'
-            )
-        if self.detection_limit_mv is not None and not 0 < self.detection_limit_mv < float("inf"):
-            raise InvalidValueError("a detection limit must be positive", got=self.detection_limit_mv)
+        check_choice(self, "reference", get_args(Reference))
+        check_numbers(self, "detection_limit_mv", above=0, optional=True)
 
 
 @runtime_checkable

@@ -1,4 +1,4 @@
-"""A device whose sweeps are recorded EMG, put together anew: semi-synthetic, for tests of the whole chain.
+"""People whose sweeps are recorded EMG, put together anew: semi-synthetic, for tests of the whole chain.
 
 A simulated person answers the stimulus with an amplitude. The sweep is a really recorded one without a MEP, plus a
 really recorded MEP, scaled so that the sum has the person's amplitude from 15 to 35 ms. Noise, offset, artefact and
@@ -10,22 +10,21 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from isiw.devices.protocol import DeviceInfo, require_staged
+from isiw.devices.protocol import DeviceInfo
 from isiw.devices.robot.waveforms import scale_of_mep
-from isiw.devices.simulated import Respond, SimulatedPerson
+from isiw.devices.simulated import Respond
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals.mep import MEP_WINDOW_MS
 from isiw.trials import Channel, Stimulus, Sweep
 from isiw.types import BoolArray, FloatArray, Reference
 
-__all__ = ["RecordedDevice", "Recordings", "load_recordings"]
+__all__ = ["RecordedPerson", "Recordings", "load_recordings"]
 
 PATTERN = "uef_*_ECR_epochs_uV_3kHz.csv.gz"
 QUIET_MV = 0.02  # recorded floors reach 20 µV peak-to-peak; the smallest recorded MEP here has 80 µV
@@ -126,8 +125,8 @@ def _sorted_recordings(time_ms: FloatArray, sweeps_mv: FloatArray) -> Recordings
     return Recordings(time_ms, sweeps_mv[amplitude < QUIET_MV], (sweeps_mv[clear] - offset[clear]) * fade_in)
 
 
-class RecordedDevice:
-    """Semi-synthetic: a simulated person's amplitudes in really recorded EMG; delivers nothing to anybody.
+class RecordedPerson:
+    """A simulation of a person whose amplitudes are put into really recorded EMG: semi-synthetic.
 
     Args:
         respond: answers a commanded ISI [ms] with the realised ISI and the MEP.
@@ -137,48 +136,21 @@ class RecordedDevice:
     """
 
     def __init__(self, respond: Respond, reference: Reference, recordings: Recordings, seed: int = 0) -> None:
-        self._person = SimulatedPerson(respond)
-        self._recordings, self._seed = recordings, seed
-        self._info = DeviceInfo(
-            name="simulated person in recorded EMG (semi-synthetic)",
-            reference=reference,
-            simulated=True,
-            channels={"emg": "mV"},
-        )
-        self._staged = False
+        name = "simulated person in recorded EMG (semi-synthetic)"
+        self.info = DeviceInfo(name, reference, simulated=True, channels={"emg": "mV"})
+        self._respond, self._recordings, self._seed = respond, recordings, seed
 
-    def describe(self) -> DeviceInfo:
-        """What the device is."""
-        return self._info
-
-    def stage(self) -> None:
-        """Arm."""
-        self._staged = True
-
-    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Sweep:  # noqa: ARG002 - answers at once
-        """The sweep that follows one pair of stimuli; its clock is zero at the magnetic pulse."""
-        require_staged(self._info.name, staged=self._staged)
-        outcome = self._person.answer(stimulus.isi_ms)
+    def answer(self, stimulus: Stimulus) -> Sweep:
+        """The sweep that follows the next pair of stimuli; its clock is zero at the magnetic pulse."""
+        outcome = self._respond(stimulus.isi_ms)
         rng = np.random.default_rng([self._seed, stimulus.trial])
         emg_mv = self._recordings.sweep_mv(outcome.mep_mv, rng)
         emg = Channel(emg_mv, self._recordings.rate_hz, "mV", t0_ms=float(self._recordings.time_ms[0]))
         first_ms = None if outcome.isi_ms is None else -outcome.isi_ms
         return Sweep(
             {"emg": emg},
-            t_valve_ms=first_ms if self._info.reference == "valve" else None,
+            t_valve_ms=first_ms if self.info.reference == "valve" else None,
             t_tms_ms=0.0,
-            t_hit_ms=first_ms if self._info.reference == "impact" else None,
+            t_hit_ms=first_ms if self.info.reference == "impact" else None,
             isi_sd_ms=outcome.isi_sd_ms,
         )
-
-    def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
-        """Bring the person to where they were after these stimuli."""
-        self._person.resume_after(stimuli)
-
-    def stop(self) -> None:
-        """Disarm."""
-        self._staged = False
-
-    def unstage(self) -> None:
-        """Disarm."""
-        self._staged = False

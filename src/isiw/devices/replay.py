@@ -1,20 +1,19 @@
-"""A device that answers from the trials of an earlier session, to try another strategy on the same data."""
+"""The trials of an earlier session as answers, to try another strategy on the same data."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
-from isiw.devices.protocol import DeviceInfo, require_staged
+from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError
 from isiw.trials import Measurement, Stimulus, Trial, TrialTable
 from isiw.types import Reference
 
-__all__ = ["ReplayDevice"]
+__all__ = ["RecordedTrials"]
 
 
-class ReplayDevice:
-    """Answers each stimulus with the recorded trial of the nearest ISI, each trial once.
+class RecordedTrials:
+    """A simulation that answers each stimulus with the recorded trial of the nearest ISI, each trial once.
 
     A session that asks what was asked before gets the same answers; another one gets the nearest there are, at the ISIs
     at which they were really recorded. These may be far from what is asked, so another strategy needs a space with a
@@ -24,7 +23,7 @@ class ReplayDevice:
         record = isiw.read_session("session.mcap")
         space = dataclasses.replace(record.header.space, tolerance_ms=1000.0)
         pairs = sum(trial.isi_ms is not None for trial in record.table.told)
-        device = isiw.ReplayDevice(record.table, space.reference)
+        device = isiw.SimulatedDevice(isiw.RecordedTrials(record.table, space.reference))
         limits = isiw.Limits.of_space(space, max_pulses=pairs)
         isiw.Session(device, isiw.make_strategy(space=space), log="again.mcap", limits=limits).run()
 
@@ -34,29 +33,15 @@ class ReplayDevice:
     """
 
     def __init__(self, table: TrialTable, reference: Reference) -> None:
+        self.info = DeviceInfo(name="replay of recorded trials", reference=reference, simulated=True)
         self._left: list[Trial] = list(table.told)
-        self._info = DeviceInfo(name="replay of recorded trials", reference=reference, simulated=True)
-        self._delivered = 0
-        self._staged = False
 
-    def describe(self) -> DeviceInfo:
-        """What the device is."""
-        return self._info
-
-    def stage(self) -> None:
-        """Arm."""
-        self._staged = True
-
-    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:  # noqa: ARG002 - answers at once
-        """The recorded answer nearest to one pair of stimuli.
+    def answer(self, stimulus: Stimulus) -> Measurement:
+        """The recorded answer nearest to the next pair of stimuli.
 
         Raises:
-            DeviceError: not staged, or no trial is left.
+            DeviceError: no trial is left.
         """
-        require_staged(self._info.name, staged=self._staged)
-        return self._take(stimulus)
-
-    def _take(self, stimulus: Stimulus) -> Measurement:
         asked_ms = stimulus.isi_ms
         fitting = [trial for trial in self._left if (trial.isi_ms is None) == (asked_ms is None)]
         if not fitting:
@@ -67,7 +52,6 @@ class ReplayDevice:
             )
         trial = min(fitting, key=lambda candidate: _distance_ms(candidate, asked_ms))
         self._left.remove(trial)
-        self._delivered += 1
         return Measurement(
             trial.mep_mv or 0.0,
             trial.isi_ms,
@@ -77,19 +61,6 @@ class ReplayDevice:
             trial.t_hit_ms,
             trial.t_tms_ms,
         )
-
-    def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
-        """Use up the trials that answered these stimuli."""
-        for stimulus in stimuli[self._delivered :]:
-            self._take(stimulus)
-
-    def stop(self) -> None:
-        """Disarm."""
-        self._staged = False
-
-    def unstage(self) -> None:
-        """Disarm."""
-        self._staged = False
 
 
 def _distance_ms(trial: Trial, asked_ms: float | None) -> float:

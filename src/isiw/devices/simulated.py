@@ -1,15 +1,17 @@
-"""A device that asks a function what came of a stimulus: simulated people, or anything else that can answer."""
+"""Devices that stimulate nobody: simulated people, recorded sweeps, recorded trials, a simulated robot."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Protocol, TypeAlias
 
-from isiw.devices.protocol import DeviceInfo, require_staged
+from isiw.devices.protocol import Answer, DeviceInfo, require_staged
+from isiw.errors import DeviceError
 from isiw.trials import Measurement, Stimulus
 from isiw.types import Reference
 
-__all__ = ["Outcome", "Respond", "SimulatedDevice", "SimulatedPerson"]
+__all__ = ["Outcome", "Respond", "SimulatedDevice", "SimulatedPerson", "Simulation"]
 
 
 class Outcome(Protocol):
@@ -32,59 +34,60 @@ Respond: TypeAlias = Callable[[float | None], Outcome]
 """Answers a commanded ISI [ms]; None is TMS alone."""
 
 
-class SimulatedPerson:
-    """A person with a memory (drift, start-up), who can be brought to where a broken session left them.
+class Simulation(Protocol):
+    """What a simulated device stands for: it answers one stimulus after the other, and may remember them."""
 
-    Args:
-        respond: answers one stimulus after the other.
-    """
+    @property
+    def info(self) -> DeviceInfo:
+        """What the device says about itself; it is simulated."""
 
-    def __init__(self, respond: Respond) -> None:
-        self._respond = respond
-        self._answered = 0
+    def answer(self, stimulus: Stimulus) -> Answer:
+        """What comes of the next stimulus.
 
-    def answer(self, isi_ms: float | None) -> Outcome:
-        """Answer the next stimulus [ms]."""
-        self._answered += 1
-        return self._respond(isi_ms)
-
-    def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
-        """Answer those of the session's stimuli that have not been answered yet, and forget the answers."""
-        for stimulus in stimuli[self._answered :]:
-            self.answer(stimulus.isi_ms)
+        Raises:
+            DeviceError: it cannot be delivered.
+        """
 
 
 class SimulatedDevice:
-    """Measures the MEPs of a simulated person; delivers nothing to anybody.
+    """A device that asks a simulation what came of each stimulus; it delivers nothing to anybody.
 
     Args:
-        respond: answers a commanded ISI [ms] with the realised ISI and the MEP.
-        reference: the event that ISIs count from.
-        name: what the log calls it.
+        simulation: answers; `SimulatedPerson`, `RecordedPerson`, `RecordedTrials` and `Tapper` are there.
     """
 
-    def __init__(self, respond: Respond, reference: Reference, name: str = "simulated person") -> None:
-        self._person = SimulatedPerson(respond)
-        self._info = DeviceInfo(name=name, reference=reference, simulated=True)
-        self._staged = False
+    def __init__(self, simulation: Simulation) -> None:
+        self.simulation = simulation
+        self._asked, self._staged = 0, False
 
     def describe(self) -> DeviceInfo:
         """What the device is."""
-        return self._info
+        return self.simulation.info
 
     def stage(self) -> None:
         """Arm."""
         self._staged = True
 
-    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:  # noqa: ARG002 - answers at once
-        """The person's answer to one pair of stimuli."""
-        require_staged(self._info.name, staged=self._staged)
-        outcome = self._person.answer(stimulus.isi_ms)
-        return Measurement(outcome.mep_mv, outcome.isi_ms, outcome.isi_sd_ms)
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:  # noqa: ARG002 - answers at once
+        """The simulation's answer.
+
+        Raises:
+            DeviceError: not staged, or the simulation refuses.
+        """
+        require_staged(self.describe().name, staged=self._staged)
+        self._asked += 1
+        return self.simulation.answer(stimulus)
 
     def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
-        """Bring the person to where they were after these stimuli."""
-        self._person.resume_after(stimuli)
+        """Answer those of the session's stimuli that have not been asked for yet, and forget the answers.
+
+        Args:
+            stimuli: all of them since the session's beginning.
+        """
+        for stimulus in stimuli[self._asked :]:
+            self._asked += 1
+            with suppress(DeviceError):  # it refused then, too
+                self.simulation.answer(stimulus)
 
     def stop(self) -> None:
         """Disarm."""
@@ -93,3 +96,22 @@ class SimulatedDevice:
     def unstage(self) -> None:
         """Disarm."""
         self._staged = False
+
+
+class SimulatedPerson:
+    """A simulation that measures the MEPs of a simulated person.
+
+    Args:
+        respond: answers a commanded ISI [ms] with the realised ISI and the MEP.
+        reference: the event that ISIs count from.
+        name: what the log calls the device.
+    """
+
+    def __init__(self, respond: Respond, reference: Reference, name: str = "simulated person") -> None:
+        self.info = DeviceInfo(name=name, reference=reference, simulated=True)
+        self._respond = respond
+
+    def answer(self, stimulus: Stimulus) -> Measurement:
+        """The person's answer to the next pair of stimuli."""
+        outcome = self._respond(stimulus.isi_ms)
+        return Measurement(outcome.mep_mv, outcome.isi_ms, outcome.isi_sd_ms)

@@ -10,6 +10,8 @@ the same order and equally weighted.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
@@ -38,6 +40,9 @@ __all__ = [
 
 Tensor: TypeAlias = torch.Tensor
 
+Values: TypeAlias = Tensor | Sequence[float | None] | Sequence[bool | None]
+"""One value a person, as a tensor or plain; None is not known."""
+
 
 @dataclass(frozen=True, eq=False)
 class Observation:
@@ -55,6 +60,32 @@ class Observation:
     mep_mv: Tensor
     isi_sd_ms: Tensor
     response: Tensor
+
+    @classmethod
+    def of(
+        cls,
+        isi_ms: Values,
+        mep_mv: Values,
+        isi_sd_ms: Values | None = None,
+        response: Sequence[bool | None] | None = None,
+    ) -> Observation:
+        """One trial of each person.
+
+        Args:
+            isi_ms: the realised ISI [ms], one a person; None or NaN means TMS alone.
+            mep_mv: amplitude of the MEP [mV], one a person; None or NaN where only the response is told.
+            isi_sd_ms: SD of the realised ISI [ms], one a person; by default all were measured.
+            response: whether a response was seen, one a person; by default amplitudes are told.
+        """
+        isi, mep = _column(isi_ms), _column(mep_mv)
+        seen = torch.full_like(mep, torch.nan) if response is None else _column(response)
+        return cls(isi, mep, torch.zeros_like(isi) if isi_sd_ms is None else _column(isi_sd_ms), seen)
+
+
+def _column(values: Values) -> Tensor:
+    if isinstance(values, torch.Tensor):
+        return values
+    return torch.tensor([math.nan if value is None else float(value) for value in values])
 
 
 @runtime_checkable
@@ -155,7 +186,7 @@ class ReportsTrouble(Protocol):
 class ResponseModel(Protocol):
     """A model: settings, from which posteriors are made."""
 
-    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> Posterior:
+    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> Posterior:
         """The posterior before the first trial."""
 
     def update(self, posterior: Any, observation: Observation) -> Posterior:

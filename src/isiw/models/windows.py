@@ -7,12 +7,23 @@ import torch
 from isiw.design import DesignSpace
 from isiw.models.protocol import Tensor
 from isiw.types import FloatArray
-from isiw.window import Window, WindowEstimate
+from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window, WindowEstimate
 
-__all__ = ["PROFILE_POINTS", "best_window", "edge_samples", "profile_grid", "sampled_estimate"]
+__all__ = ["PROFILE_POINTS", "best_window", "edge_samples", "least_excess_mv", "profile_grid", "sampled_estimate"]
 
 PROFILE_POINTS = 101
 """ISIs at which the expected MEP and its band are reported."""
+
+
+def least_excess_mv(peak_mv: Tensor, baseline_mv: Tensor) -> Tensor:
+    """The least-excess rule of `isiw.window.least_excess_mv`, for tensors.
+
+    Args:
+        peak_mv: largest excess over the baseline in the range [mV], any shape.
+        baseline_mv: expected MEP without a tap [mV], of the same shape.
+    """
+    enough_mv = (MIN_EXCESS_OF_BASELINE * baseline_mv).clamp_min(MIN_EXCESS_MV)
+    return torch.where(peak_mv >= enough_mv, EDGE_LEVEL * peak_mv, torch.inf)
 
 
 def best_window(masks: Tensor, grid_ms: FloatArray) -> Window | None:

@@ -5,7 +5,6 @@ What is on disk is always ahead of what happens next: the intent before its stim
 
 from __future__ import annotations
 
-import dataclasses
 import datetime as dt
 import importlib.metadata
 import math
@@ -18,10 +17,11 @@ from pathlib import Path
 from typing import Any
 
 import isiw
+from isiw.checks import deadline, number
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo
-from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, StrategyError
+from isiw.errors import DeviceError, LimitExceededError, StrategyError
 from isiw.log.durable import log_of
 from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform, waveform_topic
 from isiw.log.writer import LogWriter
@@ -29,7 +29,7 @@ from isiw.session.interrupts import DeferredInterrupts
 from isiw.signals.judgement import EMG_UNITS_MV, SignalLimits, judge, judge_measurement, require_unit
 from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Sweep, Trial, TrialTable
+from isiw.trials import Measurement, Stimulus, Sweep, Trial, TrialTable
 from isiw.window import WindowEstimate
 
 __all__ = ["Session", "SessionResult", "SessionUpdate", "learn"]
@@ -143,8 +143,8 @@ class Session:
     ) -> None:
         space, info = strategy.space, device.describe()
         _require_matching(info, strategy)
-        if not (timeout_s > 0 and (ask_deadline_s is None or ask_deadline_s >= 0)):
-            raise InvalidValueError("timeout_s and ask_deadline_s are times [s]", got=(timeout_s, ask_deadline_s))
+        timeout_s = number("timeout_s", timeout_s, above=0)
+        ask_deadline_s = deadline("ask_deadline_s", ask_deadline_s)
         self.strategy = strategy
         self.trials = TrialTable()
         self.log_path = log_of(Path(log))
@@ -284,7 +284,7 @@ class Session:
         self._device.check(stimulus)
         self._log.append(Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=self._clock.now_s()))
         self._log.sync()
-        trial = _unknown(stimulus)
+        trial = Trial.unknown(stimulus)
         try:
             with self._interrupts.allowed():
                 answer = self._device.deliver(stimulus, self._timeout_s)
@@ -304,13 +304,9 @@ class Session:
     def _judged(self, stimulus: Stimulus, answer: Answer) -> Trial:
         space = self.strategy.space
         if isinstance(answer, Sweep):
-            judged = judge(answer, stimulus, space, self._signals)
-        elif isinstance(answer, Measurement):
-            judged = judge_measurement(answer, stimulus, space, self._signals)
-        else:
-            raise DeviceError("the device's answer is no answer", got=answer, expected="a Sweep or a Measurement")
-        return Trial(index=stimulus.trial, commanded_isi_ms=stimulus.isi_ms, **dataclasses.asdict(judged))
-
-
-def _unknown(stimulus: Stimulus) -> Trial:
-    return Trial(stimulus.trial, Status.MISTRIAL, stimulus.isi_ms, MistrialReason.OUTCOME_UNKNOWN)
+            return judge(answer, stimulus, space, self._signals)
+        if isinstance(answer, Measurement):
+            return judge_measurement(answer, stimulus, space, self._signals)
+        raise DeviceError(
+            "the device answered with something else than its promise", got=answer, expected="a Sweep or a Measurement"
+        )

@@ -18,7 +18,7 @@ from isiw.log.writer import LogWriter
 from isiw.session.loop import Session, SessionUpdate, learn
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
-from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
+from isiw.trials import Stimulus, Trial, TrialTable
 
 __all__ = ["Replayed", "exclude", "replay", "resume"]
 
@@ -133,9 +133,7 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
             strategy = strategy.restarted()
             for trial in told:
                 learn(strategy, trial)
-    unknown = tuple(
-        Trial(intent.trial, Status.MISTRIAL, intent.isi_ms, MistrialReason.OUTCOME_UNKNOWN) for intent in record.unknown
-    )
+    unknown = tuple(Trial.unknown(Stimulus(intent.trial, intent.isi_ms)) for intent in record.unknown)
     for trial in unknown:
         learn(strategy, trial)
     table = TrialTable(tuple(sorted((*told, *unknown), key=lambda trial: trial.index)))

@@ -2,7 +2,7 @@
 
 from isiw.signals.events import TapEvents, detect_events, sweep_events
 from isiw.signals.impact import impact_time, impact_times
-from isiw.signals.judgement import Judged, SignalLimits, is_saturated, judge, judge_measurement, wrong_isi
+from isiw.signals.judgement import SignalLimits, is_saturated, judge, judge_measurement, wrong_isi
 from isiw.signals.mep import (
     MEP_WINDOWS_MS,
     background_rms,
@@ -15,7 +15,6 @@ from isiw.signals.mep import (
 
 __all__ = [
     "MEP_WINDOWS_MS",
-    "Judged",
     "SignalLimits",
     "TapEvents",
     "background_rms",

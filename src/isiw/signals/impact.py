@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from isiw.checks import number
 from isiw.errors import InvalidValueError
 from isiw.signals.waveforms import as_waveforms, rest_level
 from isiw.types import ArrayLike, FloatArray, IntArray
@@ -59,8 +60,7 @@ def impact_times(acceleration: ArrayLike, rate_hz: float, after_ms: float = VALV
         InvalidValueError: a waveform that is no recording, no finite time, or less than 20 ms of rest.
     """
     waves = as_waveforms(acceleration, rate_hz, "acceleration")
-    if not math.isfinite(after_ms):
-        raise InvalidValueError("after_ms must be finite", got=after_ms)
+    after_ms = number("after_ms", after_ms)
     valve = round(after_ms * rate_hz / 1000)
     level, noise = rest_level(waves, valve, rate_hz)
     above_rest = waves - level

@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from isiw.checks import ascending, check_numbers
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals.events import tap_artefact_times
@@ -26,13 +27,12 @@ from isiw.signals.mep import (
     mep_amplitudes,
 )
 from isiw.signals.waveforms import is_recording
-from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
+from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
 from isiw.types import ArrayLike, BoolArray, FloatArray
 
 __all__ = [
     "ACCELERATION_UNITS",
     "EMG_UNITS_MV",
-    "Judged",
     "SignalLimits",
     "is_saturated",
     "judge",
@@ -91,46 +91,13 @@ class SignalLimits:
     tap_artefact_ms: float = 8.0
 
     def __post_init__(self) -> None:
-        for name in ("background_uv", "full_scale_mv", "isi_tolerance_ms", "tap_artefact_ms"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0):
-                raise InvalidValueError(f"SignalLimits.{name} must be positive", got=value)
-        low, high = self.mep_window_ms
-        if not 0 <= low < high < math.inf:
-            raise InvalidValueError(
-                "SignalLimits.mep_window_ms is empty", got=self.mep_window_ms, expected="0 <= a < b"
-            )
+        check_numbers(self, "background_uv", "tap_artefact_ms", above=0)
+        check_numbers(self, "full_scale_mv", "isi_tolerance_ms", above=0, optional=True)
+        ascending("SignalLimits.mep_window_ms", self.mep_window_ms, least=0)
 
 
-@dataclass(frozen=True)
-class Judged:
-    """What a sweep came to: accepted, or a mistrial with its reason. All times are on the sweep's clock.
-
-    Args:
-        status: accepted or mistrial.
-        reason: why it is a mistrial; None where accepted.
-        isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone or where unknown.
-        isi_sd_ms: SD of the realised ISI [ms]; 0 where both of its events were measured.
-        mep_mv: peak-to-peak amplitude of the MEP [mV]; None in a mistrial.
-        background_rms_uv: EMG at rest before the pulse [µV RMS]; None where it could not be measured.
-        t_valve_ms: the valve command [ms].
-        t_hit_ms: the impact [ms].
-        t_tms_ms: the magnetic pulse [ms].
-    """
-
-    status: Status = Status.ACCEPTED
-    reason: MistrialReason | None = None
-    isi_ms: float | None = None
-    isi_sd_ms: float = 0.0
-    mep_mv: float | None = None
-    background_rms_uv: float | None = None
-    t_valve_ms: float | None = None
-    t_hit_ms: float | None = None
-    t_tms_ms: float | None = None
-
-
-def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Judged:
-    """Judge one sweep.
+def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Trial:
+    """Judge one sweep: the trial that it is, accepted or a mistrial. Its times are on the sweep's clock.
 
     Args:
         sweep: the recorded waveforms and what the device knows of their timing.
@@ -143,7 +110,7 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
     """
     limits = limits or SignalLimits()
     timed = _judge_timing(sweep, stimulus, space, limits)
-    if timed.reason is not None:
+    if timed.reason is not MistrialReason.OUTCOME_UNKNOWN:
         return timed
     emg = sweep.channels["emg"]
     emg_mv = emg.values * _unit_mv(emg)
@@ -159,13 +126,13 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
     if timed.background_rms_uv > limits.background_uv:
         return _mistrial(timed, MistrialReason.BACKGROUND_ACTIVITY)
     mep_mv = _mep_mv(emg_mv, emg, timed, limits)
-    return _mistrial(timed, MistrialReason.OUTCOME_UNKNOWN) if math.isnan(mep_mv) else replace(timed, mep_mv=mep_mv)
+    return timed if math.isnan(mep_mv) else replace(timed, status=Status.ACCEPTED, reason=None, mep_mv=mep_mv)
 
 
 def judge_measurement(
     measurement: Measurement, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None
-) -> Judged:
-    """Judge what a device reports that measured the MEP itself, by the same rules as a sweep.
+) -> Trial:
+    """Judge what a device reports that measured the MEP itself, by the same rules as a sweep: the trial that it is.
 
     Args:
         measurement: what the device reports.
@@ -183,7 +150,8 @@ def judge_measurement(
             got=f"a realised ISI of {measurement.isi_ms}",
             expected=f"one for the commanded ISI of {stimulus.isi_ms}",
         )
-    judged, wrong = Judged(**asdict(measurement)), None
+    judged = Trial(stimulus.trial, Status.ACCEPTED, stimulus.isi_ms, **asdict(measurement))
+    wrong = None
     if measurement.isi_ms is not None and stimulus.isi_ms is not None:
         wrong = wrong_isi(measurement.isi_ms, stimulus.isi_ms, space, limits)
     if wrong is None and (measurement.background_rms_uv or 0.0) > limits.background_uv:
@@ -224,13 +192,13 @@ def _longest_run(mask: BoolArray) -> int:
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
-def _mistrial(judged: Judged, reason: MistrialReason) -> Judged:
+def _mistrial(judged: Trial, reason: MistrialReason) -> Trial:
     return replace(judged, status=Status.MISTRIAL, reason=reason, mep_mv=None)
 
 
-def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Judged:
-    """The realised ISI, or what is wrong with the timing; the amplitude is still to come."""
-    judged = Judged(t_valve_ms=sweep.t_valve_ms, t_tms_ms=sweep.t_tms_ms)
+def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Trial:
+    """The realised ISI, or what is wrong with the timing; where nothing is, the outcome is still unknown."""
+    judged = replace(Trial.unknown(stimulus), t_valve_ms=sweep.t_valve_ms, t_tms_ms=sweep.t_tms_ms)
     if not _usable(sweep, "emg") or not _of_one_length(sweep):
         return _mistrial(judged, MistrialReason.MISSING_CHANNEL)
     _unit_mv(sweep.channels["emg"])
@@ -297,7 +265,7 @@ def _unit_mv(emg: Channel) -> float:
     return EMG_UNITS_MV[emg.unit]
 
 
-def _holds_window(emg: Channel, timed: Judged, limits: SignalLimits) -> bool:
+def _holds_window(emg: Channel, timed: Trial, limits: SignalLimits) -> bool:
     pulse = _on_channel(timed.t_tms_ms, emg)
     end = 1000 * (emg.values.size - 1) / emg.rate_hz
     return pulse + limits.mep_window_ms[0] >= 0 and pulse + limits.mep_window_ms[1] <= end
@@ -308,7 +276,7 @@ def _on_channel(time_ms: float | None, channel: Channel) -> float:
     return math.nan if time_ms is None else time_ms - channel.t0_ms
 
 
-def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Judged) -> float | None:
+def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Trial) -> float | None:
     """RMS of the EMG at rest, where possible of EMG that the tap cannot have touched; None where there is too little.
 
     After the valve command the artefact of the tap may be anywhere if the impact is unknown. A short sweep may hold
@@ -323,7 +291,7 @@ def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Judged) -> float | N
     return None
 
 
-def _mep_mv(emg_mv: FloatArray, emg: Channel, timed: Judged, limits: SignalLimits) -> float:
+def _mep_mv(emg_mv: FloatArray, emg: Channel, timed: Trial, limits: SignalLimits) -> float:
     pulse = _on_channel(timed.t_tms_ms, emg)
     shown = np.array([math.nan])
     if timed.t_hit_ms is not None and timed.t_valve_ms is not None:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, Final
 
-import numpy as np
-
+from isiw.checks import whole
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.errors import InvalidValueError, StrategyError
-from isiw.strategy.settings.common import Settings
+from isiw.errors import StrategyError
+from isiw.strategy.settings.common import Settings, settings_from, settings_values
 from isiw.strategy.strategy import Recipe, Strategy
 
-__all__ = ["list_strategies", "make_strategy", "settings_of"]
+__all__ = ["list_strategies", "make_strategy", "settings_for"]
 
 
 @dataclass(frozen=True)
@@ -23,8 +22,8 @@ class _Entry:
 
     Args:
         summary: what it does, in a sentence.
-        family: where in `isiw.strategy.settings` the class of its settings is; loaded, with the libraries that its model needs,
-            only when the strategy is made.
+        family: where in `isiw.strategy.settings` the class of its settings is; loaded, with the libraries that its
+            model needs, only when the strategy is made.
         meant: the settings that the name stands for.
     """
 
@@ -95,16 +94,24 @@ def list_strategies() -> dict[str, str]:
     return {name: entry.summary for name, entry in _CATALOGUE.items()}
 
 
-def settings_of(name: str) -> tuple[type[Settings], Mapping[str, Any]]:
-    """What can be set about a named strategy: its settings class, and the settings that its name stands for.
+def settings_for(name: str, **settings: Any) -> Settings:
+    """Settings of a named strategy, checked.
+
+    Args:
+        name: one of `list_strategies()`.
+        **settings: what differs from what the name stands for, by key; `isiw strategies NAME` lists the keys.
 
     Raises:
-        StrategyError: an unknown name.
+        StrategyError: an unknown name or setting.
+        ConfigError: a nested key or value that cannot be used.
+        InvalidValueError: an invalid value.
     """
     if name not in _CATALOGUE:
         raise StrategyError("unknown strategy", got=name, expected=", ".join(_CATALOGUE))
     entry = _CATALOGUE[name]
-    return pkgutil.resolve_name(f"isiw.strategy.settings.{entry.family}"), entry.meant
+    family = pkgutil.resolve_name(f"isiw.strategy.settings.{entry.family}")
+    chosen: Settings = settings_from(family, {**entry.meant, **settings}, name)
+    return chosen
 
 
 def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed: int = 0, **settings: Any) -> Strategy:
@@ -114,32 +121,22 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
         name: one of `list_strategies()`.
         space: the ISIs that may be asked; by default what can be searched without an accelerometer.
         seed: seed of all randomness, not negative.
-        **settings: fields of the strategy's settings class, in `isiw.strategy.settings`.
+        **settings: what differs from what the name stands for, by key; `isiw strategies NAME` lists the keys.
 
     Raises:
         StrategyError: an unknown name or setting, or an acquisition function that cannot work with the model.
-        InvalidValueError: a seed or a setting that cannot be.
+        ConfigError: a nested key or value that cannot be used.
+        InvalidValueError: an invalid seed or setting.
     """
-    family, meant = settings_of(name)
-    if seed < 0:
-        raise InvalidValueError("a seed must not be negative", got=seed)
-    known = [f.name for f in fields(family)]  # type: ignore[arg-type] # every family is a dataclass
-    unknown = sorted(set(settings) - set(known))
-    if unknown:
-        raise StrategyError(f"the strategy {name!r} has no such setting", got=unknown, expected=", ".join(known))
-    seed, settings = _plain(seed), {name: _plain(value) for name, value in settings.items()}
-    chosen = family(**{**meant, **settings})
+    seed = whole("the seed", seed, least=0)
+    chosen = settings_for(name, **settings)
+    initial_ms = chosen.asking.initial_ms(space)
     return Strategy(
         space,
-        chosen.model(),
-        chosen.acquisition_function(seed),
-        chosen.stopping(),
-        initial_ms=chosen.initial_ms(space),
+        chosen.model,
+        chosen.asking.function(seed),
+        chosen.stopping.rule(len(initial_ms)),
+        initial_ms=initial_ms,
         seed=seed,
-        recipe=Recipe(name=name, seed=seed, settings=asdict(chosen)),  # type: ignore[call-overload]
+        recipe=Recipe(name=name, seed=seed, settings=settings_values(chosen)),
     )
-
-
-def _plain(value: Any) -> Any:
-    """A number of numpy's as Python's own, which a log can hold."""
-    return value.item() if isinstance(value, np.generic) else value

@@ -1,24 +1,26 @@
-"""How a strategy goes on: what it asks next, and what its stopping rule looks back on, for b people side by side.
+"""How the examination of b people goes on: what is asked of each next, and what a stopping rule looks back on.
 
-Plain functions of what is believed, so that one person's `Strategy` and a batch of people follow one law.
+A `Course` never changes: telling it a trial gives the next one. One person's `Strategy` and a batch of people wrap the
+same course, so that they follow one law.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import torch
 
 from isiw.acquisition.fixed import golden_index
 from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
 from isiw.design import DesignSpace
-from isiw.models.protocol import Posterior, ProposesIsi, Tensor
-from isiw.strategy.stopping import StoppingRule, looks_back
+from isiw.models.protocol import Observation, Posterior, ProposesIsi, ResponseModel, Tensor
+from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
 from isiw.window import WindowEstimate
 
-__all__ = ["Choice", "Cost", "best_choices", "candidate_isis", "evenly_spaced", "planned_choices", "remembered"]
+__all__ = ["Choice", "Cost", "Course", "Method", "best_choices", "candidate_isis", "evenly_spaced"]
 
 MAX_CANDIDATES = 101
 
@@ -39,6 +41,134 @@ class Choice:
     fallback: str | None = None
 
 
+@dataclass(frozen=True)
+class Method:
+    """How people are examined.
+
+    Args:
+        space: the ISIs that may be asked.
+        model: the model of a person's responses.
+        acquisitions: what scores candidate ISIs: one for all people, or one a person where they draw.
+        stopping: the rule that says when to stop.
+        initial_ms: ISIs to ask for first [ms], on the grid, whatever the responses.
+        cost: is taken off the scores.
+    """
+
+    space: DesignSpace
+    model: ResponseModel
+    acquisitions: tuple[AcquisitionFunction, ...]
+    stopping: StoppingRule
+    initial_ms: tuple[float, ...] = ()
+    cost: Cost | None = None
+
+    def begin(self, seed: int, people: int = 1) -> Course:
+        """The course before the first trial.
+
+        Args:
+            seed: seed of the model's draws.
+            people: how many people are examined side by side.
+        """
+        return Course(self, self.model.begin(self.space, seed, people), people, earlier=((),) * people)
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What was told of b people, what is believed of them, and what is asked of each next.
+
+    Args:
+        method: how they are examined.
+        posterior: what is believed.
+        people: how many there are.
+        told: trials told of each.
+        alone: how many of those were TMS alone.
+        earlier: of each person, the estimates before the last trial that the stopping rule looks back on.
+        paired: whether the last trial was a pair of stimuli.
+    """
+
+    method: Method
+    posterior: Posterior
+    people: int
+    told: int = 0
+    alone: int = 0
+    earlier: tuple[tuple[WindowEstimate, ...], ...] = ()
+    paired: bool = False
+
+    def after(self, observation: Observation) -> Course:
+        """The course after one more trial of each person; all of them pairs of stimuli, or all TMS alone."""
+        alone = bool(observation.isi_ms.isnan().all())
+        return replace(
+            self,
+            posterior=self.method.model.update(self.posterior, observation),
+            told=self.told + 1,
+            alone=self.alone + alone,
+            earlier=self.past,
+            paired=not alone,
+        )
+
+    @cached_property
+    def past(self) -> tuple[tuple[WindowEstimate, ...], ...]:
+        """Of each person, the estimates that the stopping rule looks back on, the first after the last initial ISI."""
+        kept = looks_back(self.method.stopping)
+        if not kept or not self.paired or self.told - self.alone < len(self.method.initial_ms):
+            return self.earlier
+        return tuple((*past, self.estimate(i))[-kept:] for i, past in enumerate(self.earlier))
+
+    @property
+    def initial_left(self) -> tuple[float, ...]:
+        """What is left of the initial ISIs [ms]."""
+        return self.method.initial_ms[self.told - self.alone :]
+
+    @cached_property
+    def planned(self) -> tuple[Choice, ...] | None:
+        """What is asked of each person where that stands already; None where the acquisition function chooses."""
+        if self.initial_left:
+            return (Choice(self.initial_left[0]),) * self.people
+        if ProposesIsi in self.method.acquisitions[0].needs and isinstance(self.posterior, ProposesIsi):
+            wanted_ms = self.posterior.proposed_isis_ms()[:, 0].tolist()
+            return tuple(Choice(self.method.space.snap(isi_ms)) for isi_ms in wanted_ms)
+        return None
+
+    @cached_property
+    def choices(self) -> tuple[Choice, ...]:
+        """What is asked of each person next."""
+        return self.planned or self.chosen(self.posterior)
+
+    def chosen(self, posterior: Posterior) -> tuple[Choice, ...]:
+        """What the acquisition function chooses for each person, whatever is planned.
+
+        Args:
+            posterior: what is believed, or imagined.
+        """
+        first, *others = self.method.acquisitions
+        best = self._best(posterior, first)
+        return best if not others else (best[0], *(self._best(posterior, a)[1 + i] for i, a in enumerate(others)))
+
+    def _best(self, posterior: Posterior, acquisition: AcquisitionFunction) -> tuple[Choice, ...]:
+        return best_choices(
+            posterior, acquisition, self.method.space, told=self.told, people=self.people, cost=self.method.cost
+        )
+
+    @cached_property
+    def _estimates(self) -> dict[int, WindowEstimate]:
+        return {}
+
+    def estimate(self, person: int = 0) -> WindowEstimate:
+        """What is believed about the window of one person."""
+        if person not in self._estimates:
+            self._estimates[person] = self.posterior.estimate(person)
+        return self._estimates[person]
+
+    def decision(self, person: int = 0, mistrials: int = 0) -> StopDecision:
+        """Whether to stop with one person, and why.
+
+        Args:
+            person: which.
+            mistrials: stimuli that were delivered to the person and not told.
+        """
+        progress = Progress(self.told + mistrials, self.told, self.estimate(person), past=self.past[person])
+        return self.method.stopping(progress)
+
+
 def candidate_isis(space: DesignSpace, max_candidates: int = MAX_CANDIDATES) -> Tensor:
     """Evenly spaced ISIs of the design grid to score [ms], both ends included, shape (t,).
 
@@ -52,29 +182,6 @@ def candidate_isis(space: DesignSpace, max_candidates: int = MAX_CANDIDATES) -> 
     return torch.as_tensor(grid[picked], dtype=torch.float32)
 
 
-def planned_choices(
-    posterior: Posterior,
-    acquisition: AcquisitionFunction,
-    space: DesignSpace,
-    initial_ms: Sequence[float] = (),
-    people: int = 1,
-) -> list[Choice]:
-    """The next ISI of each person where it stands already; none where the acquisition function chooses.
-
-    Args:
-        posterior: what is believed.
-        acquisition: the acquisition function; it may leave the choice to the method's own plan.
-        space: the design space.
-        initial_ms: what is left of the initial ISIs [ms]; they come first.
-        people: how many there are.
-    """
-    if initial_ms:
-        return [Choice(initial_ms[0])] * people
-    if ProposesIsi in acquisition.needs and isinstance(posterior, ProposesIsi):
-        return [Choice(space.snap(isi_ms)) for isi_ms in posterior.proposed_isis_ms()[:, 0].tolist()]
-    return []
-
-
 def best_choices(
     posterior: Posterior,
     acquisition: AcquisitionFunction,
@@ -83,7 +190,7 @@ def best_choices(
     told: int,
     people: int = 1,
     cost: Cost | None = None,
-) -> list[Choice]:
+) -> tuple[Choice, ...]:
     """The ISI of each person that the acquisition function scores best; an evenly spaced one where it scores none.
 
     Args:
@@ -99,31 +206,13 @@ def best_choices(
     best = best_candidate(scores, None if cost is None else cost(candidates), first=golden_index(told, len(candidates)))
     nothing = f"{type(acquisition).__name__} gives no ISI a finite score: an evenly spaced one instead."
     scored = scores.isfinite().any(-1)
-    return [
+    return tuple(
         Choice(space.snap(isi_ms), None if found else nothing)
         for isi_ms, found in zip(candidates[best].tolist(), scored.tolist(), strict=True)
-    ]
+    )
 
 
 def evenly_spaced(space: DesignSpace, told: int) -> float:
     """The ISI [ms] of this trial in an order that fills the range, whatever is believed."""
     candidates = candidate_isis(space)
     return space.snap(float(candidates[golden_index(told, len(candidates))]))
-
-
-def remembered(
-    past: tuple[WindowEstimate, ...],
-    estimate: Callable[[], WindowEstimate],
-    stopping: StoppingRule,
-    pairs_since_initial: int,
-) -> tuple[WindowEstimate, ...]:
-    """The past estimates that a stopping rule looks back on, after one more pair of stimuli was told.
-
-    Args:
-        past: those before it.
-        estimate: gives the present one; called only where it is needed.
-        stopping: the rule.
-        pairs_since_initial: pairs told after the initial ISIs, negative before; the first estimate is that at 0.
-    """
-    kept = looks_back(stopping)
-    return (*past, estimate())[-kept:] if kept and pairs_since_initial >= 0 else past

@@ -5,11 +5,11 @@ A rule is a frozen settings object called with a `Progress`. Rules compose with 
 
 from __future__ import annotations
 
-import math
 import statistics
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+from isiw.checks import check_choice, check_numbers, check_probabilities, check_wholes
 from isiw.errors import InvalidValueError
 from isiw.window import WindowEstimate
 
@@ -76,9 +76,7 @@ class Budget:
     max_trials: int
 
     def __post_init__(self) -> None:
-        # A NaN compares as false with any count, and so would never stop.
-        if isinstance(self.max_trials, bool) or not isinstance(self.max_trials, int) or self.max_trials < 1:
-            raise InvalidValueError("max_trials must be a whole number of at least 1", got=self.max_trials)
+        check_wholes(self, "max_trials", least=1)
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
@@ -111,12 +109,9 @@ class CredibleWidth:
     min_share: float = 0.02
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.width_ms) and self.width_ms > 0):
-            raise InvalidValueError("width_ms must be positive", got=self.width_ms)
-        if not (0 < self.level < 1 and 0 <= self.min_probability <= 1 and 0 <= self.min_share <= 1):
-            raise InvalidValueError(
-                "levels, probabilities and shares lie in 0–1", got=(self.level, self.min_probability, self.min_share)
-            )
+        check_numbers(self, "width_ms", above=0)
+        check_numbers(self, "level", above=0, below=1)
+        check_probabilities(self, "min_probability", "min_share")
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
@@ -148,8 +143,7 @@ class NoWindow:
     probability: float = 0.9
 
     def __post_init__(self) -> None:
-        if not 0 < self.probability <= 1:
-            raise InvalidValueError("the probability of no window to stop at must lie in 0–1", got=self.probability)
+        check_numbers(self, "probability", above=0, most=1)
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
@@ -179,12 +173,9 @@ class EdgeVariance:
     edges: Literal["both", "either"] = "both"
 
     def __post_init__(self) -> None:
-        if not self.variance_ms2 > 0 or not isinstance(self.last, int) or self.last < 2:
-            raise InvalidValueError(
-                "a variance is positive and taken of two values or more", got=(self.variance_ms2, self.last)
-            )
-        if self.edges not in {"both", "either"}:
-            raise InvalidValueError("edges settle both or either", got=self.edges, expected="both or either")
+        check_numbers(self, "variance_ms2", above=0)
+        check_wholes(self, "last", least=2)
+        check_choice(self, "edges", ("both", "either"))
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
@@ -214,8 +205,7 @@ class ParticleSpread:
     sd_ms: float = 25.0
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.sd_ms) and self.sd_ms > 0):
-            raise InvalidValueError("sd_ms must be positive", got=self.sd_ms)
+        check_numbers(self, "sd_ms", above=0)
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
@@ -244,8 +234,7 @@ class SweptPast:
     quiet_ms: float = 25.0
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.quiet_ms) and self.quiet_ms > 0):
-            raise InvalidValueError("quiet_ms must be positive", got=self.quiet_ms)
+        check_numbers(self, "quiet_ms", above=0)
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
@@ -10,15 +9,14 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeVar
 
-import torch
-
 from isiw.acquisition.batch import greedy_batch, own_plan
 from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.checks import deadline, number, whole
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel
-from isiw.strategy.choosing import Choice, Cost, best_choices, evenly_spaced, planned_choices, remembered
-from isiw.strategy.stopping import Progress, StopDecision, StoppingRule
+from isiw.strategy.choosing import Choice, Cost, Method, evenly_spaced
+from isiw.strategy.stopping import StopDecision, StoppingRule
 from isiw.window import WindowEstimate
 
 __all__ = ["Recipe", "Strategy"]
@@ -63,7 +61,7 @@ class Strategy:
 
     Raises:
         StrategyError: the model's posterior lacks a capability that the acquisition function needs.
-        InvalidValueError: an initial ISI that is no finite number.
+        InvalidValueError: an initial ISI that is not a finite number.
     """
 
     def __init__(
@@ -82,20 +80,16 @@ class Strategy:
         self.initial_ms = tuple(space.snap(isi_ms) for isi_ms in initial_ms)
         self.recipe = recipe or Recipe(name="", seed=seed)
         self.cost, self.seed = cost, seed
-        self._posterior: Posterior = model.prior(space, seed)
-        missing = [c.__name__ for c in acquisition.needs if not isinstance(self._posterior, c)]
+        self._course = Method(space, model, (acquisition,), stopping, self.initial_ms, cost).begin(seed)
+        missing = [c.__name__ for c in acquisition.needs if not isinstance(self.posterior, c)]
         if missing:
             raise StrategyError(
                 f"{type(acquisition).__name__} cannot work with {type(model).__name__}",
                 got=f"a posterior without {', '.join(missing)}",
                 remedy="Choose another acquisition function, or a model whose posterior has the capability.",
             )
-        self._told = 0
-        self._told_alone = 0
         self._mistrials = 0
-        self._past: tuple[WindowEstimate, ...] = ()
         self._choice: Choice | None = None
-        self._estimate: WindowEstimate | None = None
         self._fallback_reason: str | None = None
 
     def restarted(self) -> Strategy:
@@ -114,12 +108,12 @@ class Strategy:
     @property
     def posterior(self) -> Posterior:
         """What is believed after the trials told so far."""
-        return self._posterior
+        return self._course.posterior
 
     @property
     def delivered(self) -> int:
         """How many stimuli it knows of, mistrials among them."""
-        return self._told + self._mistrials
+        return self._course.told + self._mistrials
 
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], on the grid; the same until the next `tell`.
@@ -131,15 +125,25 @@ class Strategy:
         Raises:
             InvalidValueError: a deadline that is negative or not a number.
         """
-        if deadline_s is not None and not deadline_s >= 0:
-            raise InvalidValueError("deadline_s must be a time from 0 up", got=deadline_s)
+        deadline_s = deadline("deadline_s", deadline_s)
         if self._choice is None:
-            if planned := planned_choices(self._posterior, self.acquisition, self.space, self._initial_left):
-                self._choice = planned[0]
-            else:
-                self._choice = self._best(self._posterior) if deadline_s is None else self._best_within(deadline_s)
+            self._choice = self._next_choice(deadline_s)
             self._fallback_reason = self._fallback_reason or self._choice.fallback
         return self._choice.isi_ms
+
+    def _next_choice(self, deadline_s: float | None) -> Choice:
+        course = self._course
+        if deadline_s is None or course.planned:
+            return course.choices[0]
+        answer: Future[tuple[Choice, ...]] = Future()
+        # A course never changes, so a late thread can go on with it and be forgotten.
+        choose = partial(course.chosen, course.posterior)
+        threading.Thread(target=_fulfil, args=(answer, choose), daemon=True).start()
+        try:
+            return answer.result(min(deadline_s, threading.TIMEOUT_MAX))[0]
+        except TimeoutError:
+            reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
+            return Choice(evenly_spaced(self.space, course.told), reason)
 
     def ask_batch(self, n: int) -> list[float]:
         """The next n ISIs [ms], to be delivered before anything is told; the first is what `ask` answers.
@@ -151,29 +155,15 @@ class Strategy:
             InvalidValueError: fewer than one.
             StrategyError: the model cannot imagine trials, or does not plan so far ahead.
         """
-        if n < 1:
-            raise InvalidValueError("a batch has at least one ISI", got=n)
-        chosen = (self._planned() or [self.ask()])[:n]
-        return greedy_batch(self._posterior, self.acquisition, chosen, n, self._next_of_batch)
+        n = whole("the size of a batch", n, least=1)
+        own = map(self.space.snap, own_plan(self.posterior, self.acquisition))
+        chosen = ([*self._course.initial_left, *own] or [self.ask()])[:n]
+        return greedy_batch(self.posterior, self.acquisition, chosen, n, self._next_of_batch)
 
     def _next_of_batch(self, posterior: Posterior) -> float:
-        choice = self._best(posterior)
+        choice = self._course.chosen(posterior)[0]
         self._fallback_reason = self._fallback_reason or choice.fallback
         return choice.isi_ms
-
-    @property
-    def _pairs(self) -> int:
-        """How many pairs of stimuli have been told."""
-        return self._told - self._told_alone
-
-    @property
-    def _initial_left(self) -> tuple[float, ...]:
-        """What is left of the initial ISIs [ms]."""
-        return self.initial_ms[self._pairs :]
-
-    def _planned(self) -> list[float]:
-        """What is left of the initial ISIs, and the plan of a method that has its own [ms]."""
-        return [*self._initial_left, *map(self.space.snap, own_plan(self._posterior, self.acquisition))]
 
     @property
     def fallback_reason(self) -> str | None:
@@ -183,20 +173,7 @@ class Strategy:
     @property
     def trouble(self) -> str | None:
         """What went wrong with the last fit and what stands in for it; None where nothing did."""
-        return self._posterior.trouble if isinstance(self._posterior, ReportsTrouble) else None
-
-    def _best(self, posterior: Posterior) -> Choice:
-        return best_choices(posterior, self.acquisition, self.space, told=self._told, cost=self.cost)[0]
-
-    def _best_within(self, deadline_s: float) -> Choice:
-        answer: Future[Choice] = Future()
-        # A posterior never changes, so a late thread can go on with it and be forgotten.
-        threading.Thread(target=_fulfil, args=(answer, partial(self._best, self._posterior)), daemon=True).start()
-        try:
-            return answer.result(min(deadline_s, threading.TIMEOUT_MAX))
-        except TimeoutError:
-            reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
-            return Choice(evenly_spaced(self.space, self._told), reason)
+        return self.posterior.trouble if isinstance(self.posterior, ReportsTrouble) else None
 
     def tell(
         self,
@@ -222,29 +199,13 @@ class Strategy:
         """
         if (mep_mv is None) == (response is None):
             raise InvalidValueError("tell needs either mep_mv or response", got=(mep_mv, response))
-        if mep_mv is not None and not (math.isfinite(mep_mv) and mep_mv >= 0):
-            raise InvalidValueError(
-                "mep_mv must be a finite amplitude, not negative",
-                got=mep_mv,
-                remedy="Log a trial without a trustworthy amplitude as a mistrial instead of telling it.",
-            )
         if response not in (None, False, True):
             raise InvalidValueError("response must be True or False", got=response)
-        if not (math.isfinite(isi_sd_ms) and isi_sd_ms >= 0):
-            raise InvalidValueError("isi_sd_ms must be finite and not negative", got=isi_sd_ms)
-        isi = math.nan if isi_ms is None else self.space.check_realised(isi_ms)
-        observation = Observation(
-            isi_ms=torch.tensor([isi]),
-            mep_mv=torch.tensor([math.nan if mep_mv is None else mep_mv]),
-            isi_sd_ms=torch.tensor([isi_sd_ms]),
-            response=torch.tensor([math.nan if response is None else float(response)]),
-        )
-        self._posterior = self.model.update(self._posterior, observation)
-        self._told += 1
-        self._told_alone += isi_ms is None
-        self._choice = self._estimate = self._fallback_reason = None
-        if isi_ms is not None:
-            self._past = remembered(self._past, self.estimate, self.stopping, self._pairs - len(self.initial_ms))
+        mep_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
+        isi_sd_ms = number("isi_sd_ms", isi_sd_ms, least=0)
+        isi_ms = None if isi_ms is None else self.space.check_realised(isi_ms)
+        self._course = self._course.after(Observation.of([isi_ms], [mep_mv], [isi_sd_ms], [response]))
+        self._choice = self._fallback_reason = None
 
     def count_mistrial(self) -> None:
         """Count a delivered stimulus whose outcome is not told: it uses up budget and changes nothing else."""
@@ -252,10 +213,8 @@ class Strategy:
 
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""
-        if self._estimate is None:
-            self._estimate = self._posterior.estimate()
-        return self._estimate
+        return self._course.estimate()
 
     def decision(self) -> StopDecision:
         """Whether to stop now, and why."""
-        return self.stopping(Progress(self.delivered, self._told, self.estimate(), past=self._past))
+        return self._course.decision(mistrials=self._mistrials)

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import is_dataclass, replace
-from functools import partial
 from typing import Any
 
 import pandas as pd
 import torch
 
-from isiw.acquisition.protocol import AcquisitionFunction
-from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel
-from isiw.strategy.choosing import Choice, best_choices, planned_choices, remembered
-from isiw.strategy.stopping import Progress, StopDecision
+from isiw.models.protocol import Observation, ReportsTrouble, ResponseModel
+from isiw.strategy.choosing import Choice, Method
+from isiw.strategy.stopping import StopDecision
 from isiw.studies.sessions import SimulatedSession, examine
 from isiw.subjects.subject import Response
 from isiw.window import WindowEstimate
@@ -42,62 +40,36 @@ class _Batch:
     def __init__(self, sessions: Sequence[SimulatedSession], device: str) -> None:
         players = [session.player() for session in sessions]
         first = players[0]
-        self.people, self.space, self.cost = len(players), first.space, first.cost
-        self.stopping, self.initial_ms = first.stopping, first.initial_ms
-        self.model = _on_device(first.model, device)
-        # Most acquisition functions draw nothing, and then one serves all.
-        self.acquisitions = [player.acquisition for player in players]
-        self.alike = all(acquisition == first.acquisition for acquisition in self.acquisitions)
-        self.posterior: Posterior = self.model.prior(self.space, first.seed, self.people)
-        self.told = 0
-        self.mistrials = [0] * self.people
-        self.past: list[tuple[WindowEstimate, ...]] = [()] * self.people
-        self.estimates: dict[int, WindowEstimate] = {}
+        drawing = any(player.acquisition != first.acquisition for player in players)
+        acquisitions = tuple(player.acquisition for player in players) if drawing else (first.acquisition,)
+        model = _on_device(first.model, device)
+        method = Method(first.space, model, acquisitions, first.stopping, first.initial_ms, first.cost)
+        self.stopping = first.stopping
+        self.course = method.begin(first.seed, len(players))
+        self.mistrials = [0] * len(players)
 
     def ask(self) -> Sequence[Choice]:
-        first, left = self.acquisitions[0], self.initial_ms[self.told :]
-        if planned := planned_choices(self.posterior, first, self.space, left, self.people):
-            return planned
-        if self.alike:
-            return self._best(first)
-        return [self._best(acquisition)[person] for person, acquisition in enumerate(self.acquisitions)]
-
-    def _best(self, acquisition: AcquisitionFunction) -> list[Choice]:
-        return best_choices(self.posterior, acquisition, self.space, told=self.told, people=self.people, cost=self.cost)
+        return self.course.choices
 
     def tell(self, responses: Sequence[Response]) -> None:
-        isis_ms = [self.space.check_realised(r.isi_ms) for r in responses if r.isi_ms is not None]
-        observation = Observation(
-            isi_ms=torch.tensor(isis_ms),
-            mep_mv=torch.tensor([response.mep_mv for response in responses]),
-            isi_sd_ms=torch.tensor([response.isi_sd_ms for response in responses]),
-            response=torch.full((self.people,), torch.nan),
-        )
-        self.posterior = self.model.update(self.posterior, observation)
-        self.told += 1
-        self.estimates = {}
-        since_initial = self.told - len(self.initial_ms)
-        self.past = [
-            remembered(past, partial(self.estimate, person), self.stopping, since_initial)
-            for person, past in enumerate(self.past)
-        ]
+        isis_ms = [self.course.method.space.check_realised(r.isi_ms) for r in responses if r.isi_ms is not None]
+        meps_mv, sds_ms = [r.mep_mv for r in responses], [r.isi_sd_ms for r in responses]
+        self.course = self.course.after(Observation.of(isis_ms, meps_mv, sds_ms))
 
     def count_mistrial(self, person: int) -> None:
         self.mistrials[person] += 1
 
     def estimate(self, person: int) -> WindowEstimate:
-        if person not in self.estimates:
-            self.estimates[person] = self.posterior.estimate(person)
-        return self.estimates[person]
+        return self.course.estimate(person)
 
     def decision(self, person: int) -> StopDecision:
-        delivered = self.told + self.mistrials[person]
-        return self.stopping(Progress(delivered, self.told, self.estimate(person), past=self.past[person]))
+        return self.course.decision(person, self.mistrials[person])
 
     def trouble(self) -> bool | None:
         """Whose fit it was is not told, except that nobody's failed."""
-        failed = isinstance(self.posterior, ReportsTrouble) and self.posterior.trouble is not None
-        return None if failed and self.people > 1 else failed
+        posterior = self.course.posterior
+        failed = isinstance(posterior, ReportsTrouble) and posterior.trouble is not None
+        return None if failed and self.course.people > 1 else failed
 
 
 def _on_device(model: ResponseModel, device: str) -> Any:

@@ -25,7 +25,8 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from joblib import Parallel, delayed, parallel_config
 
-from isiw.errors import InvalidValueError, StudyError
+from isiw.checks import check_wholes
+from isiw.errors import StudyError
 from isiw.studies.memory import memory_kept
 
 __all__ = ["DaskCluster", "Executor", "Failure", "Processes"]
@@ -80,8 +81,7 @@ class Processes:
     attempts: int = 3
 
     def __post_init__(self) -> None:
-        if self.workers < 1 or self.attempts < 1:
-            raise InvalidValueError("there is at least one worker and one attempt", got=(self.workers, self.attempts))
+        check_wholes(self, "workers", "attempts", least=1)
 
     def results(
         self, run: Callable[[_Item], _Result], items: Sequence[_Item]

@@ -21,11 +21,13 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 
 import pandas as pd
 
+from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.strategy.catalogue import settings_of
+from isiw.strategy.catalogue import settings_for
+from isiw.strategy.settings.common import settings_values
 from isiw.studies.batch import simulate_batch
-from isiw.studies.sessions import SimulatedSession, Stopping, require_factor, simulate
+from isiw.studies.sessions import SimulatedSession, Stopping, simulate
 from isiw.subjects.cohorts import COHORTS
 from isiw.toml_files import checked, read_toml
 
@@ -49,9 +51,8 @@ class StudyStrategy:
         label: what it is called in the table; by default its name.
 
     Raises:
-        StrategyError: an unknown name.
-        ConfigError: a setting that it does not have, or cannot have.
-        InvalidValueError: a label that cannot be part of a file's name.
+        StrategyError: an unknown name or setting.
+        InvalidValueError: an invalid setting, or a label that cannot be part of a file's name.
     """
 
     name: str
@@ -59,9 +60,8 @@ class StudyStrategy:
     label: str = ""
 
     def __post_init__(self) -> None:
-        family, meant = settings_of(self.name)
-        chosen = checked(family, {**meant, **self.settings}, f"the settings of {self.name}")
-        object.__setattr__(self, "settings", {name: getattr(chosen, name) for name in self.settings})
+        chosen = settings_values(settings_for(self.name, **self.settings))
+        object.__setattr__(self, "settings", {key: chosen[key] for key in self.settings})
         object.__setattr__(self, "label", self.label or self.name)
         if not re.fullmatch(r"[\w.+-]+", self.label):
             raise InvalidValueError(
@@ -133,15 +133,13 @@ class Study:
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if not self.marks:
             object.__setattr__(self, "marks", (*range(5, self.trials, 5), self.trials))
-        for name, least in (("people", 1), ("seed", 0), ("trials", 1), ("batch", 1)):
-            if not least <= getattr(self, name) <= _MOST:
-                raise InvalidValueError(f"{name} must be from {least} to {_MOST}", got=getattr(self, name))
-        require_factor(self.amplitude)
+        check_wholes(self, "people", "trials", "batch", least=1, most=_MOST)
+        check_wholes(self, "seed", least=0, most=_MOST)
+        check_numbers(self, "amplitude", above=0)
         if list(self.marks) != sorted(set(self.marks)) or not 1 <= self.marks[0] <= self.marks[-1] <= self.trials:
             raise InvalidValueError("marks ascend from 1 to the number of trials", got=self.marks)
-        for name, known in (("stopping", get_args(Stopping)), ("engine", get_args(Engine))):
-            if getattr(self, name) not in known:
-                raise InvalidValueError(f"{name} is unknown", got=getattr(self, name), expected=" or ".join(known))
+        check_choice(self, "stopping", get_args(Stopping))
+        check_choice(self, "engine", get_args(Engine))
         if unknown := sorted(set(self.cohorts) - set(COHORTS)):
             raise InvalidValueError("unknown cohorts", got=unknown, expected=", ".join(COHORTS))
         labels = [strategy.label for strategy in self.strategies]

@@ -14,8 +14,9 @@ from typing import Any, Literal, Protocol, TypeAlias, get_args
 import pandas as pd
 import torch
 
+from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.errors import InvalidValueError, StudyError
+from isiw.errors import StudyError
 from isiw.metrics import covers, f1
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import make_strategy
@@ -113,11 +114,10 @@ class SimulatedSession:
     amplitude: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.trials < 1 or self.person < 0:
-            raise InvalidValueError("a session needs a trial and a person", got=(self.trials, self.person))
-        require_factor(self.amplitude)
-        if self.stopping not in get_args(Stopping):
-            raise InvalidValueError("stopping is unknown", got=self.stopping, expected=", ".join(get_args(Stopping)))
+        check_wholes(self, "trials", least=1)
+        check_wholes(self, "person", least=0)
+        check_numbers(self, "amplitude", above=0)
+        check_choice(self, "stopping", get_args(Stopping))
 
     def subject(self) -> SimulatedSubject:
         """The simulated person."""
@@ -127,16 +127,6 @@ class SimulatedSession:
     def player(self) -> Strategy:
         """The strategy before its first trial."""
         return make_strategy(self.strategy, self.space, self.seed + self.person, **dict(self.settings))
-
-
-def require_factor(amplitude: float) -> None:
-    """Raise where the factor on all amplitudes is none.
-
-    Raises:
-        InvalidValueError: not a finite number above 0.
-    """
-    if not 0.0 < amplitude < math.inf:
-        raise InvalidValueError("amplitude is a factor above 0", got=amplitude)
 
 
 def simulate(session: SimulatedSession) -> pd.DataFrame:

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from isiw.errors import InvalidValueError
+from isiw.checks import choice, whole
 from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import Drift, SimulatedSubject
@@ -140,10 +140,8 @@ def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
     Raises:
         InvalidValueError: an unknown name, or a negative number.
     """
-    if name not in COHORTS:
-        raise InvalidValueError("unknown cohort", got=name, expected=", ".join(COHORTS))
-    if n < 0 or seed < 0:
-        raise InvalidValueError("n and seed must not be negative", got=(n, seed))
+    choice("the cohort", name, COHORTS)
+    n, seed = whole("n", n, least=0), whole("seed", seed, least=0)
     if name == "kim11":
         return [_kim_subject(i % len(WIDTHS_KIM_MS)) for i in range(n)]
     generators = [np.random.default_rng([zlib.crc32(name.encode()), seed, i]) for i in range(n)]

@@ -7,12 +7,12 @@ been seen or argued for: a Gaussian (dissertation, 4.2), skewed and flat-topped 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
+from isiw.checks import check_numbers, check_probabilities
 from isiw.errors import InvalidValueError
 from isiw.types import ArrayLike, FloatArray
 
@@ -24,11 +24,6 @@ class Profile(Protocol):
 
     def __call__(self, isi_ms: ArrayLike) -> FloatArray:
         """Facilitation in 0–1 at ISIs counted from the impact [ms], same shape."""
-
-
-def _require_span(start_ms: float, width_ms: float) -> None:
-    if not (math.isfinite(start_ms) and math.isfinite(width_ms) and width_ms > 0):
-        raise InvalidValueError("a profile needs a finite start and a positive width", got=(start_ms, width_ms))
 
 
 @dataclass(frozen=True)
@@ -51,9 +46,10 @@ class PeakProfile:
     exponent: float = 2.0
 
     def __post_init__(self) -> None:
-        _require_span(self.start_ms, self.width_ms)
-        if not (0 < self.peak_at < 1 and self.exponent > 0):
-            raise InvalidValueError("peak_at lies in 0–1, exponent above 0", got=(self.peak_at, self.exponent))
+        check_numbers(self, "start_ms")
+        check_numbers(self, "width_ms", above=0)
+        check_numbers(self, "peak_at", above=0, below=1)
+        check_numbers(self, "exponent", above=0)
 
     def __call__(self, isi_ms: ArrayLike) -> FloatArray:
         """Facilitation in 0–1 at ISIs counted from the impact [ms], same shape."""
@@ -82,8 +78,10 @@ class TwoPeakProfile:
     second: float
 
     def __post_init__(self) -> None:
-        _require_span(self.start_ms, self.width_ms)
-        if not (0 <= self.first <= 1 and 0 <= self.second <= 1 and 1 in {self.first, self.second}):
+        check_numbers(self, "start_ms")
+        check_numbers(self, "width_ms", above=0)
+        check_probabilities(self, "first", "second")
+        if 1 not in {self.first, self.second}:
             raise InvalidValueError("the higher peak has height 1", got=(self.first, self.second))
 
     def __call__(self, isi_ms: ArrayLike) -> FloatArray:

@@ -16,22 +16,13 @@ from typing import Protocol
 import numpy as np
 from scipy.special import expit
 
-from isiw.errors import InvalidValueError
+from isiw.checks import check_numbers
 from isiw.types import ArrayLike, FloatArray
 
 __all__ = ["EmgFloor", "GainResponse", "RecruitmentResponse", "ResponseCurve", "TrialNoise"]
 
 _NODES, _NODE_WEIGHTS = np.polynomial.hermite_e.hermegauss(80)
 _NODE_WEIGHTS = _NODE_WEIGHTS / _NODE_WEIGHTS.sum()
-
-
-def _require(owner: object, above_zero: tuple[str, ...] = (), at_least_zero: tuple[str, ...] = ()) -> None:
-    for names, fits in ((above_zero, np.greater), (at_least_zero, np.greater_equal)):
-        for name in names:
-            value = getattr(owner, name)
-            if not (np.isfinite(value) and fits(value, 0.0)):
-                sign = "positive" if fits is np.greater else "not negative"
-                raise InvalidValueError(f"{type(owner).__name__}.{name} must be finite and {sign}", got=value)
 
 
 @dataclass(frozen=True)
@@ -47,7 +38,8 @@ class EmgFloor:
     log_sd: float
 
     def __post_init__(self) -> None:
-        _require(self, above_zero=("median_mv",), at_least_zero=("log_sd",))
+        check_numbers(self, "median_mv", above=0)
+        check_numbers(self, "log_sd", least=0)
 
     @property
     def mean_mv(self) -> float:
@@ -100,9 +92,9 @@ class GainResponse:
     max_response_probability: float | None = None
 
     def __post_init__(self) -> None:
-        _require(self, above_zero=("cv",), at_least_zero=("gain_mv",))
-        if self.max_response_probability is not None and not 0.0 <= self.max_response_probability <= 1.0:
-            raise InvalidValueError("max_response_probability lies in 0–1", got=self.max_response_probability)
+        check_numbers(self, "cv", above=0)
+        check_numbers(self, "gain_mv", least=0)
+        check_numbers(self, "max_response_probability", least=0, most=1, optional=True)
 
     def response_probability(self, facilitation: ArrayLike) -> FloatArray:
         """Probability that a trial responds, by facilitation; same shape."""
@@ -150,8 +142,8 @@ class RecruitmentResponse:
     intensity_pct_rmt: float = 90.0
 
     def __post_init__(self) -> None:
-        positive = ("amplitude_mv", "slope_per_pct", "x50_pct_rmt", "intensity_pct_rmt")
-        _require(self, above_zero=positive, at_least_zero=("boost_pct_rmt", "sigma_x_pct_rmt", "sigma_y"))
+        check_numbers(self, "amplitude_mv", "slope_per_pct", "x50_pct_rmt", "intensity_pct_rmt", above=0)
+        check_numbers(self, "boost_pct_rmt", "sigma_x_pct_rmt", "sigma_y", least=0)
 
     def evoked_mv(self, facilitation: ArrayLike, input_z: ArrayLike) -> FloatArray:
         """MEP above the floor before output noise [mV], by facilitation and input noise; broadcast shape."""

@@ -6,14 +6,13 @@ start-up, serial correlation).
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final, get_args
 
 import numpy as np
 
+from isiw.checks import choice, number
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
 from isiw.subjects.profiles import Profile
 from isiw.subjects.responses import ResponseCurve, TrialNoise
 from isiw.types import FloatArray, Reference
@@ -132,10 +131,8 @@ class Responder:
         Raises:
             InvalidValueError: an ISI that is not finite, or an unknown reference.
         """
-        if isi_ms is not None and not math.isfinite(isi_ms):
-            raise InvalidValueError("an ISI must be a finite number of milliseconds", got=isi_ms)
-        if reference not in get_args(Reference):
-            raise InvalidValueError("reference is unknown", got=reference, expected=" or ".join(get_args(Reference)))
+        isi_ms = None if isi_ms is None else number("an ISI [ms]", isi_ms)
+        choice("the reference", reference, get_args(Reference))
         noise = self._next_noise()
         told_ms, facilitation = (None, 0.0) if isi_ms is None else self._stimulate(isi_ms, reference)
         subject, rng = self.subject, self._rng

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from isiw.checks import check_numbers
 from isiw.design import DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
-from isiw.errors import DeviceError, InvalidValueError, IsiwError
+from isiw.errors import DeviceError, IsiwError
 from isiw.log.schema import waveform_topic
-from isiw.signals import Judged, SignalLimits, judge, judge_measurement
+from isiw.signals import SignalLimits, judge, judge_measurement
 from isiw.testing.requirements import require
-from isiw.trials import Measurement, MistrialReason, Stimulus, Sweep
+from isiw.trials import Measurement, MistrialReason, Stimulus, Sweep, Trial
 
 __all__ = ["check_device"]
 
@@ -69,8 +69,7 @@ class _Pace:
     clock: Clock
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.iti_s) and self.iti_s >= 0):
-            raise InvalidValueError("iti_s must be finite and not negative", got=self.iti_s)
+        check_numbers(self, "iti_s", least=0)
 
     def deliver(self, device: Device, stimulus: Stimulus) -> Answer:
         """Deliver one pair of stimuli, an inter-trial interval after whatever was delivered before."""
@@ -89,7 +88,7 @@ class _Rules:
     space: DesignSpace
     limits: SignalLimits
 
-    def judged(self, answer: Answer, stimulus: Stimulus) -> Judged:
+    def judged(self, answer: Answer, stimulus: Stimulus) -> Trial:
         if isinstance(answer, Sweep):
             for name in answer.channels:
                 waveform_topic(name)

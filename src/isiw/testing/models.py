@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -66,19 +65,18 @@ def check_model(
 
 
 def _observation(isi_ms: float | None, mep_mv: float, people: int = 1) -> Observation:
-    columns = (math.nan if isi_ms is None else isi_ms, mep_mv, 0.0, math.nan)
-    return Observation(*(torch.full((people,), value) for value in columns))
+    return Observation.of([isi_ms] * people, [mep_mv] * people)
 
 
 def _after(model: ResponseModel, space: DesignSpace, trials: Trials, *, seed: int = 1, people: int = 1) -> Posterior:
-    posterior = model.prior(space, seed, people)
+    posterior = model.begin(space, seed, people)
     for isi_ms, mep_mv in trials:
         posterior = model.update(posterior, _observation(isi_ms, mep_mv, people))
     return posterior
 
 
 def _check_learning(model: ResponseModel, space: DesignSpace, trials: Trials) -> None:
-    before = model.prior(space, 1)
+    before = model.begin(space, 1)
     require(isinstance(before, Posterior), "a posterior has trials and estimate()")
     require(before.trials == 0, "a prior has been told no trials")
     estimate = before.estimate()

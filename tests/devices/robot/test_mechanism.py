@@ -8,6 +8,8 @@ import pytest
 from isiw.devices.robot.mechanism import (
     SEPARATION_RAD,
     SUPPLY_KPA,
+    Event,
+    Faults,
     Geometry,
     draw_taps,
     drive,
@@ -21,12 +23,12 @@ from isiw.errors import InvalidValueError
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_taps_vary_as_the_geometry_says(name):
-    geometry = replace(preset(name), late_probability=0.0)
+    geometry = replace(preset(name), faults=Faults())
     taps = draw_taps(geometry, 4000, np.random.default_rng(0))
-    assert taps.hit_ms.mean() == pytest.approx(geometry.hit_ms, abs=0.3)
-    assert taps.hit_ms.std() == pytest.approx(geometry.hit_sd_ms, rel=0.06)
-    assert taps.descent_ms.mean() == pytest.approx(geometry.descent_ms, abs=0.3)
-    assert taps.descent_ms.std() == pytest.approx(geometry.descent_sd_ms, rel=0.06)
+    assert taps.hit_ms.mean() == pytest.approx(geometry.hit.mean_ms, abs=0.3)
+    assert taps.hit_ms.std() == pytest.approx(geometry.hit.sd_ms, rel=0.06)
+    assert taps.descent_ms.mean() == pytest.approx(geometry.descent.mean_ms, abs=0.3)
+    assert taps.descent_ms.std() == pytest.approx(geometry.descent.sd_ms, rel=0.06)
 
 
 def test_a_late_descent_makes_a_late_hit_but_not_by_as_much():
@@ -39,7 +41,7 @@ def test_a_late_descent_makes_a_late_hit_but_not_by_as_much():
 
 def test_the_hammer_is_driven_from_the_descent_to_the_travel_of_its_geometry():
     geometry = preset("subject2")
-    time_ms = np.arange(geometry.descent_ms, geometry.hit_ms, 0.001)
+    time_ms = np.arange(geometry.descent.mean_ms, geometry.hit.mean_ms, 0.001)
     speed = np.cumsum(drive(time_ms, geometry.kinetic_share)) * 1e-6
     assert speed[-1] == pytest.approx(geometry.hit_speed_m_s, rel=1e-3)
     assert speed.sum() * 1e-3 == pytest.approx(geometry.travel_mm, rel=1e-3)
@@ -61,14 +63,14 @@ def test_the_rebound_pushes_only_and_leaves_with_the_speed_of_restitution():
 
 def test_the_contact_lasts_as_long_as_the_geometry_says():
     geometry = preset("subject3")
-    pull = float(drive(geometry.hit_ms, geometry.kinetic_share))
+    pull = float(drive(geometry.hit.mean_ms, geometry.kinetic_share))
     time_ms = np.arange(0, 40, 0.001)
     push = -1000 * geometry.hit_speed_m_s * geometry.stiffness_rad_ms * rebound(geometry.stiffness_rad_ms * time_ms)
-    assert (push > pull).sum() * 0.001 == pytest.approx(geometry.contact_ms, abs=0.05)
+    assert (push > pull).sum() * 0.001 == pytest.approx(geometry.contact.mean_ms, abs=0.05)
 
 
 def test_faults_come_as_often_as_their_probability():
-    faulty = replace(preset("cushion"), stuck_probability=0.1, late_probability=0.2, late_ms=(13.0, 22.0))
+    faulty = replace(preset("cushion"), faults=Faults(0.1, 0.2, (13.0, 22.0)))
     taps = draw_taps(faulty, 5000, np.random.default_rng(2))
     assert np.isnan(taps.hit_ms).mean() == pytest.approx(0.1, abs=0.02)
     late = taps.late_ms[taps.late_ms > 0]
@@ -79,19 +81,23 @@ def test_faults_come_as_often_as_their_probability():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"descent_ms": 20.0},
-        {"hit_ms": 120.0},
-        {"contact_ms": 0.0},
-        {"hit_sd_ms": -1.0},
-        {"hit_sd_ms": 0.1, "descent_sd_ms": 5.0},
-        {"stuck_probability": 1.5},
-        {"late_probability": 0.1, "late_ms": (20.0, 10.0)},
+        {"descent": (20.0, 5.0)},
+        {"hit": (120.0, 4.0)},
+        {"contact": (0.0, 1.0)},
+        {"hit": (183.0, -1.0)},
+        {"hit": (183.0, 0.1)},
     ],
 )
-def test_a_geometry_that_cannot_be_is_an_error(wrong):
+def test_an_impossible_geometry_is_an_error(wrong):
+    events = {"descent": (131.0, 5.0), "hit": (183.0, 4.0), "contact": (15.0, 1.0)} | wrong
     with pytest.raises(InvalidValueError):
-        Geometry(**{"descent_ms": 131, "descent_sd_ms": 5, "hit_ms": 183, "hit_sd_ms": 4, "contact_ms": 15,
-                    "contact_sd_ms": 1} | wrong)  # fmt: skip
+        Geometry(**{name: Event(*times) for name, times in events.items()})
+
+
+@pytest.mark.parametrize("wrong", [{"stuck_probability": 1.5}, {"late_probability": 0.1, "late_ms": (20.0, 10.0)}])
+def test_impossible_faults_are_an_error(wrong):
+    with pytest.raises(InvalidValueError):
+        Faults(**wrong)
 
 
 def test_an_unknown_preset_names_the_known_ones():

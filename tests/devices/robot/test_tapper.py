@@ -8,8 +8,10 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Device, HasMemory
+from isiw.devices.robot.mechanism import Faults
 from isiw.devices.robot.presets import preset
 from isiw.devices.robot.tapper import HitDelay, Tapper, TapperSettings
+from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals import impact_time, judge
 from isiw.subjects.cohorts import cohort
@@ -25,8 +27,8 @@ class Answer:
     mep_mv: float = 0.1
 
 
-def tapper(geometry="subject2", *, respond=lambda _: Answer(), seed=0, **settings) -> Tapper:
-    device = Tapper(respond, geometry, TapperSettings(**settings), seed=seed)
+def tapper(geometry="subject2", *, respond=lambda _: Answer(), seed=0, **settings) -> SimulatedDevice:
+    device = SimulatedDevice(Tapper(respond, geometry, TapperSettings(**settings), seed=seed))
     device.stage()
     return device
 
@@ -47,7 +49,7 @@ def test_it_keeps_what_every_device_promises(trigger, accelerometer):
     def made(reference):
         subject = cohort("recruitment", 1, 0)[0].begin(1)
         settings = TapperSettings(reference=reference, trigger=trigger, accelerometer=accelerometer)
-        return Tapper(lambda isi_ms: subject.respond(isi_ms, "impact"), "subject3", settings)
+        return SimulatedDevice(Tapper(lambda isi_ms: subject.respond(isi_ms, "impact"), "subject3", settings))
 
     check_device(lambda: made("impact"), DesignSpace(5, 320, reference="impact"))
     check_device(lambda: made("valve"), DesignSpace(200, 500, reference="valve"))
@@ -95,7 +97,7 @@ def test_open_loop_the_isi_varies_with_the_hit_and_triggered_it_does_not():
 def test_the_command_is_corrected_by_the_measured_hits():
     device = tapper("subject2", expected_hit_ms=190.0)
     deliver(device, 60.0, n=30)
-    assert device.hit_delay.mean_ms == pytest.approx(172.0, abs=1.0)
+    assert device.simulation.hit_delay.mean_ms == pytest.approx(172.0, abs=1.0)
     later = [device.deliver(Stimulus(trial, 60.0), 1.0) for trial in range(30, 90)]
     error = [judge(sweep, Stimulus(0, 60.0), IMPACT).isi_ms - 60.0 for sweep in later]
     assert np.mean(error) == pytest.approx(0.0, abs=0.8)
@@ -138,7 +140,7 @@ def test_the_stated_uncertainty_covers_the_people_of_the_dissertation():
 
 
 def test_a_hammer_that_sticks_gives_no_impact_open_loop_and_no_pulse_triggered():
-    stuck = replace(preset("subject1"), stuck_probability=1.0)
+    stuck = replace(preset("subject1"), faults=Faults(stuck_probability=1.0))
     asked = []
     open_loop = deliver(tapper(stuck, respond=lambda isi: asked.append(isi) or Answer()), 60.0)[0]
     assert judge(open_loop, Stimulus(0, 60.0), IMPACT).reason is MistrialReason.NO_IMPACT

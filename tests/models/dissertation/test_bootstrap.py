@@ -12,7 +12,7 @@ from isiw.acquisition.fixed import OwnProposal
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.dissertation.bootstrap import BootstrapFilter, BootstrapPosterior, normalised, resampled
-from isiw.models.dissertation.curves import Floor
+from isiw.models.shared.floor import FloorTreatment
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
@@ -31,7 +31,7 @@ def generation(posterior: BootstrapPosterior, mep_mv) -> BootstrapPosterior:
 
 
 def test_nothing_is_learnt_before_the_generation_is_complete() -> None:
-    posterior = PF.prior(VALVE_SPACE, 3)
+    posterior = PF.begin(VALVE_SPACE, 3)
     plan = posterior.proposed_isis_ms()[0].tolist()
     for told_so_far, isi_ms in enumerate(plan):
         assert posterior.proposed_isis_ms()[0].tolist() == plan[told_so_far:]
@@ -64,13 +64,13 @@ def test_a_batch_reaches_to_the_end_of_the_generation_and_no_further() -> None:
 
 
 def test_the_first_generation_is_uniform_over_the_range() -> None:
-    plan = BootstrapFilter(particles=4000, diffusion_ms=0.0).prior(VALVE_SPACE, 1).proposed_isis_ms()[0]
+    plan = BootstrapFilter(particles=4000, diffusion_ms=0.0).begin(VALVE_SPACE, 1).proposed_isis_ms()[0]
     assert np.histogram(plan.numpy(), bins=5, range=(-2.5, 502.5))[0] / 4000 == pytest.approx([0.2] * 5, abs=0.03)
 
 
 @pytest.mark.parametrize("space", [VALVE_SPACE, DesignSpace(3.0, 321.0, reference="impact")], ids=["valve", "odd"])
 def test_particles_stay_on_the_lattice_and_in_the_range(space: DesignSpace) -> None:
-    posterior = BootstrapFilter(diffusion_ms=60.0).prior(space, 5)
+    posterior = BootstrapFilter(diffusion_ms=60.0).begin(space, 5)
     for _ in range(3):
         plan = posterior.proposed_isis_ms()[0].numpy()
         assert ((plan - space.low_ms) % 5.0 == 0.0).all()
@@ -98,7 +98,7 @@ def test_a_draw_at_either_end_is_a_particle_with_weight() -> None:
 
 
 def test_without_diffusion_all_particles_go_where_the_only_mep_was() -> None:
-    posterior = STILL.prior(VALVE_SPACE, 4)
+    posterior = STILL.begin(VALVE_SPACE, 4)
     chosen = posterior.proposed_isis_ms()[0, 11].item()
     after = generation(posterior, lambda isi_ms: 0.1 if isi_ms == chosen else 0.0)
     assert after.proposed_isis_ms()[0].tolist() == [chosen] * 30
@@ -106,7 +106,7 @@ def test_without_diffusion_all_particles_go_where_the_only_mep_was() -> None:
 
 
 def test_the_window_is_the_weighted_mean_of_the_measured_particles_and_75_ms_to_either_side() -> None:
-    posterior = STILL.prior(VALVE_SPACE, 4)
+    posterior = STILL.begin(VALVE_SPACE, 4)
     plan = posterior.proposed_isis_ms()[0].numpy()
     meps = 0.01 + bell_mv(plan)
     after = generation(posterior, lambda isi_ms: 0.01 + bell_mv(isi_ms))
@@ -118,13 +118,13 @@ def test_the_window_is_the_weighted_mean_of_the_measured_particles_and_75_ms_to_
 
 
 def test_the_spread_is_the_population_sd_of_the_resampled_particles() -> None:
-    after = generation(STILL.prior(VALVE_SPACE, 4), lambda isi_ms: 0.01 + bell_mv(isi_ms))
+    after = generation(STILL.begin(VALVE_SPACE, 4), lambda isi_ms: 0.01 + bell_mv(isi_ms))
     assert after.estimate().spread_ms == pytest.approx(np.std(after.proposed_isis_ms()[0].double().numpy()))
 
 
 def test_diffusion_moves_particles_by_its_sd() -> None:
     model = BootstrapFilter(particles=2000, diffusion_ms=20.0)
-    first = STILL.prior(VALVE_SPACE, 4).proposed_isis_ms()[0, 0].item()
+    first = STILL.begin(VALVE_SPACE, 4).proposed_isis_ms()[0, 0].item()
     posterior = told(replace(model), [(250.0, 0.1)] * 2000)
     plan = posterior.proposed_isis_ms()[0].double()
     assert first % 5.0 == 0.0
@@ -144,7 +144,7 @@ def test_the_particles_gather_in_the_window_and_the_strategy_stops() -> None:
 
 
 def test_tms_alone_measures_no_particle() -> None:
-    posterior = PF.prior(VALVE_SPACE, 3)
+    posterior = PF.begin(VALVE_SPACE, 3)
     plan = posterior.proposed_isis_ms()[0].tolist()
     posterior = PF.update(posterior, observation([None], [0.02]))
     assert posterior.proposed_isis_ms()[0].tolist() == plan
@@ -152,8 +152,8 @@ def test_tms_alone_measures_no_particle() -> None:
 
 
 def test_a_generation_without_a_mep_above_the_floor_says_so_and_spreads_evenly() -> None:
-    model = BootstrapFilter(floor=Floor("zeroed", threshold_mv=0.02))
-    posterior = generation(model.prior(VALVE_SPACE, 3), lambda _: 0.01)
+    model = BootstrapFilter(floor=FloorTreatment("zeroed", threshold_mv=0.02))
+    posterior = generation(model.begin(VALVE_SPACE, 3), lambda _: 0.01)
     assert "all of its particles were given the same weight" in posterior.trouble
     assert posterior.spread_ms[0] > 80.0
     assert generation(posterior, bell_mv).trouble is None
@@ -165,7 +165,7 @@ def test_a_particle_is_where_its_mep_was_measured() -> None:
 
 
 def test_people_whose_generations_end_at_different_trials_do_not_disturb_one_another() -> None:
-    posterior = PF.prior(VALVE_SPACE, 3, people=2)
+    posterior = PF.begin(VALVE_SPACE, 3, people=2)
     second = posterior.proposed_isis_ms()[1].tolist()
     posterior = PF.update(posterior, observation([100.0, None], [0.1, 0.01]))
     assert posterior.proposed_isis_ms().shape == (2, 29)

@@ -1,4 +1,4 @@
-"""Fitted curves: the floor, the window of a curve, and its intervals."""
+"""Fitted curves: the window of a curve, and its intervals."""
 
 from __future__ import annotations
 
@@ -8,43 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from isiw.errors import InvalidValueError
-from isiw.models.dissertation.curves import FittedCurve, Floor, curve_masks
-from isiw.models.shared.history import PersonTrials
+from isiw.models.dissertation.curves import FittedCurve, curve_masks
 from isiw.window import Window, window_from_excess
 
 GRID = np.arange(0.0, 501.0)
-
-
-def trials(mep_mv: list[float], baseline_mv: list[float] | None = None) -> PersonTrials:
-    return PersonTrials(np.arange(float(len(mep_mv))), np.array(mep_mv), np.array(baseline_mv or []))
-
-
-def test_the_floor_is_the_mean_of_the_meps_of_tms_alone_where_there_are_any() -> None:
-    assert Floor().level_mv(trials([0.1, 0.2], [0.01, 0.03])) == pytest.approx(0.02)
-
-
-def test_without_tms_alone_the_floor_is_the_median_of_all_meps() -> None:
-    assert Floor().level_mv(trials([0.01, 0.3, 0.02])) == 0.02
-    assert Floor().level_mv(trials([])) == 0.0
-
-
-@pytest.mark.parametrize("kind", ["zeroed", "raw"])
-def test_only_a_subtracted_floor_is_above_zero(kind: str) -> None:
-    assert Floor(kind).level_mv(trials([0.1, 0.2], [0.01])) == 0.0
-
-
-def test_what_is_above_the_floor_depends_on_its_kind() -> None:
-    mep_mv = np.array([0.01, 0.03])
-    assert Floor("subtracted").excess_mv(mep_mv, 0.02).tolist() == pytest.approx([-0.01, 0.01])
-    assert Floor("zeroed", threshold_mv=0.02).excess_mv(mep_mv, 0.0).tolist() == [0.0, 0.03]
-    assert Floor("raw").excess_mv(mep_mv, 0.0).tolist() == [0.01, 0.03]
-
-
-@pytest.mark.parametrize("settings", [{"kind": "cut"}, {"threshold_mv": 0.0}, {"threshold_mv": float("nan")}])
-def test_a_floor_that_cannot_be_is_refused(settings: dict[str, object]) -> None:
-    with pytest.raises(InvalidValueError, match=r"floor|threshold_mv"):
-        Floor(**settings)
 
 
 @given(st.lists(st.floats(-0.01, 0.1), min_size=3, max_size=20), st.floats(0.0, 0.05))

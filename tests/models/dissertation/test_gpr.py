@@ -11,9 +11,9 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import InvalidValueError
-from isiw.models.dissertation.curves import Floor
 from isiw.models.dissertation.gpr import GaussianProcessRegression
 from isiw.models.dissertation.regression import RegressionModel
+from isiw.models.shared.floor import FloorTreatment
 from isiw.testing import check_model
 from isiw.window import Window
 from models.told_trials import bell_mv, told, trials_of
@@ -53,7 +53,7 @@ def test_sampled_curves_scatter_about_the_mean_as_the_process_does() -> None:
 def test_a_floor_above_the_edges_level_hides_them_unless_it_is_subtracted() -> None:
     trials = trials_of(lambda isi_ms: 0.02 + bell_mv(isi_ms))
     raw, subtracted = (
-        told(RegressionModel(GaussianProcessRegression(), Floor(kind)), trials).estimate().window
+        told(RegressionModel(GaussianProcessRegression(), FloorTreatment(kind)), trials).estimate().window
         for kind in ("raw", "subtracted")
     )
     assert raw == Window(0.0, 500.0)
@@ -61,14 +61,14 @@ def test_a_floor_above_the_edges_level_hides_them_unless_it_is_subtracted() -> N
 
 
 def test_without_trials_the_prior_stands_in() -> None:
-    posterior = RegressionModel(GaussianProcessRegression()).prior(VALVE_SPACE, 1)
+    posterior = RegressionModel(GaussianProcessRegression()).begin(VALVE_SPACE, 1)
     assert "no trials" in posterior.trouble
     assert posterior.estimate().window is None
     assert posterior.curves[0].samples_mv.std() > 0
 
 
 def test_a_search_that_gives_up_says_so_and_its_best_parameters_stand_in() -> None:
-    assert "did not converge in 1 iterations" in fit(max_iterations=1).trouble
+    assert "did not converge in 1 iterations" in fit(max_fit_iterations=1).trouble
 
 
 @pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
@@ -77,8 +77,8 @@ def test_the_model_conforms(space) -> None:
 
 
 @pytest.mark.parametrize(
-    "settings", [{"length_ms": 10.0}, {"min_length_ms": 0.0}, {"noise": 0.0}, {"max_iterations": 0}, {"samples": 1}]
+    "settings", [{"length_ms": 10.0}, {"min_length_ms": 0.0}, {"noise": 0.0}, {"max_fit_iterations": 0}, {"samples": 1}]
 )
 def test_a_setting_that_cannot_be_is_refused(settings: dict[str, float]) -> None:
-    with pytest.raises(InvalidValueError, match=r"length_ms|noise|iterations"):
+    with pytest.raises(InvalidValueError, match=r"length_ms|noise|iterations|samples"):
         GaussianProcessRegression(**settings)

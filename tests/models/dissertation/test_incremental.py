@@ -11,8 +11,8 @@ import torch
 from isiw.acquisition.fixed import IncrementalSweep
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.dissertation.curves import Floor
 from isiw.models.dissertation.incremental import SweepModel
+from isiw.models.shared.floor import FloorTreatment
 from isiw.strategy.catalogue import make_strategy
 from isiw.testing import check_model
 from isiw.window import Window
@@ -74,7 +74,7 @@ def test_neighbouring_isis_are_averaged_before_they_are_judged() -> None:
 
 
 def test_meps_below_the_threshold_may_be_counted_as_none() -> None:
-    zeroed = replace(BRIEF, floor=Floor("zeroed", threshold_mv=0.02))
+    zeroed = replace(BRIEF, floor=FloorTreatment("zeroed", threshold_mv=0.02))
     assert swept(zeroed, [0.015, 0.015, 0.05, 0.1, 0.015, 0.015]).estimate().window == Window(40.0, 60.0)
 
 
@@ -108,7 +108,7 @@ class AmplitudeHistory:
 
 
 def test_it_goes_where_the_incremental_design_goes() -> None:
-    plan = SweepModel().prior(VALVE_SPACE, 0).proposed_isis_ms()[0]
+    plan = SweepModel().begin(VALVE_SPACE, 0).proposed_isis_ms()[0]
     grid = torch.arange(0.0, 501.0, 5.0)
     picks = [float(grid[IncrementalSweep()(AmplitudeHistory(trial), grid).argmax()]) for trial in range(1212)]
     assert plan.tolist() == picks
@@ -150,7 +150,7 @@ def test_a_sweep_may_be_told_to_go_on_to_the_end() -> None:
 
 
 def test_people_are_swept_side_by_side() -> None:
-    posterior = BRIEF.prior(SPACE, 0, people=2)
+    posterior = BRIEF.begin(SPACE, 0, people=2)
     posterior = BRIEF.update(posterior, observation([0.0, None], [0.1, 0.1]))
     assert posterior.proposed_isis_ms()[:, 3].tolist() == [20.0, 0.0]
 
@@ -173,5 +173,5 @@ def test_the_model_conforms(space: DesignSpace) -> None:
     ],
 )
 def test_a_setting_that_cannot_be_is_refused(settings: dict[str, object]) -> None:
-    with pytest.raises(InvalidValueError, match=r"step_ms|not discarded|rule|evidence_se|neighbours"):
+    with pytest.raises(InvalidValueError, match=r"step_ms|trials_per_isi|discarded|rule|evidence_se|neighbours"):
         SweepModel(**settings)

@@ -10,9 +10,9 @@ from scipy.optimize import curve_fit
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import InvalidValueError
-from isiw.models.dissertation.curves import Floor
 from isiw.models.dissertation.nonlinear import NonlinearRegression, gaussians_mv, gradient_mv
 from isiw.models.dissertation.regression import RegressionModel
+from isiw.models.shared.floor import FloorTreatment
 from isiw.testing import check_model
 from isiw.window import Window
 from models.told_trials import bell_mv, told, trials_of
@@ -36,7 +36,8 @@ def test_a_floor_above_the_edges_level_hides_them_unless_it_is_subtracted() -> N
     assert FLOOR_MV > 0.135 * (FLOOR_MV + 0.1)
     trials = trials_of(lambda isi_ms: FLOOR_MV + bell_mv(isi_ms))
     windows = {
-        kind: told(RegressionModel(NR.method, Floor(kind)), trials).estimate().window for kind in ("raw", "subtracted")
+        kind: told(RegressionModel(NR.method, FloorTreatment(kind)), trials).estimate().window
+        for kind in ("raw", "subtracted")
     }
     assert windows["subtracted"] == Window(213.0, 313.0)
     assert windows["raw"].width_ms > 120.0
@@ -109,7 +110,7 @@ def test_three_trials_are_too_few_and_a_flat_curve_stands_in(trials: int) -> Non
 
 
 def test_before_the_fit_is_possible_the_sampled_curves_are_those_of_prior_knowledge() -> None:
-    samples_mv = NR.prior(VALVE_SPACE, 1).curves[0].samples_mv
+    samples_mv = NR.begin(VALVE_SPACE, 1).curves[0].samples_mv
     peaks_ms = samples_mv.argmax(axis=-1)
     assert samples_mv.min() >= 0.0
     assert samples_mv.max() > 0.05
@@ -156,7 +157,7 @@ def test_where_no_amplitude_is_known_beforehand_it_starts_from_the_largest_mep(s
     ],
 )
 def test_a_setting_that_cannot_be_is_refused(settings: dict[str, float]) -> None:
-    with pytest.raises(InvalidValueError, match=r"peaks|width_ms|amplitude_mv|evaluations"):
+    with pytest.raises(InvalidValueError, match=r"peaks|width_ms|amplitude_mv|evaluations|samples"):
         NonlinearRegression(**settings)
 
 

@@ -61,7 +61,7 @@ def test_the_samples_of_all_capabilities_are_the_same() -> None:
 def test_the_less_noise_the_better_an_outcome_tells_samples_apart() -> None:
     overlaps = []
     for noise_mv in (0.01, 0.1):
-        mass = RegressionModel(TwoHumps(noise_mv)).prior(VALVE_SPACE, 0).outcome_mass(torch.tensor([150.0]))[0, :, 0]
+        mass = RegressionModel(TwoHumps(noise_mv)).begin(VALVE_SPACE, 0).outcome_mass(torch.tensor([150.0]))[0, :, 0]
         overlaps.append(float(mass.min(dim=0).values.sum()))
     assert overlaps[0] < 0.05
     assert overlaps[1] > 0.4
@@ -75,8 +75,8 @@ def test_the_next_isi_is_where_the_curve_is_least_known() -> None:
 
 
 def test_people_are_fitted_apart() -> None:
-    posterior = NR.prior(VALVE_SPACE, 1, people=2)
-    alone = NR.prior(VALVE_SPACE, 1)
+    posterior = NR.begin(VALVE_SPACE, 1, people=2)
+    alone = NR.begin(VALVE_SPACE, 1)
     for isi_ms, mep_mv in trials_of(bell_mv):
         posterior = NR.update(posterior, observation([isi_ms, 500.0 - isi_ms], [mep_mv, mep_mv]))
         alone = NR.update(alone, observation([isi_ms], [mep_mv]))
@@ -94,7 +94,7 @@ def test_a_fantasy_is_what_telling_it_would_have_been() -> None:
 
 
 def test_the_segment_of_the_peak_is_reported_or_all_of_them() -> None:
-    peak, every = (RegressionModel(TwoHumps(), segments=which).prior(VALVE_SPACE, 0) for which in ("peak", "all"))
+    peak, every = (RegressionModel(TwoHumps(), segments=which).begin(VALVE_SPACE, 0) for which in ("peak", "all"))
     assert peak.estimate().window.segments == ((100.0, 200.0),)
     assert len(every.estimate().window.segments) == 2
     assert (peak.window_masks(torch.tensor([400.0])) <= every.window_masks(torch.tensor([400.0]))).all()
@@ -118,7 +118,7 @@ def test_an_estimate_claims_no_probability_and_no_posterior_of_the_edges() -> No
 def test_a_response_without_its_amplitude_is_refused() -> None:
     seen = Observation(torch.tensor([1.0]), torch.tensor([torch.nan]), torch.zeros(1), torch.ones(1))
     with pytest.raises(StrategyError, match="amplitudes only"):
-        NR.update(NR.prior(VALVE_SPACE, 0), seen)
+        NR.update(NR.begin(VALVE_SPACE, 0), seen)
 
 
 def test_an_unknown_word_for_the_segments_is_refused() -> None:

@@ -44,7 +44,7 @@ def test_the_window_is_near_the_true_one() -> None:
 
 
 def test_without_trials_a_flat_curve_stands_in() -> None:
-    posterior = RegressionModel(SupportVectorRegression()).prior(VALVE_SPACE, 1)
+    posterior = RegressionModel(SupportVectorRegression()).begin(VALVE_SPACE, 1)
     assert "no trials" in posterior.trouble
     assert posterior.estimate().window is None
 

@@ -11,7 +11,6 @@ import torch
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
-from isiw.models.gp import fit as gp_fit
 from isiw.models.gp.fit import Fit, fit, fixed_fit
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, Hyperparameters
 from isiw.models.gp.scale import Scale, Transform, scale_of
@@ -78,7 +77,7 @@ def test_a_profile_is_believed_and_a_flat_one_is_not() -> None:
 
 def test_the_most_likely_process_is_more_likely_than_all_of_the_grid() -> None:
     told = trials()
-    grid, most_likely = fitted(told), fitted(told, marginalised=False)
+    grid, most_likely = fitted(told), fitted(told, max_evaluations=150)
     within = grid.processes.picked(torch.tensor([grid.best]))
     zs = [PRIOR.z(x)[0].square().sum() for x in (within, most_likely.processes.picked(torch.tensor([0])))]
     no_noise = torch.zeros(30, dtype=torch.float64)
@@ -96,7 +95,7 @@ def test_noise_by_isi_leaves_the_odds_of_a_profile_as_they_are() -> None:
 def test_where_nothing_is_impossible_it_stays_so() -> None:
     told = trials()
     certain = replace(PRIOR, p_window=1.0)
-    for options in ({}, {"marginalised": False}, {"noise_by_isi": True}):
+    for options in ({}, {"max_evaluations": 150}, {"noise_by_isi": True}):
         got = fit(certain, "rbf", scale_of(told.mep_mv, "log", 0.005), told, **options)
         assert got.log_joint[got.processes.amplitude == 0].exp().sum() == 0
 
@@ -113,8 +112,7 @@ def test_a_singular_covariance_is_told_and_answered_by_the_medians() -> None:
     assert torch.isfinite(singular.log_joint).all()
 
 
-def test_a_search_that_does_not_end_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gp_fit, "MAX_EVALUATIONS", 5)
-    got = fitted(trials(), marginalised=False)
+def test_a_search_that_does_not_end_is_told() -> None:
+    got = fitted(trials(), max_evaluations=5)
     assert "has not ended after 5 evaluations" in got.trouble
     assert torch.isfinite(got.log_joint).all()

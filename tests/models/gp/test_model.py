@@ -14,7 +14,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
-from isiw.models.gp.model import GaussianProcess, GaussianProcessPosterior
+from isiw.models.gp.model import GaussianProcess, GaussianProcessPosterior, ProcessSettings
 from isiw.models.gp.prior import FixedProcess
 from isiw.models.protocol import (
     Conditions,
@@ -26,6 +26,7 @@ from isiw.models.protocol import (
     SamplesProfiles,
     SamplesWindows,
 )
+from isiw.models.shared.floor import FloorTreatment
 from isiw.studies import SimulatedSession, run_study
 from isiw.subjects.cohorts import cohort
 from isiw.testing import check_model
@@ -47,7 +48,7 @@ def observation(isi_ms: float | None, mep_mv: float, response: float = math.nan)
 def after(
     model: GaussianProcess, trials: Trials, space: DesignSpace = VALVE_SPACE, seed: int = 1
 ) -> GaussianProcessPosterior:
-    posterior = model.prior(space, seed)
+    posterior = model.begin(space, seed)
     for isi_ms, mep_mv in trials:
         posterior = model.update(posterior, observation(isi_ms, mep_mv))
     return posterior
@@ -72,13 +73,13 @@ def estimate(model: GaussianProcess, trials: Trials) -> WindowEstimate:
     "changed",
     [
         {},
-        {"kernel": "rbf"},
-        {"noise": "by-isi"},
-        {"hyperparameters": "map"},
-        {"transform": "sqrt", "noise": "by-isi", "hyperparameters": "map"},
-        {"transform": "none", "floor": "raw"},
-        {"floor": "zeroed"},
-        {"fixed": FIXED},
+        {"process": ProcessSettings(kernel="rbf")},
+        {"process": ProcessSettings(noise="by-isi")},
+        {"process": ProcessSettings(hyperparameters="map")},
+        {"transform": "sqrt", "process": ProcessSettings(noise="by-isi", hyperparameters="map")},
+        {"transform": "none", "floor": FloorTreatment("raw")},
+        {"floor": FloorTreatment("zeroed")},
+        {"process": ProcessSettings(fixed=FIXED)},
     ],
     ids=str,
 )
@@ -92,7 +93,7 @@ def test_it_conforms_from_the_impact_and_in_a_narrow_space() -> None:
 
 
 def test_it_has_the_capabilities_that_it_says() -> None:
-    posterior = FEW.prior(VALVE_SPACE, 0)
+    posterior = FEW.begin(VALVE_SPACE, 0)
     for capability in (
         PredictsOutcomes,
         SamplesWindows,
@@ -127,8 +128,8 @@ def test_a_flat_profile_becomes_ever_more_certain_to_be_flat() -> None:
 
 def test_without_trials_it_believes_what_was_believed_before() -> None:
     # Of the paths that change something, some rise too little to have a window.
-    probability = FEW.prior(VALVE_SPACE, 0).estimate().probability
-    assert 0.6 < probability <= FEW.beliefs.p_window + 0.01
+    probability = FEW.begin(VALVE_SPACE, 0).estimate().probability
+    assert 0.6 < probability <= FEW.process.prior.p_window + 0.01
 
 
 def test_told_baselines_are_the_floor() -> None:
@@ -139,7 +140,7 @@ def test_told_baselines_are_the_floor() -> None:
 
 
 def test_amplitudes_below_the_threshold_are_zero_where_the_floor_is_zeroed() -> None:
-    model = GaussianProcess(floor="zeroed", zero_below_mv=0.03)
+    model = GaussianProcess(floor=FloorTreatment("zeroed", 0.03))
     trials = evenly("gaussian", 40)
     zeroed = [(isi_ms, 0.0 if mep_mv < 0.03 else mep_mv) for isi_ms, mep_mv in trials]
     one, other = (after(model, told) for told in (trials, zeroed))
@@ -155,7 +156,7 @@ def test_the_model_for_botorch_agrees_with_scikit_learn() -> None:
     values = (np.log(np.maximum(meps_mv, 0.005)) - FIXED.centre) / FIXED.unit
     reference = GaussianProcessRegressor(kernel, alpha=FIXED.noise**2, optimizer=None).fit(isis_ms[:, None], values)
     mean, sd = reference.predict(GRID.double().numpy()[:, None], return_std=True)
-    model = after(GaussianProcess(fixed=FIXED), trials).botorch_model()
+    model = after(GaussianProcess(ProcessSettings(fixed=FIXED)), trials).botorch_model()
     with torch.no_grad():
         posterior = model.posterior(GRID.double()[:, None])
     np.testing.assert_allclose(posterior.mean[:, 0], mean, rtol=0, atol=1e-6)
@@ -163,7 +164,7 @@ def test_the_model_for_botorch_agrees_with_scikit_learn() -> None:
 
 
 def test_conditioning_on_a_trial_is_refitting_with_it_where_hyperparameters_are_fixed() -> None:
-    model, trials = replace(FEW, fixed=FIXED), evenly("gaussian", 20)
+    model, trials = replace(FEW, process=ProcessSettings(fixed=FIXED)), evenly("gaussian", 20)
     refitted = after(model, trials)
     conditioned = after(model, trials[:-1]).condition(*(torch.tensor([x], dtype=torch.float64) for x in trials[-1]))
     assert torch.equal(conditioned.profiles_mv(GRID), refitted.profiles_mv(GRID))
@@ -184,7 +185,7 @@ def test_conditioning_keeps_the_scale_and_the_processes_and_weighs_them_anew() -
 
 def test_people_do_not_see_each_other() -> None:
     alone = after(FEW, evenly("gaussian", 12))
-    together = FEW.prior(VALVE_SPACE, 1, people=2)
+    together = FEW.begin(VALVE_SPACE, 1, people=2)
     for (isi_ms, mep_mv), (other_ms, other_mv) in zip(evenly("gaussian", 12), flat(12, 0), strict=True):
         pair = torch.tensor([[isi_ms, other_ms], [mep_mv, other_mv], [0, 0], [math.nan, math.nan]]).double()
         together = FEW.update(together, Observation(*pair))
@@ -202,12 +203,12 @@ def test_all_of_the_samples_are_the_same_ones() -> None:
 
 def test_a_response_without_an_amplitude_is_refused() -> None:
     with pytest.raises(StrategyError, match="amplitudes only"):
-        FEW.update(FEW.prior(VALVE_SPACE, 0), observation(250.0, math.nan, response=1.0))
+        FEW.update(FEW.begin(VALVE_SPACE, 0), observation(250.0, math.nan, response=1.0))
 
 
-def test_trouble_of_a_fit_is_told_and_an_estimate_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("isiw.models.gp.fit.MAX_EVALUATIONS", 5)
-    posterior = after(replace(FEW, hyperparameters="map"), list(usual_trials(VALVE_SPACE)))
+def test_trouble_of_a_fit_is_told_and_an_estimate_is_given() -> None:
+    hasty = replace(FEW, process=ProcessSettings(hyperparameters="map", max_evaluations=5))
+    posterior = after(hasty, list(usual_trials(VALVE_SPACE)))
     assert posterior.trouble.startswith("The search")
     assert posterior.trouble.endswith(".")
     assert posterior.estimate().window is not None
@@ -217,22 +218,32 @@ def test_trouble_of_a_fit_is_told_and_an_estimate_is_given(monkeypatch: pytest.M
 @pytest.mark.parametrize(
     "changed",
     [
-        {"kernel": "linear"},
-        {"noise": "level"},
         {"transform": "log10"},
-        {"hyperparameters": "mcmc"},
-        {"floor": "median"},
         {"samples": 1},
         {"samples": 2.5},
         {"detection_limit_mv": 0.0},
-        {"zero_below_mv": math.nan},
+    ],
+    ids=str,
+)
+def test_an_invalid_setting_is_refused(changed: dict[str, Any]) -> None:
+    with pytest.raises(InvalidValueError):
+        replace(FEW, **changed)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"kernel": "linear"},
+        {"noise": "level"},
+        {"hyperparameters": "mcmc"},
+        {"max_evaluations": 0},
         {"fixed": FIXED, "noise": "by-isi"},
     ],
     ids=str,
 )
-def test_a_setting_that_cannot_be_is_refused(changed: dict[str, Any]) -> None:
+def test_an_invalid_process_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
-        replace(FEW, **changed)
+        ProcessSettings(**wrong)
 
 
 def coverage(people: int, trials: int, strategy: str = "gp-straddle", **settings: Any) -> tuple[float, float]:

@@ -8,7 +8,6 @@ import pytest
 import torch
 
 from isiw.errors import InvalidValueError
-from isiw.models.beliefs import prior_with
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior
 
 
@@ -18,7 +17,7 @@ def test_the_grid_has_the_medians_and_spreads_of_the_prior() -> None:
     weights = log_prior.exp() * (processes.amplitude > 0)
     assert weights.sum().item() == pytest.approx(prior.p_window)
     weights = weights / weights.sum()
-    for values, (median, log_sd) in ((processes.length_ms, prior.length_ms), (processes.noise, prior.noise)):
+    for values, (median, log_sd, _) in ((processes.length_ms, prior.length_ms), (processes.noise, prior.noise)):
         mean = (weights * values.log()).sum()
         assert mean.exp().item() == pytest.approx(median)
         # A grid that ends at 2.25 SDs has a little less spread.
@@ -30,12 +29,6 @@ def test_hyperparameters_there_and_back() -> None:
     prior = HyperparameterPrior()
     z = torch.tensor([[0.5, -1.0, 2.0], [0.0, 0.0, 0.0]], dtype=torch.float64)
     torch.testing.assert_close(prior.z(prior.at(z)), z)
-
-
-def test_settings_that_differ_are_told_by_name() -> None:
-    assert prior_with({"length_ms": [50, 0.3]}, HyperparameterPrior).length_ms == (50.0, 0.3)
-    with pytest.raises(InvalidValueError, match=r"no such setting.*length.*length_ms"):
-        prior_with({"length": (50.0, 0.3)}, HyperparameterPrior)
 
 
 @pytest.mark.parametrize(
@@ -52,7 +45,7 @@ def test_settings_that_differ_are_told_by_name() -> None:
 )
 def test_a_prior_that_cannot_be_is_refused(settings: dict[str, object], what: str) -> None:
     with pytest.raises(InvalidValueError, match=what):
-        prior_with(settings, HyperparameterPrior)
+        HyperparameterPrior(**settings)
 
 
 @pytest.mark.parametrize(

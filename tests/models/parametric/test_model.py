@@ -14,6 +14,7 @@ from isiw.models.parametric import ParametricModel, ParametricPosterior
 from isiw.models.parametric import sampling as parametric_sampling
 from isiw.models.parametric.importance import Effort
 from isiw.models.parametric.prior import Likelihood, WindowPrior
+from isiw.models.parametric.sampling import Chains
 from isiw.models.protocol import (
     Conditions,
     HasEvidence,
@@ -41,7 +42,7 @@ def observation(
 
 
 def after(model: ParametricModel, observations: Sequence[Observation], seed: int = 1) -> ParametricPosterior:
-    return model.update_by_all(model.prior(VALVE_SPACE, seed), observations)
+    return model.update_by_all(model.begin(VALVE_SPACE, seed), observations)
 
 
 def evenly(name: str, person: int, n: int) -> list[Observation]:
@@ -58,7 +59,7 @@ def simulated(model: ParametricModel, seed: int, isis_ms: np.ndarray):
 
 def test_model_and_posterior_keep_their_protocols() -> None:
     model = ParametricModel()
-    posterior = model.prior(VALVE_SPACE, 0)
+    posterior = model.begin(VALVE_SPACE, 0)
     assert isinstance(model, ResponseModel)
     assert isinstance(model, SimulatesPeople)
     for protocol in (
@@ -86,7 +87,7 @@ def test_the_parametric_model_conforms_with_every_likelihood(likelihood: Likelih
 
 
 def test_the_prior_is_sampled_as_it_is_stated() -> None:
-    posterior = ParametricModel(samples=2000).prior(VALVE_SPACE, 1)
+    posterior = ParametricModel(samples=2000).begin(VALVE_SPACE, 1)
     z = posterior.latents[0]
     assert z.mean(0).abs().max() < 0.12
     assert (z.std(0) - 1).abs().max() < 0.12
@@ -120,7 +121,7 @@ def test_the_posterior_agrees_with_plain_importance_sampling_from_the_prior(like
 def test_trials_told_at_once_and_one_by_one_give_the_same_posterior() -> None:
     model = ParametricModel(likelihood="gamma")
     observations = evenly("gaussian", 2, 6)
-    step_by_step = model.prior(VALVE_SPACE, 1)
+    step_by_step = model.begin(VALVE_SPACE, 1)
     for each in observations:
         step_by_step = model.update(step_by_step, each)
     assert torch.equal(step_by_step.latents, after(model, observations).latents)
@@ -128,7 +129,7 @@ def test_trials_told_at_once_and_one_by_one_give_the_same_posterior() -> None:
 
 def test_people_do_not_see_each_other() -> None:
     model = ParametricModel(likelihood="gamma", samples=100)
-    two = model.prior(VALVE_SPACE, 1, people=2)
+    two = model.begin(VALVE_SPACE, 1, people=2)
     for isi_ms in (100.0, 250.0, 400.0):
         two = model.update(
             two, Observation(*(torch.tensor(row) for row in ([isi_ms] * 2, [0.01, 0.1], [0.0] * 2, [math.nan] * 2)))
@@ -163,7 +164,7 @@ def test_two_places_that_may_both_be_the_window_are_both_kept() -> None:
 def test_tms_alone_teaches_the_floor_and_nothing_about_the_window() -> None:
     model = ParametricModel(likelihood="log-normal")
     posterior = after(model, [observation(math.nan, mep_mv) for mep_mv in (0.009, 0.011, 0.010, 0.008)])
-    assert posterior.baselines_mv().log().std() < 0.3 * WindowPrior().floor_mv[1]
+    assert posterior.baselines_mv().log().std() < 0.3 * WindowPrior().floor.mean_mv.sd
     assert abs(posterior.estimate().probability - WindowPrior().p_window) < 0.05
 
 
@@ -206,7 +207,7 @@ def test_a_fantasy_moves_the_samples_as_an_update_would() -> None:
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_the_predicted_outcomes_have_the_expectation_of_the_profile(likelihood: Likelihood) -> None:
     # Without outliers. Outcomes lie a quarter of a nat apart and leave out the rarest MEPs, which makes 1.1 % at most.
-    model = ParametricModel(beliefs=WindowPrior(outliers=(-12.0, 0.1)), likelihood=likelihood)
+    model = ParametricModel(prior=WindowPrior(outliers=(-12.0, 0.1)), likelihood=likelihood)
     posterior = after(model, evenly("gaussian", 2, 20))
     unknowns = posterior.sample.unknowns
     low = unknowns.floor_mv.log().quantile(0.05) - 1.0
@@ -291,31 +292,31 @@ def nuts_gap_ms(model: ParametricModel, observations: Sequence[Observation]) -> 
         return np.where(fast == slow, 0.0, np.abs(fast - slow))
 
 
-def test_fast_inference_agrees_with_nuts(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.slow
+def test_fast_inference_agrees_with_nuts() -> None:
     # One data set and few draws: the Monte-Carlo error of a median is about 2 ms.
-    monkeypatch.setattr("isiw.models.parametric.program.WARMUP", 60)
-    model = ParametricModel(likelihood="log-normal", samples=90)
+    model = ParametricModel(likelihood="log-normal", samples=90, chains=Chains(warmup=60))
     _, observations = simulated(model, 1, np.random.default_rng(1).uniform(150, 450, 30))
     assert nuts_gap_ms(model, observations).max() < 8
 
 
 def test_chains_of_nuts_that_disagree_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    def stuck(_program, _trials, starts, draws, generator):
+    def stuck(_program, _trials, starts, draws, _warmup, generator):
         noise = torch.randn((len(starts), draws, starts.shape[1]), generator=generator, dtype=torch.double)
         return starts.unsqueeze(1) + 0.01 * noise
 
     monkeypatch.setattr(parametric_sampling, "nuts_sample", stuck)
-    monkeypatch.setattr(parametric_sampling, "LEAST_SHARE", 0.0)
     silence = [observation(isi_ms, 0.009) for isi_ms in (60.0, 120.0, 300.0, 310.0, 320.0)]
     responses = [observation(210.0, 0.08), observation(420.0, 0.08)]
-    trouble = after(ParametricModel(likelihood="log-normal", method="nuts"), [*silence, *responses]).trouble
+    model = ParametricModel(likelihood="log-normal", method="nuts", chains=Chains(least_share=0.0))
+    trouble = after(model, [*silence, *responses]).trouble
     assert trouble is not None
     assert "R-hat" in trouble
 
 
 @pytest.mark.slow
 def test_fast_inference_agrees_with_nuts_on_twenty_data_sets() -> None:
-    model = ParametricModel(beliefs=WindowPrior(p_window=1.0), likelihood="log-normal", samples=300)
+    model = ParametricModel(prior=WindowPrior(p_window=1.0), likelihood="log-normal", samples=300)
     gaps_ms = []
     for seed in range(20):
         _, observations = simulated(model, seed, np.random.default_rng(seed).uniform(150, 450, 30))

@@ -5,8 +5,7 @@ import torch
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.beliefs import prior_with
-from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior, latent_names
+from isiw.models.parametric.prior import FloorPrior, InputNoisePrior, Likelihood, Unknowns, WindowPrior, latent_names
 
 
 def drawn(likelihood: Likelihood, space: DesignSpace, prior: WindowPrior | None = None) -> Unknowns:
@@ -28,7 +27,7 @@ def test_windows_start_up_to_an_eighth_of_a_second_after_the_impact_or_rarely_an
 
 
 def test_widths_and_floors_have_the_medians_and_spreads_that_are_set() -> None:
-    prior = WindowPrior(width_ms=(80.0, 0.3), floor_mv=(0.02, 0.5))
+    prior = WindowPrior(width_ms=(80.0, 0.3), floor=FloorPrior(mean_mv=(0.02, 0.5)))
     unknowns = drawn("log-normal", VALVE_SPACE, prior)
     for values, (median, log_sd) in ((unknowns.width_ms, (80.0, 0.3)), (unknowns.floor_mv, (0.02, 0.5))):
         assert values.median().item() == pytest.approx(median, rel=0.03)
@@ -45,23 +44,22 @@ def test_with_noise_on_the_input_the_expected_mep_saturates_and_tms_alone_evokes
     assert 0.03 < (unknowns.baseline_mv + unknowns.amplitude_mv).median().item() < 0.15
 
 
-def test_settings_from_a_file_are_a_prior_and_unknown_ones_are_named() -> None:
-    assert prior_with({"width_ms": [90.0, 0.4]}, WindowPrior) == WindowPrior(width_ms=(90.0, 0.4))
-    with pytest.raises(InvalidValueError, match="p_windows"):
-        prior_with({"p_windows": 0.5}, WindowPrior)
-
-
 @pytest.mark.parametrize(
     "wrong",
     [
         {"p_window": 0.0},
-        {"p_anywhere": 1.5},
         {"width_ms": (0.0, 0.4)},
-        {"floor_mv": (math.nan, 0.4)},
-        {"rest": (-2.7, 0.0)},
-        {"start_ms": (50.0, 50.0)},
+        {"outliers": (-3.5, 0.0)},
     ],
 )
 def test_a_prior_that_cannot_be_is_refused(wrong) -> None:
     with pytest.raises(InvalidValueError):
         WindowPrior(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("part", "wrong"), [(FloorPrior, {"mean_mv": (math.nan, 0.4)}), (InputNoisePrior, {"rest": (-2.7, 0.0)})]
+)
+def test_an_impossible_part_is_refused(part, wrong) -> None:
+    with pytest.raises(InvalidValueError, match=next(iter(wrong))):
+        part(**wrong)

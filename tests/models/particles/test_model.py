@@ -1,5 +1,5 @@
 import math
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -9,12 +9,12 @@ from isiw.acquisition.information import mutual_information
 from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.metrics import covers
-from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.likelihood import levels, total_log_likelihood
+from isiw.models.particles.model import Moving, ParticleModel, ParticlePosterior
 from isiw.models.particles.moves import Mover
 from isiw.models.particles.noise import NoiseKind, draw_log_mep, log_gain, log_likelihood
 from isiw.models.particles.predictions import PersonSample
-from isiw.models.particles.prior import LATENTS, Person, Prior
+from isiw.models.particles.prior import LATENTS, NoiseShares, Person, Prior, ProfilePrior
 from isiw.models.protocol import (
     Observation,
     Posterior,
@@ -39,7 +39,7 @@ def observation(isi_ms: list[float], mep_mv: list[float], response: list[float] 
 
 
 def after(model: ParticleModel, trials: list[tuple[float, float]], seed: int = 1) -> ParticlePosterior:
-    posterior = model.prior(VALVE_SPACE, seed)
+    posterior = model.begin(VALVE_SPACE, seed)
     for isi_ms, mep_mv in trials:
         posterior = model.update(posterior, observation([isi_ms], [mep_mv]))
     return posterior
@@ -72,7 +72,7 @@ def evenly(subject: SimulatedSubject, n: int, seed: int = 0) -> list[tuple[float
 
 def test_model_and_posterior_keep_their_protocols() -> None:
     model = ParticleModel(particles=20)
-    posterior = model.prior(VALVE_SPACE, 0)
+    posterior = model.begin(VALVE_SPACE, 0)
     assert isinstance(model, ResponseModel)
     assert isinstance(model, SimulatesPeople)
     for protocol in (Posterior, PredictsOutcomes, SamplesWindows):
@@ -81,7 +81,7 @@ def test_model_and_posterior_keep_their_protocols() -> None:
 
 def test_an_update_changes_no_earlier_posterior() -> None:
     model = ParticleModel(particles=200)
-    before = model.prior(VALVE_SPACE, 3)
+    before = model.begin(VALVE_SPACE, 3)
     latents = before.latents.z.clone()
     model.update(before, observation([250.0], [0.08]))
     assert before.trials == 0
@@ -98,7 +98,7 @@ def test_the_same_seed_and_trials_give_the_same_posterior() -> None:
 def test_people_in_one_batch_do_not_see_each_other() -> None:
     # The first person's particles wear out or not; what the second is told must not change when.
     model = ParticleModel(particles=200)
-    calm = wild = model.prior(VALVE_SPACE, 3, people=2)
+    calm = wild = model.begin(VALVE_SPACE, 3, people=2)
     for trial, mep_mv in enumerate((0.010, 0.009, 0.011, 0.010)):
         isi_ms = 20.0 + 10.0 * trial
         calm = model.update(calm, observation([isi_ms, isi_ms], [mep_mv, 0.010]))
@@ -112,7 +112,7 @@ def test_people_in_one_batch_do_not_see_each_other() -> None:
 def test_an_uncertain_isi_is_integrated_out() -> None:
     # The likelihood must be the average over the ISIs that may have come about, here by brute force on 400 quantiles.
     generator = torch.Generator().manual_seed(4)
-    prior = Prior(p_window=1.0)
+    prior = Prior(ProfilePrior(p_window=1.0))
     person = prior.person(prior.sample(1, 4000, generator), VALVE_SPACE)
     isi_ms, isi_sd_ms, mep_mv = 230.0, 3.0, 0.05
 
@@ -131,17 +131,19 @@ def test_an_uncertain_isi_is_integrated_out() -> None:
 
 def test_an_estimate_knows_the_noise_that_its_samples_suppose() -> None:
     # Of two kinds of noise one has wide windows only, so that kind and width must go together in every sample.
-    posterior = ParticleModel(Prior(p_window=0.9, p_noise=(0.5, 0.0, 0.5, 0.0), p_hand=0.0)).prior(VALVE_SPACE, 3)
-    recruits = posterior.latents.noise == NoiseKind.RECRUITMENT
+    posterior = ParticleModel(Prior(ProfilePrior(p_window=0.9), NoiseShares(0.5, 0.0, 0.5, 0.0, 0.0))).begin(
+        VALVE_SPACE, 3
+    )
+    recruits = posterior.latents.noise == NoiseKind.FOREARM
     width = LATENTS.index("width")
     posterior.latents.z[..., width] = torch.where(recruits, 2.5, -2.5)
     weights = torch.linspace(-3.0, 3.0, recruits.shape[-1]).unsqueeze(0)  # every pick is another particle than its own
     estimate = replace(posterior, log_weights=torch.log_softmax(weights, -1)).estimate()
     edges_ms, kinds = estimate.edge_samples_ms, estimate.hypotheses
-    assert set(kinds.tolist()) == {NoiseKind.GAIN, NoiseKind.RECRUITMENT}
+    assert set(kinds.tolist()) == {NoiseKind.CONSTANT_CV, NoiseKind.FOREARM}
     inside = np.isfinite(edges_ms).all(1)
     widths_ms = edges_ms[inside, 1] - edges_ms[inside, 0]
-    wide = kinds[inside] == NoiseKind.RECRUITMENT
+    wide = kinds[inside] == NoiseKind.FOREARM
     assert widths_ms[wide].min() > widths_ms[~wide].max()
 
 
@@ -157,8 +159,9 @@ def test_moves_without_trials_leave_the_prior_as_it_is() -> None:
         latents, log_likelihood = mover.sweep(latents, log_likelihood)
     assert latents.z[0].mean(0).abs().max() < 0.05
     assert (latents.z[0].std(0) - 1).abs().max() < 0.04
-    assert abs(latents.present.float().mean().item() - prior.p_window) < 0.025
-    for kinds, probabilities in ((latents.shape, prior.p_shape), (latents.noise, prior.p_noise_of_particles)):
+    assert abs(latents.present.float().mean().item() - prior.profile.p_window) < 0.025
+    for kinds, named in ((latents.shape, prior.profile.shapes), (latents.noise, prior.noise)):
+        probabilities = astuple(named)
         shares = torch.bincount(kinds[0], minlength=len(probabilities)) / 8000
         assert (shares - torch.tensor(probabilities)).abs().max() < 0.025
 
@@ -166,7 +169,7 @@ def test_moves_without_trials_leave_the_prior_as_it_is() -> None:
 def test_moved_particles_agree_with_plain_importance_sampling() -> None:
     # The reference weights 60,000 particles of the prior by the likelihood of all trials at once.
     trials = evenly(cohort("gaussian", 3, 0)[2], 6)[:4]
-    reference = after(ParticleModel(particles=60_000, moves=0, min_ess=0.0), trials)
+    reference = after(ParticleModel(particles=60_000, moves=Moving(sweeps=0, min_ess=0.0)), trials)
     ess = torch.exp(-torch.logsumexp(2 * reference.log_weights, -1)).item()
     assert ess > 500
     expected = reference.estimate()
@@ -232,18 +235,18 @@ def test_data_that_break_things_give_finite_beliefs(trials: list[tuple[float, fl
 
 def test_tms_alone_teaches_the_baseline_and_nothing_about_the_window() -> None:
     model = ParticleModel()
-    posterior = model.prior(VALVE_SPACE, 1)
+    posterior = model.begin(VALVE_SPACE, 1)
     before = posterior.person.response.log_floor.std().item()
     for mep_mv in (0.009, 0.011, 0.010, 0.008):
         posterior = model.update(posterior, observation([math.nan], [mep_mv]))
     floors = posterior.person.response.log_floor[0, systematic(posterior.log_weights, 1000)[0]]
     assert floors.std().item() < before / 3
-    assert abs(posterior.estimate().probability - Prior().p_window) < 0.08
+    assert abs(posterior.estimate().probability - Prior().profile.p_window) < 0.08
 
 
 def test_responses_seen_or_not_are_learnt_from() -> None:
     model = ParticleModel()
-    posterior = model.prior(VALVE_SPACE, 1)
+    posterior = model.begin(VALVE_SPACE, 1)
     for isi_ms in (190.0, 230.0, 270.0, 310.0, 350.0, 390.0, 430.0) * 3:
         seen = float(240 <= isi_ms <= 360)
         posterior = model.update(posterior, observation([isi_ms], [math.nan], [seen]))
@@ -278,10 +281,10 @@ def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
     # People drawn from the prior, whose MEPs are drawn from their own predictive distribution; 200 people, 20 trials at
     # even ISIs. The 90 % intervals of 200 honest posteriors cover 0.83 to 0.96 (99.8 %).
     generator = torch.Generator().manual_seed(11)
-    beliefs = Prior(p_window=1.0)
+    beliefs = Prior(ProfilePrior(p_window=1.0))
     hidden = beliefs.person(beliefs.sample(200, 1, generator), VALVE_SPACE)
-    model = ParticleModel(beliefs=beliefs)
-    posterior = model.prior(VALVE_SPACE, 12, people=200)
+    model = ParticleModel(prior=beliefs)
+    posterior = model.begin(VALVE_SPACE, 12, people=200)
     isis_ms = torch.linspace(170, 440, 20)[torch.randperm(20, generator=generator)]
     for isi_ms in isis_ms.tolist():
         meps_mv = sampled_meps_mv(hidden, isi_ms, generator)
@@ -295,12 +298,16 @@ def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
     assert ((covered.mean(0) > 0.83) & (covered.mean(0) < 0.96)).all()
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"particles": 1}, {"particles": 2.5}, {"moves": -1}, {"min_ess": 1.5}, {"detection_limit_mv": 0.0}]
-)
-def test_a_model_that_cannot_be_is_refused(wrong) -> None:
+@pytest.mark.parametrize("wrong", [{"particles": 1}, {"particles": 2.5}, {"thinned": 0}, {"detection_limit_mv": 0.0}])
+def test_an_invalid_model_is_refused(wrong) -> None:
     with pytest.raises(InvalidValueError):
         ParticleModel(**wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"sweeps": -1}, {"max_trial_sweeps": 0.5}, {"min_ess": 1.5}])
+def test_invalid_moves_are_refused(wrong) -> None:
+    with pytest.raises(InvalidValueError):
+        Moving(**wrong)
 
 
 @pytest.mark.parametrize("isi_ms", [180.0, 260.0, 330.0, 450.0])

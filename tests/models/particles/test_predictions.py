@@ -7,7 +7,8 @@ import torch
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1
 from isiw.models.particles.predictions import PersonSample
-from isiw.models.particles.prior import Prior
+from isiw.models.particles.prior import Prior, ProfilePrior
+from isiw.models.shared.start import StartPrior
 from isiw.window import Window, window_from_excess
 
 
@@ -18,7 +19,7 @@ from isiw.window import Window, window_from_excess
 )
 def test_windows_are_those_of_the_rule_also_where_a_peak_lies_beyond_the_range(space: DesignSpace) -> None:
     # Tables of facilitations are interpolated in windows and in MEPs; they differ where an edge or a peak lies between.
-    beliefs = Prior(p_window=0.9, p_anywhere=0.3)
+    beliefs = Prior(ProfilePrior(p_window=0.9, start=StartPrior(p_anywhere=0.3)))
     person = beliefs.person(beliefs.sample(1, 1000, torch.Generator().manual_seed(3)), space)
     sample = PersonSample(person, space)
     grid_ms = torch.tensor(space.grid_ms, dtype=torch.float32)

@@ -11,12 +11,13 @@ the stiffness, and these vary from tap to tap. Times are in ms from the valve co
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.optimize import brentq
 
+from isiw.checks import check_numbers, check_probabilities
 from isiw.errors import InvalidValueError
 from isiw.types import ArrayLike, FloatArray
 
@@ -24,6 +25,8 @@ __all__ = [
     "LINE_DELAY_MS",
     "SEPARATION_RAD",
     "SUPPLY_KPA",
+    "Event",
+    "Faults",
     "Geometry",
     "SensorNoise",
     "Taps",
@@ -71,102 +74,129 @@ class SensorNoise:
 
 
 @dataclass(frozen=True)
+class Event:
+    """When something happens in a tap, and how it varies from tap to tap.
+
+    Args:
+        mean_ms: its mean [ms].
+        sd_ms: its SD [ms].
+
+    Raises:
+        InvalidValueError: a mean that is not positive, or a negative SD.
+    """
+
+    mean_ms: float
+    sd_ms: float
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "mean_ms", above=0)
+        check_numbers(self, "sd_ms", least=0)
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What goes wrong now and then.
+
+    Args:
+        stuck_probability: share of taps in which the hammer does not move.
+        late_probability: share of taps whose valve opens late.
+        late_ms: by how much those are late, uniform between the two [ms].
+
+    Raises:
+        InvalidValueError: an invalid probability, or delays that do not ascend from 0.
+    """
+
+    stuck_probability: float = 0.0
+    late_probability: float = 0.0
+    late_ms: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "stuck_probability", "late_probability")
+        if not 0 <= self.late_ms[0] <= self.late_ms[1]:
+            raise InvalidValueError("Faults.late_ms must ascend from 0", got=self.late_ms)
+
+
+@dataclass(frozen=True)
 class Geometry:
     """One person's wrist under the robot, by its mean event times and how they vary from tap to tap.
 
     Args:
-        descent_ms: mean begin of the descent [ms after the valve command].
-        descent_sd_ms: its SD, from the static friction [ms].
-        hit_ms: mean impact [ms after the valve command].
-        hit_sd_ms: its SD, from friction and travel together [ms].
-        contact_ms: mean time for which the tendon decelerates the hammer [ms].
-        contact_sd_ms: its SD [ms].
-        memg_ms: mean time from the impact to its artefact in the EMG [ms].
-        memg_sd_ms: its SD [ms].
+        descent: begin of the descent [after the valve command]; it varies by the static friction.
+        hit: impact [after the valve command]; it varies by friction and travel together.
+        contact: for how long the tendon decelerates the hammer.
+        memg: artefact of the impact in the EMG [after the impact].
         artefact_mv: amplitude of that artefact [mV]; 0 where there is no EMG.
         load_cell: whether the hammer taps a load cell.
-        stuck_probability: share of taps in which the hammer does not move.
-        late_probability: share of taps whose valve opens late, a fault of the timing.
-        late_ms: by how much those are late, uniform between the two [ms].
+        faults: what goes wrong now and then.
         noise: of the sensors.
 
     Raises:
-        InvalidValueError: events out of order, negative SDs, or a hit SD that the friction alone exceeds.
+        InvalidValueError: events out of order, a negative amplitude, or a hit SD that the friction alone exceeds.
     """
 
-    descent_ms: float
-    descent_sd_ms: float
-    hit_ms: float
-    hit_sd_ms: float
-    contact_ms: float
-    contact_sd_ms: float
-    memg_ms: float = 20.0
-    memg_sd_ms: float = 0.5
+    descent: Event
+    hit: Event
+    contact: Event
+    memg: Event = Event(20.0, 0.5)
     artefact_mv: float = 0.1
     load_cell: bool = False
-    stuck_probability: float = 0.0
-    late_probability: float = 0.0
-    late_ms: tuple[float, float] = (0.0, 0.0)
-    noise: SensorNoise = SensorNoise()
+    faults: Faults = field(default_factory=Faults)
+    noise: SensorNoise = field(default_factory=SensorNoise)
 
     def __post_init__(self) -> None:
-        if not LINE_DELAY_MS < self.descent_ms < self.hit_ms or not 0 < self.contact_ms < math.inf:
+        check_numbers(self, "artefact_mv", least=0)
+        if not LINE_DELAY_MS < self.descent.mean_ms < self.hit.mean_ms:
             raise InvalidValueError(
                 "a tap's events are out of order",
-                got=(LINE_DELAY_MS, self.descent_ms, self.hit_ms, self.contact_ms),
-                expected="line delay < descent < hit, and a contact of positive length",
+                got=(LINE_DELAY_MS, self.descent.mean_ms, self.hit.mean_ms),
+                expected="line delay < descent < hit",
             )
-        if min(self.descent_sd_ms, self.hit_sd_ms, self.contact_sd_ms, self.memg_sd_ms, self.artefact_mv) < 0:
-            raise InvalidValueError("SDs and amplitudes must not be negative", got=self)
-        chances = (self.stuck_probability, self.late_probability)
-        if not (0 <= min(chances) <= max(chances) <= 1 and 0 <= self.late_ms[0] <= self.late_ms[1]):
-            raise InvalidValueError("a fault cannot be as probable or as late as that", got=(*chances, self.late_ms))
         if self.travel_sd_ms is None:
             raise InvalidValueError(
                 "the friction alone makes the hit vary more than that",
-                got=self.hit_sd_ms,
-                expected=f"at least {self.friction_share * self.descent_sd_ms:.2f} ms",
-                remedy="Raise hit_sd_ms or lower descent_sd_ms.",
+                got=self.hit.sd_ms,
+                expected=f"at least {self.friction_share * self.descent.sd_ms:.2f} ms",
+                remedy="Raise the SD of the hit or lower that of the descent.",
             )
 
     @cached_property
     def kinetic_share(self) -> float:
         """Kinetic friction, as a share of the supply pressure."""
-        return float(_pressure_share(self.descent_ms)) - BREAK_AWAY_M_S2 / DRIVE_M_S2
+        return float(_pressure_share(self.descent.mean_ms)) - BREAK_AWAY_M_S2 / DRIVE_M_S2
 
     @cached_property
     def hit_speed_m_s(self) -> float:
         """Speed of the hammer at the mean impact [m/s]."""
-        return float(_speed(self.descent_ms, self.hit_ms, self.kinetic_share))
+        return float(_speed(self.descent.mean_ms, self.hit.mean_ms, self.kinetic_share))
 
     @cached_property
     def travel_mm(self) -> float:
         """Mean travel of the hammer from its initial position to the tendon [mm]."""
-        return float(_travel(self.descent_ms, self.hit_ms, self.kinetic_share))
+        return float(_travel(self.descent.mean_ms, self.hit.mean_ms, self.kinetic_share))
 
     @property
     def friction_share(self) -> float:
         """By how much the hit is later when the descent is 1 ms later: a late start has more pressure behind it."""
-        return BREAK_AWAY_M_S2 * (self.hit_ms - self.descent_ms) / (1000 * self.hit_speed_m_s)
+        return BREAK_AWAY_M_S2 * (self.hit.mean_ms - self.descent.mean_ms) / (1000 * self.hit_speed_m_s)
 
     @property
     def travel_sd_ms(self) -> float | None:
         """What the travel adds to the SD of the hit [ms]; None where nothing is left for it."""
-        left = self.hit_sd_ms**2 - (self.friction_share * self.descent_sd_ms) ** 2
+        left = self.hit.sd_ms**2 - (self.friction_share * self.descent.sd_ms) ** 2
         return math.sqrt(left) if left >= 0 else None
 
     @cached_property
     def stiffness_rad_ms(self) -> float:
         """Natural frequency of the hammer on the tendon [rad/ms], from the contact's length."""
-        drive_m_s2 = float(drive(self.hit_ms, self.kinetic_share))
+        drive_m_s2 = float(drive(self.hit.mean_ms, self.kinetic_share))
 
         def too_short(rad_ms: float) -> float:
-            return float(_decelerated_ms(self.hit_speed_m_s, drive_m_s2, rad_ms)) - self.contact_ms
+            return float(_decelerated_ms(self.hit_speed_m_s, drive_m_s2, rad_ms)) - self.contact.mean_ms
 
         softest = 3 * drive_m_s2 / (1000 * self.hit_speed_m_s)  # below it the drive all but wins against the spring
         if too_short(softest) < 0:
-            raise InvalidValueError("the hammer is too slow to be pushed back for so long", got=self.contact_ms)
-        return float(brentq(too_short, softest, 2 * math.pi / self.contact_ms))
+            raise InvalidValueError("the hammer is too slow to be pushed back for so long", got=self.contact.mean_ms)
+        return float(brentq(too_short, softest, 2 * math.pi / self.contact.mean_ms))
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,22 +232,26 @@ def draw_taps(geometry: Geometry, n: int, rng: np.random.Generator) -> Taps:
     """Taps with the variation of a geometry, n of them."""
     z = rng.standard_normal((4, n))
     fault = rng.uniform(size=(3, n))
-    stuck = np.where(fault[2] < geometry.stuck_probability, math.nan, 0.0)
-    late = np.where(fault[0] < geometry.late_probability, geometry.late_ms[0] + fault[1] * np.ptp(geometry.late_ms), 0)
+    stuck = np.where(fault[2] < geometry.faults.stuck_probability, math.nan, 0.0)
+    late = np.where(
+        fault[0] < geometry.faults.late_probability,
+        geometry.faults.late_ms[0] + fault[1] * np.ptp(geometry.faults.late_ms),
+        0,
+    )
     kinetic = geometry.kinetic_share
     # However low the static friction, nothing moves before the pressure exceeds the kinetic one.
     earliest_ms = LINE_DELAY_MS - FILL_MS * math.log1p(-kinetic) + 1.0
-    descent = np.maximum(geometry.descent_ms + geometry.descent_sd_ms * z[0], earliest_ms)
+    descent = np.maximum(geometry.descent.mean_ms + geometry.descent.sd_ms * z[0], earliest_ms)
     travel_sd_ms = geometry.travel_sd_ms or 0.0
     travel = geometry.travel_mm + geometry.hit_speed_m_s * travel_sd_ms * z[1]
-    hit = _arrival(descent, travel, kinetic, geometry.hit_ms)
-    contact_ms = np.maximum(geometry.contact_ms + geometry.contact_sd_ms * z[2], 0.5)
+    hit = _arrival(descent, travel, kinetic, geometry.hit.mean_ms)
+    contact_ms = np.maximum(geometry.contact.mean_ms + geometry.contact.sd_ms * z[2], 0.5)
     return Taps(
         descent_ms=descent + late + stuck,
         hit_ms=hit + late + stuck,
-        rad_ms=geometry.stiffness_rad_ms * geometry.contact_ms / contact_ms,
+        rad_ms=geometry.stiffness_rad_ms * geometry.contact.mean_ms / contact_ms,
         speed_m_s=_speed(descent, hit, kinetic),
-        memg_ms=hit + late + stuck + geometry.memg_ms + geometry.memg_sd_ms * z[3],
+        memg_ms=hit + late + stuck + geometry.memg.mean_ms + geometry.memg.sd_ms * z[3],
         late_ms=late,
         geometry=geometry,
     )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias, get_args
 
 import numpy as np
 
-from isiw.devices.protocol import DeviceInfo, require_staged
+from isiw.checks import check_choice, check_numbers
+from isiw.devices.protocol import DeviceInfo
 from isiw.devices.robot.mechanism import Geometry, Taps, draw_taps
 from isiw.devices.robot.presets import preset
 from isiw.devices.robot.waveforms import UNITS, record_emg, record_robot, sample_times_ms
@@ -62,15 +63,9 @@ class TapperSettings:
     expected_tap_sd_ms: float = 2.5
 
     def __post_init__(self) -> None:
-        if self.reference not in {"impact", "valve"} or self.trigger not in {"open-loop", "impact"}:
-            raise InvalidValueError(
-                "unknown reference or trigger",
-                got=(self.reference, self.trigger),
-                expected='"impact" or "valve", and "open-loop" or "impact"',
-            )
-        for name in ("rate_hz", "expected_hit_ms", "expected_hit_sd_ms", "expected_tap_sd_ms"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise InvalidValueError(f"TapperSettings.{name} must be positive", got=getattr(self, name))
+        check_choice(self, "reference", get_args(Reference))
+        check_choice(self, "trigger", get_args(Trigger))
+        check_numbers(self, "rate_hz", "expected_hit_ms", "expected_hit_sd_ms", "expected_tap_sd_ms", above=0)
         if self.trigger == "impact" and not self.accelerometer:
             raise InvalidValueError("the impact cannot trigger a pulse without an accelerometer to find it")
 
@@ -105,7 +100,7 @@ class HitDelay:
 
 
 class Tapper:
-    """The simulated tapping robot, its stimulator, and a person who answers.
+    """A simulation of the tapping robot, its stimulator, and a person who answers.
 
     Args:
         respond: answers the ISI that truly came about [ms from the impact; None for TMS alone] with a MEP.
@@ -126,10 +121,10 @@ class Tapper:
         self.settings = settings or TapperSettings()
         self.hit_delay = HitDelay(self.settings.expected_hit_ms)
         self._respond, self._seed = respond, seed
-        self._staged, self._delivered = False, 0
 
-    def describe(self) -> DeviceInfo:
-        """What the device is."""
+    @property
+    def info(self) -> DeviceInfo:
+        """What the robot says about itself."""
         silent = {name for name, there in self._has.items() if not there}
         channels = {name: unit for name, unit in UNITS.items() if name not in silent}
         return DeviceInfo("simulated tapping robot", self.settings.reference, simulated=True, channels=channels)
@@ -138,58 +133,31 @@ class Tapper:
     def _has(self) -> dict[str, bool]:
         return {"acceleration": self.settings.accelerometer, "force": self.geometry.load_cell}
 
-    def stage(self) -> None:
-        """Arm."""
-        self._staged = True
-
-    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Sweep:  # noqa: ARG002 - answers at once
+    def answer(self, stimulus: Stimulus) -> Sweep:
         """Tap, pulse, and record.
 
         Raises:
-            DeviceError: not staged, or an ISI too short to be triggered by the impact.
+            DeviceError: an ISI too short to be triggered by the impact.
         """
-        require_staged(self.describe().name, staged=self._staged)
-        refusal = self._refusal(stimulus.isi_ms)
-        if refusal is not None:
-            raise refusal
-        return self._deliver(stimulus)
-
-    def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
-        """Come into the state of having delivered these stimuli since the session's beginning."""
-        for stimulus in stimuli[self._delivered :]:
-            if self._refusal(stimulus.isi_ms) is None:
-                self._deliver(stimulus)
-
-    def stop(self) -> None:
-        """Disarm."""
-        self._staged = False
-
-    def unstage(self) -> None:
-        """Disarm."""
-        self._staged = False
+        if stimulus.isi_ms is not None:
+            self._require_possible(stimulus.isi_ms)
+        rng = np.random.default_rng([self._seed, stimulus.trial])
+        taps = draw_taps(self.geometry, 1, rng)
+        return self._pulse_alone(taps, rng) if stimulus.isi_ms is None else self._pair(taps, stimulus.isi_ms, rng)
 
     def _after_impact_ms(self, isi_ms: float) -> float:
         """The commanded ISI, counted from the impact as predicted [ms]."""
         return isi_ms if self.settings.reference == "impact" else isi_ms - self.hit_delay.mean_ms
 
-    def _refusal(self, isi_ms: float | None) -> DeviceError | None:
-        if self.settings.trigger == "open-loop" or isi_ms is None:
-            return None
+    def _require_possible(self, isi_ms: float) -> None:
         after_impact_ms = self._after_impact_ms(isi_ms)
-        if after_impact_ms >= DETECTION_LATENCY_MS:
-            return None
-        return DeviceError(
-            "the pulse cannot come so soon after the impact that triggers it",
-            got=f"{after_impact_ms:.1f} ms after the impact",
-            expected=f"at least {DETECTION_LATENCY_MS:g} ms",
-            remedy="Start the design space later, or use the open-loop trigger.",
-        )
-
-    def _deliver(self, stimulus: Stimulus) -> Sweep:
-        self._delivered += 1
-        rng = np.random.default_rng([self._seed, stimulus.trial])
-        taps = draw_taps(self.geometry, 1, rng)
-        return self._pulse_alone(taps, rng) if stimulus.isi_ms is None else self._pair(taps, stimulus.isi_ms, rng)
+        if self.settings.trigger == "impact" and after_impact_ms < DETECTION_LATENCY_MS:
+            raise DeviceError(
+                "the pulse cannot come so soon after the impact that triggers it",
+                got=f"{after_impact_ms:.1f} ms after the impact",
+                expected=f"at least {DETECTION_LATENCY_MS:g} ms",
+                remedy="Start the design space later, or use the open-loop trigger.",
+            )
 
     def _pulse_alone(self, taps: Taps, rng: np.random.Generator) -> Sweep:
         silent, times = taps.none(), self._times_ms(ALONE_MS)

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import torch
 
+from isiw.checks import check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
-from isiw.models.dissertation.curves import Floor
 from isiw.models.protocol import Observation, Tensor
+from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory
 from isiw.types import BoolArray, FloatArray, IntArray
 from isiw.window import Window, WindowEstimate
@@ -67,18 +67,14 @@ class BootstrapFilter:
     diffusion_ms: float = 10.0
     lattice_ms: float = 5.0
     half_width_ms: float = 75.0
-    floor: Floor = field(default_factory=lambda: Floor("raw"))
+    floor: FloorTreatment = field(default_factory=lambda: FloorTreatment("raw"), metadata={"spread": True})
 
     def __post_init__(self) -> None:
-        if isinstance(self.particles, bool) or not isinstance(self.particles, int) or self.particles < 2:
-            raise InvalidValueError("particles must be a whole number of at least 2", got=self.particles)
-        for name in ("lattice_ms", "half_width_ms"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise InvalidValueError(f"{name} must be positive", got=getattr(self, name))
-        if not (math.isfinite(self.diffusion_ms) and self.diffusion_ms >= 0):
-            raise InvalidValueError("diffusion_ms must not be negative", got=self.diffusion_ms)
+        check_wholes(self, "particles", least=2)
+        check_numbers(self, "lattice_ms", "half_width_ms", above=0)
+        check_numbers(self, "diffusion_ms", least=0)
 
-    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> BootstrapPosterior:
+    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> BootstrapPosterior:
         """The first generation: uniform over the range, diffused, not measured."""
         rng = np.random.default_rng([seed, 1])  # [seed, 0] is the stream of seed
         particles = self.on_lattice(space, rng.uniform(space.low_ms, space.high_ms, (people, self.particles)))

@@ -1,4 +1,4 @@
-"""A curve fitted to the MEPs of one person: what is subtracted before, and which window follows from it."""
+"""A curve fitted to the MEPs of one person, and which window follows from it."""
 
 from __future__ import annotations
 
@@ -9,54 +9,12 @@ from typing import Literal
 import numpy as np
 from scipy.special import stdtrit
 
-from isiw.errors import InvalidValueError
-from isiw.models.shared.history import PersonTrials
 from isiw.types import BoolArray, FloatArray
-from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
+from isiw.window import EDGE_LEVEL, least_excess_mv
 
-__all__ = ["FittedCurve", "Floor", "FloorKind", "Segments", "curve_masks"]
-
-FloorKind = Literal["subtracted", "zeroed", "raw"]
+__all__ = ["FittedCurve", "Segments", "curve_masks"]
 
 Segments = Literal["peak", "all"]
-
-
-@dataclass(frozen=True)
-class Floor:
-    """What a MEP amounts to where the tap does nothing, and what becomes of it before a curve is fitted.
-
-    The dissertation's plots have amplitudes of zero outside the window; it does not say how they came about (4.3).
-
-    Args:
-        kind: `"subtracted"`: the floor is the mean of the MEPs of TMS alone; where there are none, the median of all
-            MEPs, since most of the range is outside the window. `"zeroed"`: a MEP below the threshold is 0. `"raw"`:
-            MEPs as they are; where the floor exceeds 0.135 of the peak, such a curve has no edges.
-        threshold_mv: of `"zeroed"` [mV]; the dissertation's thresholds of a response are 0.015–0.033 mV (4.1.1).
-
-    Raises:
-        InvalidValueError: another kind, or a threshold that is not positive.
-    """
-
-    kind: FloorKind = "subtracted"
-    threshold_mv: float = 0.025
-
-    def __post_init__(self) -> None:
-        if self.kind not in {"subtracted", "zeroed", "raw"}:
-            raise InvalidValueError("the floor's kind is unknown", got=self.kind, expected="subtracted, zeroed or raw")
-        if not (math.isfinite(self.threshold_mv) and self.threshold_mv > 0):
-            raise InvalidValueError("threshold_mv must be positive", got=self.threshold_mv)
-
-    def level_mv(self, trials: PersonTrials) -> float:
-        """The floor [mV] of one person."""
-        if self.kind != "subtracted":
-            return 0.0
-        if len(trials.baseline_mv):
-            return float(trials.baseline_mv.mean())
-        return float(np.median(trials.mep_mv)) if len(trials.mep_mv) else 0.0
-
-    def excess_mv(self, mep_mv: FloatArray, level_mv: FloatArray | float) -> FloatArray:
-        """What MEPs [mV] have above the floor [mV]; broadcast shape."""
-        return np.where(mep_mv < self.threshold_mv, 0.0, mep_mv) if self.kind == "zeroed" else mep_mv - level_mv
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +69,7 @@ def curve_masks(
         Shape (s, t); all False where there is no window.
     """
     peak = curves_mv.max(axis=-1, keepdims=True)
-    enough = peak >= max(MIN_EXCESS_OF_BASELINE * floor_mv, MIN_EXCESS_MV)
-    masks: BoolArray = enough & (curves_mv >= level * peak)
+    masks: BoolArray = curves_mv >= least_excess_mv(peak, floor_mv, level)
     if segments == "all":
         return masks
     gaps_before = (~masks).cumsum(axis=-1)

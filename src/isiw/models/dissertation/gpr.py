@@ -16,8 +16,8 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from threadpoolctl import ThreadpoolController
 
+from isiw.checks import check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
 from isiw.models.dissertation.curves import FittedCurve
 from isiw.types import FloatArray
 
@@ -42,7 +42,7 @@ class GaussianProcessRegression:
         min_length_ms: shortest length that is searched [ms].
         max_length_ms: longest length that is searched [ms].
         noise: noise SD where the search starts, as a share of the largest excess.
-        max_iterations: iterations after which the search gives up.
+        max_fit_iterations: iterations after which the search gives up.
         samples: how many curves are drawn.
 
     Raises:
@@ -53,19 +53,16 @@ class GaussianProcessRegression:
     min_length_ms: float = 25.0
     max_length_ms: float = 100.0
     noise: float = 0.3
-    max_iterations: int = 40
+    max_fit_iterations: int = 40
     samples: int = 64
 
     def __post_init__(self) -> None:
-        lengths = (self.min_length_ms, self.length_ms, self.max_length_ms)
-        if not 0 < lengths[0] <= lengths[1] <= lengths[2] < math.inf:
-            raise InvalidValueError("min_length_ms, length_ms and max_length_ms ascend from above 0", got=lengths)
-        if not 0 < self.noise < 1:
-            raise InvalidValueError("noise is a share of the largest excess", got=self.noise, expected="0–1")
-        if self.max_iterations < 1 or self.samples < 2:
-            raise InvalidValueError(
-                "a search needs iterations and two samples", got=(self.max_iterations, self.samples)
-            )
+        check_numbers(self, "min_length_ms", above=0)
+        check_numbers(self, "length_ms", least=self.min_length_ms)
+        check_numbers(self, "max_length_ms", least=self.length_ms)
+        check_numbers(self, "noise", above=0, below=1)
+        check_wholes(self, "max_fit_iterations", least=1)
+        check_wholes(self, "samples", least=2)
 
     def fit(
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
@@ -111,10 +108,10 @@ class GaussianProcessRegression:
             jac=True,
             method="L-BFGS-B",
             bounds=kernel.bounds,
-            options={"maxiter": self.max_iterations, "ftol": 1e-5},
+            options={"maxiter": self.max_fit_iterations, "ftol": 1e-5},
         )
         process = GaussianProcessRegressor(kernel.clone_with_theta(found.x), optimizer=None).fit(isi, scaled)
-        gave_up = f"The kernel did not converge in {self.max_iterations} iterations: its best parameters stand in."
+        gave_up = f"The kernel did not converge in {self.max_fit_iterations} iterations: its best parameters stand in."
         return process, math.exp(0.5 * found.x[-1]), None if found.success else gave_up
 
 

@@ -6,15 +6,17 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from statistics import NormalDist
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 import torch
 
+from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.dissertation.curves import Floor, curve_masks
+from isiw.models.dissertation.curves import curve_masks
 from isiw.models.protocol import Observation, Tensor
+from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory, PersonTrials
 from isiw.types import FloatArray
 from isiw.window import EDGE_LEVEL, Window, WindowEstimate
@@ -57,26 +59,19 @@ class SweepModel:
     rule: SweepRule = "baseline"
     neighbours: int = 3
     evidence_se: float = 3.0
-    floor: Floor = field(default_factory=Floor)
+    floor: FloorTreatment = field(default_factory=FloorTreatment, metadata={"spread": True})
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.step_ms) and self.step_ms > 0):
-            raise InvalidValueError("step_ms must be positive", got=self.step_ms)
-        whole = isinstance(self.trials_per_isi, int) and isinstance(self.discarded, int)
-        if not (whole and 0 <= self.discarded <= self.trials_per_isi - 2):
-            raise InvalidValueError(
-                "a mean and its error need two trials that are not discarded",
-                got=(self.trials_per_isi, self.discarded),
-                expected="trials_per_isi of at least discarded + 2",
-            )
-        if self.rule not in {"baseline", "share"}:
-            raise InvalidValueError("the rule is unknown", got=self.rule, expected="baseline or share")
-        if not isinstance(self.neighbours, int) or self.neighbours < 1 or self.neighbours % 2 == 0:
-            raise InvalidValueError("neighbours must be an odd number from 1 up", got=self.neighbours)
-        if not (math.isfinite(self.evidence_se) and self.evidence_se >= 0):
-            raise InvalidValueError("evidence_se must not be negative", got=self.evidence_se)
+        check_numbers(self, "step_ms", above=0)
+        check_wholes(self, "discarded", least=0)
+        check_wholes(self, "trials_per_isi", least=self.discarded + 2)  # a mean and its error need two that are kept
+        check_choice(self, "rule", get_args(SweepRule))
+        check_wholes(self, "neighbours", least=1)
+        if self.neighbours % 2 == 0:
+            raise InvalidValueError("SweepModel.neighbours must be odd", got=self.neighbours)
+        check_numbers(self, "evidence_se", least=0)
 
-    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> SweepPosterior:  # noqa: ARG002 - no randomness
+    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> SweepPosterior:  # noqa: ARG002 - no randomness
         """Nothing measured yet."""
         return SweepPosterior(self, space, AmplitudeHistory.nothing(people))
 

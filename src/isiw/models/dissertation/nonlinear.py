@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
+from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
 from isiw.models.dissertation.curves import FittedCurve
 from isiw.types import FloatArray
 
@@ -99,17 +99,13 @@ class NonlinearRegression:
     samples: int = 64
 
     def __post_init__(self) -> None:
-        if not isinstance(self.peaks, int) or self.peaks not in {1, 2}:
-            raise InvalidValueError("a nonlinear regression has 1 or 2 peaks", got=self.peaks)
-        widths = (self.min_width_ms, self.width_ms, self.max_width_ms)
-        if not 0 < widths[0] <= widths[1] <= widths[2] < math.inf or widths[0] == widths[2]:
-            raise InvalidValueError("min_width_ms, width_ms and max_width_ms ascend from above 0", got=widths)
-        if not 0 <= self.amplitude_mv < math.inf:
-            raise InvalidValueError("amplitude_mv must not be negative", got=self.amplitude_mv)
-        if self.max_evaluations < 1 or self.samples < 2:
-            raise InvalidValueError(
-                "a search needs evaluations and two samples", got=(self.max_evaluations, self.samples)
-            )
+        check_choice(self, "peaks", (1, 2))
+        check_numbers(self, "min_width_ms", above=0)
+        check_numbers(self, "width_ms", least=self.min_width_ms)
+        check_numbers(self, "max_width_ms", least=self.width_ms, above=self.min_width_ms)
+        check_numbers(self, "amplitude_mv", least=0)
+        check_wholes(self, "max_evaluations", least=1)
+        check_wholes(self, "samples", least=2)
 
     def fit(
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, get_args
 
 import numpy as np
 import torch
 
+from isiw.checks import check_choice
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
-from isiw.models.dissertation.curves import FittedCurve, Floor, Segments, curve_masks
+from isiw.models.dissertation.curves import FittedCurve, Segments, curve_masks
 from isiw.models.protocol import Observation, Tensor
+from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory
 from isiw.types import FloatArray
 from isiw.window import Window, WindowEstimate
@@ -57,17 +58,14 @@ class RegressionModel:
         InvalidValueError: another word for the segments.
     """
 
-    method: RegressionMethod
-    floor: Floor = field(default_factory=Floor)
+    method: RegressionMethod = field(metadata={"spread": True})
+    floor: FloorTreatment = field(default_factory=FloorTreatment, metadata={"spread": True})
     segments: Segments = "peak"
 
     def __post_init__(self) -> None:
-        if self.segments not in {"peak", "all"}:
-            raise InvalidValueError(
-                "a window has all segments or the peak's", got=self.segments, expected="peak or all"
-            )
+        check_choice(self, "segments", get_args(Segments))
 
-    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> RegressionPosterior:
+    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> RegressionPosterior:
         """The posterior before the first trial."""
         return self._fitted(space, seed, AmplitudeHistory.nothing(people))
 
@@ -163,8 +161,7 @@ class RegressionPosterior:
 
     def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> RegressionPosterior:
         """The fit with an imagined trial as well; see `Conditions`."""
-        unknown = torch.full_like(mep_mv, torch.nan)
-        return self.model.update(self, Observation(isi_ms, mep_mv, torch.zeros_like(mep_mv), unknown))
+        return self.model.update(self, Observation.of(isi_ms, mep_mv))
 
     def prediction_mv(self, level: float = 0.95, person: int = 0) -> tuple[FloatArray, FloatArray]:
         """The interval that holds the next MEP with this probability [mV], at each ISI of the grid (4.3).

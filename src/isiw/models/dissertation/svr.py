@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from sklearn.svm import SVR
 
+from isiw.checks import check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
 from isiw.models.dissertation.curves import FittedCurve
 from isiw.types import FloatArray
 
@@ -42,14 +41,9 @@ class SupportVectorRegression:
     committee: int = 10
 
     def __post_init__(self) -> None:
-        for name in ("c", "length_ms"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise InvalidValueError(f"{name} must be positive", got=value)
-        if not (math.isfinite(self.epsilon) and self.epsilon >= 0):
-            raise InvalidValueError("epsilon must not be negative", got=self.epsilon)
-        if not isinstance(self.committee, int) or self.committee < 2:
-            raise InvalidValueError("a committee has at least two members", got=self.committee)
+        check_numbers(self, "c", "length_ms", above=0)
+        check_numbers(self, "epsilon", least=0)
+        check_wholes(self, "committee", least=2)
 
     def fit(
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from isiw.models.gp.model import GaussianProcess, GaussianProcessPosterior
+from isiw.models.gp.model import GaussianProcess, GaussianProcessPosterior, ProcessSettings
 
-__all__ = ["GaussianProcess", "GaussianProcessPosterior"]
+__all__ = ["GaussianProcess", "GaussianProcessPosterior", "ProcessSettings"]

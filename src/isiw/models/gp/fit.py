@@ -28,8 +28,6 @@ from isiw.types import FloatArray
 
 __all__ = ["Fit", "Trials", "fit", "fixed_fit"]
 
-MAX_EVALUATIONS = 150
-
 LEAST_PIVOT = 1e-6
 """A covariance in standardised units whose Cholesky factor has smaller pivots is singular but for rounding."""
 
@@ -160,7 +158,7 @@ def fit(
     scale: Scale,
     told: PersonTrials,
     *,
-    marginalised: bool = True,
+    max_evaluations: int | None = None,
     noise_by_isi: bool = False,
 ) -> Fit:
     """Weigh processes by one person's trials.
@@ -170,7 +168,8 @@ def fit(
         kernel: the kernel's name.
         scale: the scale of amplitudes.
         told: the trials.
-        marginalised: all of the grid; else the most likely process stands for all that have an amplitude.
+        max_evaluations: of the search for the most likely process, which stands for all that have an amplitude; None to
+            marginalise over all of the grid.
         noise_by_isi: whether the noise depends on the ISI.
     """
     found = _sound(Fit(prior, kernel, scale, told, *prior.grid()))
@@ -179,7 +178,7 @@ def fit(
     if noise_by_isi and len(told.isi_ms):
         profile = noise_profile(found.trials.isi_ms, found.surprise)
         found = _with_same_totals(found, replace(found, noise=profile))
-    return found if marginalised else _most_likely(found)
+    return found if max_evaluations is None else _most_likely(found, max_evaluations)
 
 
 def fixed_fit(
@@ -206,7 +205,7 @@ def _sound(found: Fit) -> Fit:
     )
 
 
-def _most_likely(found: Fit) -> Fit:
+def _most_likely(found: Fit, max_evaluations: int) -> Fit:
     """The most likely process in place of all that have an amplitude, and as believable as they are together."""
     log_variance = found.noise.log_variance(found.trials.isi_ms)
 
@@ -220,13 +219,13 @@ def _most_likely(found: Fit) -> Fit:
         "initial_simplex": simplex.numpy(),
         "xatol": 0.05,
         "fatol": 0.02,
-        "maxfev": MAX_EVALUATIONS,
+        "maxfev": max_evaluations,
     }
     result = minimize(loss, start.numpy(), method="Nelder-Mead", options=options)  # type: ignore[call-overload]
     trouble = None
     if not result.success:
         trouble = (
-            f"The search for the most likely hyperparameters has not ended after {MAX_EVALUATIONS} evaluations. "
+            f"The search for the most likely hyperparameters has not ended after {max_evaluations} evaluations. "
             "The best ones that it met stand in for them."
         )
     flat = torch.where(found.processes.amplitude == 0, found.log_joint, -torch.inf).argmax()

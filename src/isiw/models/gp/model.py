@@ -9,38 +9,63 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import torch
 
+from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.gp.fit import Fit, fit, fixed_fit
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior
 from isiw.models.gp.process import KernelName, SingleTaskGP
-from isiw.models.gp.samples import FloorKind, Paths, ProfileSample, draw_paths
+from isiw.models.gp.samples import Paths, ProfileSample, draw_paths
 from isiw.models.gp.scale import Scale, Transform, scale_of
 from isiw.models.protocol import Observation, Tensor
+from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory, PersonTrials
 from isiw.models.windows import profile_grid, sampled_estimate
-from isiw.types import FloatArray
 from isiw.window import WindowEstimate
 
-__all__ = ["GaussianProcess", "GaussianProcessPosterior", "NoiseKind"]
+__all__ = ["GaussianProcess", "GaussianProcessPosterior", "NoiseKind", "ProcessSettings"]
 
 NoiseKind: TypeAlias = Literal["equal", "by-isi"]
 
 PATH_STEP_MS = 4.0
 """Paths are drawn at ISIs this far apart at most, and are straight in between; length scales are 10 ms and more."""
 
-_CHOICES = {
-    "kernel": ("rbf", "matern"),
-    "noise": ("equal", "by-isi"),
-    "transform": ("log", "sqrt", "none"),
-    "hyperparameters": ("marginalised", "map"),
-    "floor": ("subtracted", "zeroed", "raw"),
-}
+
+@dataclass(frozen=True)
+class ProcessSettings:
+    """The Gaussian process itself.
+
+    Args:
+        kernel: `"rbf"`, the squared exponential, or `"matern"` with smoothness 5/2.
+        noise: `"equal"` at all ISIs, or `"by-isi"`. Whether there is a profile at all is judged under equal noise.
+        hyperparameters: `"marginalised"` over a grid, or `"map"`, the most likely ones.
+        prior: of the hyperparameters.
+        fixed: hyperparameters and scale that are not learnt, for equal noise.
+        max_evaluations: evaluations after which the search for the most likely hyperparameters gives up.
+
+    Raises:
+        InvalidValueError: another choice, or fixed hyperparameters with noise that depends on the ISI.
+    """
+
+    kernel: KernelName = "matern"
+    noise: NoiseKind = "equal"
+    hyperparameters: Literal["marginalised", "map"] = "marginalised"
+    prior: HyperparameterPrior = field(default_factory=HyperparameterPrior)
+    fixed: FixedProcess | None = None
+    max_evaluations: int = 150
+
+    def __post_init__(self) -> None:
+        check_choice(self, "kernel", get_args(KernelName))
+        check_choice(self, "noise", get_args(NoiseKind))
+        check_choice(self, "hyperparameters", ("marginalised", "map"))
+        check_wholes(self, "max_evaluations", least=1)
+        if self.fixed is not None and self.noise != "equal":
+            raise InvalidValueError("fixed hyperparameters are of equal noise", got=self.noise, expected="equal")
 
 
 @dataclass(frozen=True)
@@ -51,48 +76,29 @@ class GaussianProcess:
     detection limit for that limit.
 
     Args:
-        kernel: `"rbf"`, the squared exponential, or `"matern"` with smoothness 5/2.
-        noise: `"equal"` at all ISIs, or `"by-isi"`. Whether there is a profile at all is judged under equal noise.
+        process: kernel, noise and hyperparameters.
         transform: `"log"`, `"sqrt"` or `"none"`: of which the MEP the process is.
-        hyperparameters: `"marginalised"` over a grid, or `"map"`, the most likely ones.
-        floor: what the 0.135 rule is applied above. `"subtracted"`: the expected MEP of TMS alone where that was told,
-            else the median of what lies low on each path. `"zeroed"`: 0, MEPs below `zero_below_mv` being 0. `"raw"`:
-            0, MEPs as they are; where the floor exceeds 0.135 of the peak, such a window has no edges.
-        beliefs: prior of the hyperparameters.
-        fixed: hyperparameters and scale that are not learnt, for equal noise.
+        floor: what the least-excess rule is applied above. Where the floor is subtracted and TMS alone was not told,
+            it is the median of what lies low on each path.
         samples: how many paths represent the posterior.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
-        zero_below_mv: threshold of the floor `"zeroed"` [mV].
 
     Raises:
-        InvalidValueError: another choice, or a number that cannot be.
+        InvalidValueError: another choice, or an invalid number.
     """
 
-    kernel: KernelName = "matern"
-    noise: NoiseKind = "equal"
+    process: ProcessSettings = field(default_factory=ProcessSettings, metadata={"spread": True})
     transform: Transform = "log"
-    hyperparameters: Literal["marginalised", "map"] = "marginalised"
-    floor: FloorKind = "subtracted"
-    beliefs: HyperparameterPrior = field(default_factory=HyperparameterPrior)
-    fixed: FixedProcess | None = None
+    floor: FloorTreatment = field(default_factory=FloorTreatment, metadata={"spread": True})
     samples: int = 256
     detection_limit_mv: float = 0.005
-    zero_below_mv: float = 0.025
 
     def __post_init__(self) -> None:
-        for name, choices in _CHOICES.items():
-            if getattr(self, name) not in choices:
-                raise InvalidValueError(f"{name} is unknown", got=getattr(self, name), expected=" or ".join(choices))
-        if self.fixed is not None and self.noise != "equal":
-            raise InvalidValueError("fixed hyperparameters are of equal noise", got=self.noise, expected="equal")
-        if isinstance(self.samples, bool) or not isinstance(self.samples, int) or self.samples < 2:
-            raise InvalidValueError("samples must be a whole number", got=self.samples, expected="2 or more")
-        if not all(math.isfinite(x) and x > 0 for x in (self.detection_limit_mv, self.zero_below_mv)):
-            raise InvalidValueError(
-                "detection_limit_mv and zero_below_mv are positive", got=(self.detection_limit_mv, self.zero_below_mv)
-            )
+        check_choice(self, "transform", get_args(Transform))
+        check_wholes(self, "samples", least=2)
+        check_numbers(self, "detection_limit_mv", above=0)
 
-    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> GaussianProcessPosterior:
+    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> GaussianProcessPosterior:
         """The posterior before the first trial."""
         return GaussianProcessPosterior(self, space, seed, AmplitudeHistory.nothing(people))
 
@@ -106,28 +112,24 @@ class GaussianProcess:
 
     def fit(self, told: PersonTrials) -> Fit:
         """Fit one person's trials."""
-        told = self.seen(told)
-        if self.fixed is not None:
-            scale = Scale(self.transform, self.detection_limit_mv, self.fixed.centre, self.fixed.unit)
-            return fixed_fit(self.beliefs, self.kernel, scale, told, self.fixed)
+        told, process = self.seen(told), self.process
+        if process.fixed is not None:
+            scale = Scale(self.transform, self.detection_limit_mv, process.fixed.centre, process.fixed.unit)
+            return fixed_fit(process.prior, process.kernel, scale, told, process.fixed)
         return fit(
-            self.beliefs,
-            self.kernel,
+            process.prior,
+            process.kernel,
             scale_of(np.concatenate((told.mep_mv, told.baseline_mv)), self.transform, self.detection_limit_mv),
             told,
-            marginalised=self.hyperparameters == "marginalised",
-            noise_by_isi=self.noise == "by-isi",
+            max_evaluations=None if process.hyperparameters == "marginalised" else process.max_evaluations,
+            noise_by_isi=process.noise == "by-isi",
         )
 
     def seen(self, told: PersonTrials) -> PersonTrials:
         """Trials as they are fitted: small MEPs are 0 where the floor is `"zeroed"`."""
-        if self.floor != "zeroed":
-            return told
-
-        def zeroed(mep_mv: FloatArray) -> FloatArray:
-            return np.where(mep_mv < self.zero_below_mv, 0.0, mep_mv)
-
-        return replace(told, mep_mv=zeroed(told.mep_mv), baseline_mv=zeroed(told.baseline_mv))
+        return replace(
+            told, mep_mv=self.floor.excess_mv(told.mep_mv), baseline_mv=self.floor.excess_mv(told.baseline_mv)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +179,7 @@ class GaussianProcessPosterior:
         ]
         stacked = (torch.stack(field) for field in zip(*drawn, strict=True))
         paths = Paths(*(x if x.dtype == torch.bool else x.float() for x in stacked))
-        return ProfileSample(isi_ms.float(), paths, self.model.transform, self.model.floor)
+        return ProfileSample(isi_ms.float(), paths, self.model.transform, self.model.floor.floor)
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
@@ -197,9 +199,7 @@ class GaussianProcessPosterior:
 
     def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> GaussianProcessPosterior:
         """What would be believed after one more trial, the hyperparameters staying what they are; see `Conditions`."""
-        unknown = torch.full_like(mep_mv, torch.nan)
-        imagined = Observation(isi_ms, mep_mv, isi_sd_ms=torch.zeros_like(mep_mv), response=unknown)
-        return replace(self, told=self.told.appended(imagined), held=self.fits)
+        return replace(self, told=self.told.appended(Observation.of(isi_ms, mep_mv)), held=self.fits)
 
     def log_evidence(self) -> Tensor:
         """Log marginal likelihood of the trials, as a density of log amplitudes [nat]; see `HasEvidence`.

@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import torch
 
+from isiw.checks import check_numbers
 from isiw.errors import InvalidValueError
 from isiw.models.protocol import Tensor
+from isiw.models.shared.scales import Scale, check_scales
 
 __all__ = ["FixedProcess", "HyperparameterPrior", "Hyperparameters"]
 
@@ -41,7 +43,7 @@ class Hyperparameters(NamedTuple):
 
 @dataclass(frozen=True)
 class HyperparameterPrior:
-    """Log-normal priors, each a median and a log SD, and the probability of a profile.
+    """Log-normal priors, each a median and a log SD without a tail, and the probability of a profile.
 
     Args:
         length_ms: over which the transformed profile varies [ms]. Windows are 40 to 230 ms wide, which Gaussian
@@ -51,20 +53,15 @@ class HyperparameterPrior:
         p_window: probability that the tap changes anything.
     """
 
-    length_ms: tuple[float, float] = (30.0, 0.5)
-    amplitude: tuple[float, float] = (1.2, 0.3)
-    noise: tuple[float, float] = (0.6, 0.5)
+    length_ms: Scale = Scale(30.0, 0.5)
+    amplitude: Scale = Scale(1.2, 0.3)
+    noise: Scale = Scale(0.6, 0.5)
     p_window: float = 0.75
 
     def __post_init__(self) -> None:
-        for name in ("length_ms", "amplitude", "noise"):
-            pair = getattr(self, name)
-            if len(pair) != 2 or not all(math.isfinite(x) and x > 0 for x in pair):
-                raise InvalidValueError(f"{name} is a median and a log SD, both positive", got=pair)
-            object.__setattr__(self, name, (float(pair[0]), float(pair[1])))
-        if not 0.0 < self.p_window <= 1.0:
-            raise InvalidValueError("p_window is a probability above 0", got=self.p_window)
-        least = self.noise[0] * math.exp(-GRID_SD * self.noise[1])
+        check_scales(self, "length_ms", "amplitude", "noise")
+        check_numbers(self, "p_window", above=0, most=1)
+        least = self.noise.median * math.exp(-GRID_SD * self.noise.sd)
         if least < LEAST_NOISE:
             raise InvalidValueError(
                 "the prior allows so little noise that covariances become singular",
@@ -101,7 +98,7 @@ class HyperparameterPrior:
     @property
     def _medians_and_sds(self) -> Tensor:
         rows = torch.tensor([self.length_ms, self.amplitude, self.noise], dtype=torch.float64)
-        return rows.T
+        return rows[:, :2].T
 
 
 @dataclass(frozen=True)
@@ -126,9 +123,8 @@ class FixedProcess:
     unit: float = 1.0
 
     def __post_init__(self) -> None:
-        positive = (self.length_ms, self.amplitude, self.noise, self.unit)
-        if not all(math.isfinite(x) and x > 0 for x in positive) or not math.isfinite(self.centre):
-            raise InvalidValueError("length, amplitude, noise and unit are positive, the centre finite", got=self)
+        check_numbers(self, "length_ms", "amplitude", "noise", "unit", above=0)
+        check_numbers(self, "centre")
         if self.noise < LEAST_NOISE * self.amplitude:
             raise InvalidValueError(
                 "so little noise makes covariances singular", got=self.noise, expected=f"{LEAST_NOISE:g} amplitudes"

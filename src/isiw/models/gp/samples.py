@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -13,11 +13,10 @@ from isiw.models.gp.fit import Fit
 from isiw.models.gp.scale import Transform, expected_mep_mv
 from isiw.models.protocol import Tensor
 from isiw.models.randomness import systematic
-from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
+from isiw.models.shared.floor import FloorKind
+from isiw.models.windows import least_excess_mv
 
-__all__ = ["FloorKind", "Paths", "ProfileSample", "draw_paths"]
-
-FloorKind: TypeAlias = Literal["subtracted", "zeroed", "raw"]
+__all__ = ["Paths", "ProfileSample", "draw_paths"]
 
 FLOOR_SHARE = 0.15
 """A path is lowest up to this quantile; of a range of 320 ms, at least 28 % lie outside the widest window."""
@@ -154,8 +153,8 @@ class ProfileSample:
         """Expected MEP at the window's edge [mV], shape (b, s, 1); infinite where there is no window."""
         floor_mv = self.floor_mv
         peak_mv = self._expected_mv.amax(-1) - floor_mv
-        enough = peak_mv >= (MIN_EXCESS_OF_BASELINE * floor_mv).clamp_min(MIN_EXCESS_MV)
-        return torch.where(enough & self.paths.present, floor_mv + EDGE_LEVEL * peak_mv, torch.inf).unsqueeze(-1)
+        level_mv = floor_mv + least_excess_mv(peak_mv, floor_mv)
+        return torch.where(self.paths.present, level_mv, torch.inf).unsqueeze(-1)
 
     @cached_property
     def _cleared_mv(self) -> Tensor:

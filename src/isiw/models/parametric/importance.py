@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import torch
 
-from isiw.errors import InvalidValueError
+from isiw.checks import check_numbers, check_wholes
 from isiw.models.parametric.ascent import LogDensity, Modes, find_modes
 from isiw.models.protocol import Tensor
 
@@ -60,14 +60,9 @@ class Effort:
     enough: float = 400.0
 
     def __post_init__(self) -> None:
-        for name in ("scouts", "starts", "steps", "draws", "fits"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise InvalidValueError(f"{name} must be a whole number", got=value, expected="1 or more")
-        if self.scouts < self.starts:
-            raise InvalidValueError("every start needs a scout", got=self.scouts, expected=f"{self.starts} or more")
-        if not 0.0 < self.enough < math.inf:
-            raise InvalidValueError("enough is a positive number of draws", got=self.enough)
+        check_wholes(self, "starts", "steps", "draws", "fits", least=1)
+        check_wholes(self, "scouts", least=self.starts)  # every start needs one
+        check_numbers(self, "enough", above=0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,25 +10,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import get_args
+from typing import Literal, get_args
 
 import numpy as np
 import torch
 
+from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
 from isiw.models.parametric.importance import Effort
 from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
 from isiw.models.parametric.program import WindowProgram
-from isiw.models.parametric.sampling import Method, sample_person
+from isiw.models.parametric.sampling import Chains, sample_person
 from isiw.models.protocol import Observation, SimulatedPerson, Tensor
 from isiw.models.randomness import SIMULATED, step_generator, systematic
 from isiw.models.shared.history import History, observed
 from isiw.models.shared.tables import OUTCOMES, interpolated, table_levels
-from isiw.models.windows import profile_grid, sampled_estimate
+from isiw.models.windows import least_excess_mv, profile_grid, sampled_estimate
 from isiw.types import ArrayLike
-from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window, WindowEstimate
+from isiw.window import Window, WindowEstimate
 
 __all__ = ["ParametricModel", "ParametricPosterior"]
 
@@ -38,12 +38,13 @@ class ParametricModel:
     """A Gaussian window on a floor, with gamma, log-normal or input-side noise and outliers.
 
     Args:
-        beliefs: the prior over people.
+        prior: the prior over people.
         likelihood: how MEPs scatter: "gamma", "log-normal", or "input-noise" (a noisy input of a saturating curve).
         method: "fast" samples by importance around all modes; "nuts" takes the draws with a window from Pyro's
             no-U-turn sampler instead, which needs minutes and is for reference.
         samples: equally weighted samples that represent a posterior.
         effort: how much work a sample with a window is worth.
+        chains: how long the no-U-turn sampler runs.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a told response is known to be above [mV].
 
@@ -51,31 +52,26 @@ class ParametricModel:
         InvalidValueError: an unknown likelihood or method, or a number that cannot be.
     """
 
-    beliefs: WindowPrior = field(default_factory=WindowPrior)
+    prior: WindowPrior = field(default_factory=WindowPrior)
     likelihood: Likelihood = "input-noise"
-    method: Method = "fast"
+    method: Literal["fast", "nuts"] = "fast"
     samples: int = 512
     effort: Effort = field(default_factory=Effort)
+    chains: Chains = field(default_factory=Chains)
     detection_limit_mv: float = 0.005
     response_threshold_mv: float = 0.02
 
     def __post_init__(self) -> None:
-        for name, kinds in (("likelihood", get_args(Likelihood)), ("method", get_args(Method))):
-            if getattr(self, name) not in kinds:
-                raise InvalidValueError(f"unknown {name}", got=getattr(self, name), expected=" or ".join(kinds))
-        if isinstance(self.samples, bool) or not isinstance(self.samples, int) or self.samples < 2:
-            raise InvalidValueError("samples must be a whole number", got=self.samples, expected="2 or more")
-        if not (self.detection_limit_mv > 0 and self.response_threshold_mv > 0):
-            raise InvalidValueError(
-                "a detection limit and a threshold are positive",
-                got=(self.detection_limit_mv, self.response_threshold_mv),
-            )
+        check_choice(self, "likelihood", get_args(Likelihood))
+        check_choice(self, "method", ("fast", "nuts"))
+        check_wholes(self, "samples", least=2)
+        check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
 
     def program(self, space: DesignSpace) -> WindowProgram:
         """The Pyro program of one person."""
-        return WindowProgram(self.beliefs, self.likelihood, space)
+        return WindowProgram(self.prior, self.likelihood, space)
 
-    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> ParametricPosterior:
+    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParametricPosterior:
         """The posterior before the first trial."""
         return self._after(space, seed, History.empty(people, torch.device("cpu")).to("cpu", torch.double))
 
@@ -100,7 +96,7 @@ class ParametricModel:
         generator = step_generator("cpu", seed, SIMULATED)
         program = self.program(space)
         latents = torch.randn((1, 1, program.latents), generator=generator, dtype=torch.double)
-        present = torch.rand((1, 1), generator=generator) < self.beliefs.p_window
+        present = torch.rand((1, 1), generator=generator) < self.prior.p_window
         person = WindowSample(program.unknowns(latents), present, self.likelihood, space)
         log_mep = draw_log_mep(
             person.unknowns, person.levels(torch.as_tensor(isi_ms, dtype=torch.double)), self.likelihood, generator
@@ -114,10 +110,10 @@ class ParametricModel:
             sample_person(
                 self.program(space),
                 _sorted(history, person),
-                self.method,
                 self.samples,
                 self.effort,
                 step_generator("cpu", seed, trials),
+                self.chains if self.method == "nuts" else None,
             )
             for person in range(people)
         ]
@@ -160,30 +156,24 @@ class WindowSample:
         """Share of the largest excess at some ISIs, of shape (t,) or (b, 1 or s, t), shape (b, s, t)."""
         return torch.where(self.present.unsqueeze(-1), levels(self.unknowns, isi_ms), 0.0)
 
-    @cached_property
-    def _highest(self) -> Tensor:
-        """Share of the largest excess that the range reaches, shape (b, s)."""
-        middle_ms = self.unknowns.start_ms + 0.5 * self.unknowns.width_ms
-        reached_ms = middle_ms.clamp(self.space.low_ms, self.space.high_ms)
-        return self.levels(reached_ms.unsqueeze(-1)).squeeze(-1)
+    def _excess_mv(self, isi_ms: Tensor) -> Tensor:
+        """Expected MEP above the baseline at some ISIs [mV], shapes as for `levels`."""
+        return self.unknowns.amplitude_mv.unsqueeze(-1) * self.levels(isi_ms)
 
     @cached_property
-    def enhances(self) -> Tensor:
-        """Whether the excess in the range is large enough to speak of a window, shape (b, s)."""
-        least_mv = (MIN_EXCESS_OF_BASELINE * self.unknowns.baseline_mv).clamp_min(MIN_EXCESS_MV)
-        return self.present & (self.unknowns.amplitude_mv * self._highest >= least_mv)
+    def least_excess_mv(self) -> Tensor:
+        """Excess at the window's edge [mV]; infinite where there is no window, shape (b, s)."""
+        middle_ms = self.unknowns.start_ms + 0.5 * self.unknowns.width_ms
+        reached_ms = middle_ms.clamp(self.space.low_ms, self.space.high_ms)
+        return least_excess_mv(self._excess_mv(reached_ms.unsqueeze(-1)).squeeze(-1), self.unknowns.baseline_mv)
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows as 0 or 1, shape (b, s, t)."""
-        inside = self.enhances.unsqueeze(-1) & (
-            self.levels(isi_ms.double()) >= EDGE_LEVEL * self._highest.unsqueeze(-1)
-        )
-        return inside.to(torch.float32)
+        return (self._excess_mv(isi_ms.double()) >= self.least_excess_mv.unsqueeze(-1)).to(torch.float32)
 
     def profiles_mv(self, isi_ms: Tensor) -> Tensor:
         """Expected MEP [mV], shape (b, s, t)."""
-        excess_mv = self.unknowns.amplitude_mv.unsqueeze(-1) * self.levels(isi_ms.double())
-        return (self.unknowns.baseline_mv.unsqueeze(-1) + excess_mv).float()
+        return (self.unknowns.baseline_mv.unsqueeze(-1) + self._excess_mv(isi_ms.double())).float()
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP under each sample, shape (b, s, t, y)."""
@@ -257,10 +247,7 @@ class ParametricPosterior:
 
     def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> ParametricPosterior:
         """The same samples, some more often and some no more, by an imagined trial; see `Conditions`."""
-        unknown = torch.full_like(mep_mv, torch.nan)
-        trial = self.model.observed(
-            Observation(isi_ms, mep_mv, isi_sd_ms=torch.zeros_like(mep_mv), response=unknown), self.trials
-        )
+        trial = self.model.observed(Observation.of(isi_ms, mep_mv), self.trials)
         ends = torch.stack((trial.log_mep, trial.log_mep_high), dim=-1).unsqueeze(1)
         level = self.sample.levels(trial.isi_ms.unsqueeze(1))
         gain = log_likelihood(self.sample.unknowns, level, ends, self.model.likelihood).squeeze(-1)

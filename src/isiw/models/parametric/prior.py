@@ -6,16 +6,17 @@ the latents have no bounds.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
 import torch
 
+from isiw.checks import check_numbers
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
 from isiw.models.protocol import Tensor
-from isiw.models.shared.start import start_ms
+from isiw.models.shared.scales import Scale, check_scales
+from isiw.models.shared.start import StartPrior
 
 __all__ = ["OUTPUT_CV", "Likelihood", "Unknowns", "WindowPrior", "latent_names"]
 
@@ -64,68 +65,83 @@ class Unknowns(NamedTuple):
     p_outlier: Tensor
 
 
+_Evoked = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]
+
+
+@dataclass(frozen=True)
+class FloorPrior:
+    """Of the EMG floor.
+
+    Args:
+        mean_mv: its expectation [mV]; 6–20 µV measured, and wide enough for rigs with ten times the gain.
+        cv: its CV from trial to trial; 0.12–0.35 measured.
+
+    Raises:
+        InvalidValueError: an invalid scale.
+    """
+
+    mean_mv: Scale = Scale(0.009, 0.8)
+    cv: Scale = Scale(0.24, 0.4)
+
+    def __post_init__(self) -> None:
+        check_scales(self, "mean_mv", "cv")
+
+
+@dataclass(frozen=True)
+class InputNoisePrior:
+    """Of a saturating curve with noise on its input, in probits.
+
+    Args:
+        saturation: the largest evoked MEP over the floor; 0.1–0.25 mV in forearm muscles.
+        input_sd: SD of the noise on the input: 5–9 % RMT at 0.3 logits a percent, and 1.7 logits a probit.
+        boost: shift of the input at the centre: 5–18 % RMT.
+        rest: the input without a tap: 90 % RMT, half-maximal at RMT + 4 %.
+
+    Raises:
+        InvalidValueError: an invalid scale.
+    """
+
+    saturation: Scale = Scale(16.0, 0.6)
+    input_sd: Scale = Scale(1.24, 0.25)
+    boost: Scale = Scale(1.94, 0.45)
+    rest: Scale = Scale(-2.7, 0.35)
+
+    def __post_init__(self) -> None:
+        check_scales(self, "saturation", "input_sd", "boost")
+        check_scales(self, "rest", positive=False)
+
+
 @dataclass(frozen=True)
 class WindowPrior:
-    """The prior of the parametric window model. Pairs are median and log SD of a log-normal where not said otherwise.
+    """The prior of the parametric window model.
 
     Args:
         p_window: probability that there is a window.
-        start_ms: where windows start after the impact [ms], uniform between these.
-        hit_delay_ms: mean and SD of the hit delay of a person unknown [ms]; 172–188 ms measured (dissertation, 4.2).
-        p_anywhere: probability that a window starts anywhere in the range instead, for stimulators unlike that one;
-            more in a range that only a part of the usual starts lies in.
+        start: where windows start.
         width_ms: the width; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
-        floor_mv: the EMG floor; 6–20 µV measured, and wide enough for rigs with ten times the gain.
-        floor_cv: its CV; 0.12–0.35 measured.
+        floor: of the EMG floor.
         amplitude: excess at the centre over the floor; MEPs peak at 0.03–0.3 mV (dissertation, 4.2).
         cv: CV of what is evoked; 0.36 above 2 mV, 1.1 below 0.1 mV measured.
-        outliers: mean and SD of the logit of an outlier's probability; about 2 to 7 % of a threshold's false positives.
-        saturation: the largest evoked MEP over the floor; 0.1–0.25 mV in forearm muscles.
-        input_sd: noise on the input: 5–9 % RMT at 0.3 logits a percent, and 1.7 logits a probit.
-        boost: shift of the input at the centre: 5–18 % RMT, in probits.
-        rest: mean and SD of the input without a tap, in probits: 90 % RMT, half-maximal at RMT + 4 %.
+        outliers: logit of an outlier's probability; about 2 to 7 % of a threshold's false positives.
+        input_noise: of the likelihood with noise on the input.
 
     Raises:
-        InvalidValueError: something that is no probability, or a median or SD that is not positive.
+        InvalidValueError: an invalid probability or scale.
     """
 
     p_window: float = 0.75
-    start_ms: tuple[float, float] = (0.0, 125.0)
-    hit_delay_ms: tuple[float, float] = (180.0, 7.0)
-    p_anywhere: float = 0.2
-    width_ms: tuple[float, float] = (100.0, 0.45)
-    floor_mv: tuple[float, float] = (0.009, 0.8)
-    floor_cv: tuple[float, float] = (0.24, 0.4)
-    amplitude: tuple[float, float] = (7.0, 0.8)
-    cv: tuple[float, float] = (0.62, 0.3)
-    outliers: tuple[float, float] = (-3.5, 0.7)
-    saturation: tuple[float, float] = (16.0, 0.6)
-    input_sd: tuple[float, float] = (1.24, 0.25)
-    boost: tuple[float, float] = (1.94, 0.45)
-    rest: tuple[float, float] = (-2.7, 0.35)
+    start: StartPrior = field(default_factory=lambda: StartPrior((0.0, 125.0), (180.0, 7.0), 0.2))
+    width_ms: Scale = Scale(100.0, 0.45)
+    floor: FloorPrior = field(default_factory=FloorPrior)
+    amplitude: Scale = Scale(7.0, 0.8)
+    cv: Scale = Scale(0.62, 0.3)
+    outliers: Scale = Scale(-3.5, 0.7)
+    input_noise: InputNoisePrior = field(default_factory=InputNoisePrior)
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.p_window <= 1.0 and 0.0 <= self.p_anywhere <= 1.0):
-            raise InvalidValueError(
-                "p_window and p_anywhere must be probabilities", got=(self.p_window, self.p_anywhere)
-            )
-        for name in (
-            "hit_delay_ms",
-            "width_ms",
-            "floor_mv",
-            "floor_cv",
-            "amplitude",
-            "cv",
-            "saturation",
-            "input_sd",
-            "boost",
-        ):
-            if not all(math.isfinite(value) and value > 0 for value in getattr(self, name)):
-                raise InvalidValueError(f"{name} must be positive", got=getattr(self, name))
-        if not (self.outliers[1] > 0 and self.rest[1] > 0):
-            raise InvalidValueError("an SD must be positive", got=(self.outliers, self.rest))
-        if not self.start_ms[0] < self.start_ms[1]:
-            raise InvalidValueError("start_ms is empty", got=self.start_ms, expected="earliest < latest")
+        check_numbers(self, "p_window", above=0, most=1)
+        check_scales(self, "width_ms", "amplitude", "cv")
+        check_scales(self, "outliers", positive=False)
 
     def unknowns(self, latents: Tensor, likelihood: Likelihood, space: DesignSpace) -> Unknowns:
         """What standard normal latents mean.
@@ -136,44 +152,26 @@ class WindowPrior:
             space: the design space.
         """
         z = dict(zip(latent_names(likelihood), latents.unbind(-1), strict=True))
-        floor_mv = _log_normal(z["floor"], self.floor_mv)
+        floor_mv = self.floor.mean_mv.log_normal(z["floor"])
+        evoked = self._saturating(z, floor_mv) if likelihood == "input-noise" else self._proportional(z, floor_mv)
+        start_ms, width_ms = self.start.start_ms(z["start"], space), self.width_ms.log_normal(z["width"])
+        floor_cv, p_outlier = self.floor.cv.log_normal(z["floor_cv"]), self.outliers.probability(z["outliers"])
+        return Unknowns(start_ms, width_ms, floor_mv, floor_cv, *evoked, p_outlier)
+
+    def _saturating(self, z: Mapping[str, Tensor], floor_mv: Tensor) -> _Evoked:
+        """Baseline, amplitude, CV, saturation and input SD of a saturating curve."""
+        curve = self.input_noise
+        saturation_mv = floor_mv * curve.saturation.log_normal(z["amplitude"])
+        input_sd, rest = curve.input_sd.log_normal(z["noise"]), curve.rest.normal(z["rest"])
+        # Averaged over its noise, a probit of the input is a probit again, only flatter.
+        blur, boosted = torch.sqrt(1.0 + input_sd.square()), rest + curve.boost.log_normal(z["boost"])
+        at_rest, at_centre = (torch.special.ndtr(x / blur) for x in (rest, boosted))
+        baseline_mv = floor_mv + saturation_mv * at_rest
+        output_cv = torch.full_like(floor_mv, OUTPUT_CV)
+        return baseline_mv, saturation_mv * (at_centre - at_rest), output_cv, saturation_mv, input_sd
+
+    def _proportional(self, z: Mapping[str, Tensor], floor_mv: Tensor) -> _Evoked:
+        """Baseline, amplitude, CV, saturation and input SD where the MEP is in proportion to its level."""
+        amplitude_mv = floor_mv * self.amplitude.log_normal(z["amplitude"])
         ones = torch.ones_like(floor_mv)
-        if likelihood == "input-noise":
-            saturation_mv, input_sd = (
-                floor_mv * _log_normal(z["amplitude"], self.saturation),
-                _log_normal(z["noise"], self.input_sd),
-            )
-            blur = torch.sqrt(1.0 + input_sd.square())
-            rest = self.rest[0] + self.rest[1] * z["rest"]
-            # Averaged over its noise, a probit of the input is a probit again, only flatter.
-            at_rest, at_centre = (
-                torch.special.ndtr(x / blur) for x in (rest, rest + _log_normal(z["boost"], self.boost))
-            )
-            evoked = (
-                floor_mv + saturation_mv * at_rest,
-                saturation_mv * (at_centre - at_rest),
-                OUTPUT_CV * ones,
-                saturation_mv,
-                input_sd,
-            )
-        else:
-            evoked = (
-                floor_mv,
-                floor_mv * _log_normal(z["amplitude"], self.amplitude),
-                _log_normal(z["noise"], self.cv),
-                ones,
-                0.0 * ones,
-            )
-        return Unknowns(
-            start_ms(z["start"], space, self.start_ms, self.hit_delay_ms, self.p_anywhere),
-            _log_normal(z["width"], self.width_ms),
-            floor_mv,
-            _log_normal(z["floor_cv"], self.floor_cv),
-            *evoked,
-            p_outlier=torch.sigmoid(self.outliers[0] + self.outliers[1] * z["outliers"]),
-        )
-
-
-def _log_normal(z: Tensor, median_and_log_sd: tuple[float, float]) -> Tensor:
-    median, log_sd = median_and_log_sd
-    return median * torch.exp(log_sd * z)
+        return floor_mv, amplitude_mv, self.cv.log_normal(z["noise"]), ones, 0.0 * ones

@@ -27,7 +27,6 @@ from isiw.models.shared.tables import ISI_NODES
 
 __all__ = ["MepLaw", "WindowProgram", "nuts_sample"]
 
-WARMUP: Final = 150
 TREE_DEPTH: Final = 6
 """Latents are of the order of one: 63 leaps reach far enough, and a chain between two modes does not take for ever."""
 
@@ -138,7 +137,7 @@ def _ends(trials: History) -> Tensor:
 
 
 def nuts_sample(
-    program: WindowProgram, trials: History, starts: Tensor, draws: int, generator: torch.Generator
+    program: WindowProgram, trials: History, starts: Tensor, draws: int, warmup: int, generator: torch.Generator
 ) -> Tensor:
     """Draw from the posterior, given that there is a window, by the no-U-turn sampler: slow, for reference.
 
@@ -146,7 +145,8 @@ def nuts_sample(
         program: the model.
         trials: of one person, columns of shape (1, n).
         starts: a chain begins at each of these latents, shape (c, d).
-        draws: kept draws of each chain, after `WARMUP` for adaptation.
+        draws: kept draws of each chain.
+        warmup: draws before them, for adaptation.
         generator: source of randomness.
 
     Returns:
@@ -158,7 +158,7 @@ def nuts_sample(
         torch.manual_seed(int(torch.randint(2**31, (1,), generator=generator)))
         for start in starts:
             kernel = NUTS(program, full_mass=True, max_tree_depth=TREE_DEPTH)
-            mcmc = MCMC(kernel, draws, warmup_steps=WARMUP, initial_params={"latents": start}, disable_progbar=True)
+            mcmc = MCMC(kernel, draws, warmup_steps=warmup, initial_params={"latents": start}, disable_progbar=True)
             mcmc.run(trials)
             chains.append(mcmc.get_samples()["latents"])
     return torch.stack(chains)

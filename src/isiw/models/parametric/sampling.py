@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final, Literal
+from typing import Final
 
 import torch
 
+from isiw.checks import check_numbers, check_wholes
 from isiw.models.parametric.ascent import Modes
 from isiw.models.parametric.importance import Effort, Mixture, WeightedDraws, importance_sample, worth
 from isiw.models.parametric.program import WindowProgram, nuts_sample
@@ -16,9 +17,7 @@ from isiw.models.protocol import Tensor
 from isiw.models.randomness import systematic
 from isiw.models.shared.history import History
 
-__all__ = ["Method", "PersonDraws", "sample_person"]
-
-Method = Literal["fast", "nuts"]
+__all__ = ["Chains", "PersonDraws", "sample_person"]
 
 WITHOUT_WINDOW: Final = Effort(scouts=256, starts=2, steps=15, draws=300, enough=200.0)
 """Without a window few latents matter, and there is one mode."""
@@ -26,14 +25,30 @@ WITHOUT_WINDOW: Final = Effort(scouts=256, starts=2, steps=15, draws=300, enough
 LEAST_WORTH: Final = 50.0
 """Draws that are worth fewer independent ones than this are trouble."""
 
-LEAST_SHARE: Final = 0.05
-"""Modes with a smaller share of the evidence get no chain."""
 
-MIN_DRAWS: Final = 50
-"""A chain is at least this long."""
+@dataclass(frozen=True)
+class Chains:
+    """How long the no-U-turn sampler runs.
 
-MAX_R_HAT: Final = 1.1
-"""Chains that disagree by more (Gelman and Rubin, Stat. Sci. 7, 1992) are trouble."""
+    Args:
+        warmup: draws for adaptation.
+        least: a chain has at least so many draws after them.
+        least_share: modes with a smaller share of the evidence get no chain.
+        max_r_hat: chains that disagree by more (Gelman and Rubin, Stat. Sci. 7, 1992) are trouble.
+
+    Raises:
+        InvalidValueError: an invalid number.
+    """
+
+    warmup: int = 150
+    least: int = 50
+    least_share: float = 0.05
+    max_r_hat: float = 1.1
+
+    def __post_init__(self) -> None:
+        check_wholes(self, "warmup", "least", least=1)
+        check_numbers(self, "least_share", least=0, below=1)
+        check_numbers(self, "max_r_hat", above=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,17 +69,22 @@ class PersonDraws:
 
 
 def sample_person(
-    program: WindowProgram, trials: History, method: Method, samples: int, effort: Effort, generator: torch.Generator
+    program: WindowProgram,
+    trials: History,
+    samples: int,
+    effort: Effort,
+    generator: torch.Generator,
+    chains: Chains | None = None,
 ) -> PersonDraws:
     """Draw from the posterior of one person.
 
     Args:
         program: the model.
         trials: columns of shape (1, n).
-        method: where the draws with a window come from.
         samples: how many draws.
         effort: how much work the importance sample with a window is worth.
         generator: source of randomness.
+        chains: where the draws with a window come from Pyro's no-U-turn sampler; None to keep those of the sample.
     """
 
     def log_density(latents: Tensor, present: bool) -> Tensor:  # noqa: FBT001 - the one thing the two models differ in
@@ -87,8 +107,8 @@ def sample_person(
     picks = systematic(log_weights.unsqueeze(0), samples)[0]
     latents, present = torch.cat([model.points for model in kept])[picks], picks < len(kept[0].points)
     # Without trials there is nothing to climb, and Pyro knows no empty plate.
-    if method == "nuts" and bool(present.any()) and trials.isi_ms.numel():
-        latents[present], disagree = _by_nuts(program, trials, with_.modes, int(present.sum()), generator)
+    if chains is not None and bool(present.any()) and trials.isi_ms.numel():
+        latents[present], disagree = _by_nuts(program, trials, with_.modes, int(present.sum()), chains, generator)
         troubles = (*troubles, disagree)
     trouble = " ".join(sentence for sentence in troubles if sentence)
     return PersonDraws(latents, present, float(torch.logsumexp(log_joint, dim=0)), trouble or None)
@@ -111,22 +131,23 @@ def _flattened(drawn: WeightedDraws, log_share: float, which: str) -> tuple[Weig
 
 
 def _by_nuts(
-    program: WindowProgram, trials: History, modes: Modes, size: int, generator: torch.Generator
+    program: WindowProgram, trials: History, modes: Modes, size: int, chains: Chains, generator: torch.Generator
 ) -> tuple[Tensor, str | None]:
     """Draws of a chain of NUTS from each mode that matters, and a sentence if they disagree about the window.
 
     Chains that do not mix say nothing about the modes' shares, so each counts by its mode's evidence.
     """
     shares = torch.softmax(modes.log_evidence, dim=0)
-    shares = shares[shares >= LEAST_SHARE]
-    chains = nuts_sample(program, trials, modes.points[: len(shares)], max(MIN_DRAWS, size // len(shares)), generator)
-    log_weights = (shares / shares.sum() / chains.shape[1]).log().repeat_interleave(chains.shape[1])
+    shares = shares[shares >= chains.least_share]
+    length = max(chains.least, size // len(shares))
+    drawn = nuts_sample(program, trials, modes.points[: len(shares)], length, chains.warmup, generator)
+    log_weights = (shares / shares.sum() / length).log().repeat_interleave(length)
     picks = systematic(log_weights.unsqueeze(0), size)[0]
-    r_hat = _r_hat(chains[..., :2])
+    r_hat = _r_hat(drawn[..., :2])
     disagree = None
-    if r_hat > MAX_R_HAT:
+    if r_hat > chains.max_r_hat:
         disagree = f"The chains of NUTS disagree (R-hat {r_hat:.2f}); each counts by the evidence of its mode."
-    return chains.flatten(0, 1)[picks], disagree
+    return drawn.flatten(0, 1)[picks], disagree
 
 
 def _r_hat(chains: Tensor) -> float:

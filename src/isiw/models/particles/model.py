@@ -13,8 +13,8 @@ from functools import cached_property
 
 import torch
 
+from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
 from isiw.models.particles.likelihood import levels, total_log_likelihood
 from isiw.models.particles.moves import Mover
 from isiw.models.particles.noise import Response, draw_log_mep, log_gain
@@ -28,7 +28,35 @@ from isiw.models.windows import profile_grid, sampled_estimate
 from isiw.types import ArrayLike
 from isiw.window import Window, WindowEstimate
 
-__all__ = ["ParticleModel", "ParticlePosterior"]
+__all__ = ["Moving", "ParticleModel", "ParticlePosterior"]
+
+
+@dataclass(frozen=True)
+class Moving:
+    """How often particles move, and when they are resampled.
+
+    Args:
+        sweeps: sweeps of Markov chain moves after each trial; up to five times as many among the first 25, whose
+            history is short and tells apart the particles most.
+        max_trial_sweeps: sweeps times trials are at most this many, so that a tell stays fast late in a session.
+        min_ess: effective sample size, as a share of the particles, below which they are resampled.
+
+    Raises:
+        InvalidValueError: an invalid number.
+    """
+
+    sweeps: int = 2
+    max_trial_sweeps: int = 240
+    min_ess: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_wholes(self, "sweeps", "max_trial_sweeps", least=0)
+        check_probabilities(self, "min_ess")
+
+    def sweeps_after(self, trials: int) -> int:
+        """How many sweeps follow a trial: more where the history is short, fewer where it has become long."""
+        early = min(5.0, max(1.0, 25 / max(1, trials)))
+        return min(int(self.sweeps * early), max(1, self.max_trial_sweeps // max(1, trials)))
 
 
 @dataclass(frozen=True)
@@ -36,48 +64,34 @@ class ParticleModel:
     """A particle posterior over profile, recruitment and noise; the default model.
 
     Args:
-        beliefs: the prior over people.
+        prior: the prior over people.
         particles: how many particles a person has.
         thinned: how many of them represent the posterior where every candidate ISI is scored.
-        moves: sweeps of Markov chain moves after each trial; up to five times as many among the first 25, whose history
-            is short and tells apart the particles most.
-        max_trial_moves: sweeps times trials are at most this many, so that a tell stays fast late in a session.
-        min_ess: effective sample size, as a share of the particles, below which they are resampled.
+        moves: how often particles move, and when they are resampled.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a told response is known to be above [mV].
         device: torch device.
 
     Raises:
-        InvalidValueError: fewer than two particles, or a number that cannot be.
+        InvalidValueError: fewer than two particles, or an invalid number.
     """
 
-    beliefs: Prior = field(default_factory=Prior)
+    prior: Prior = field(default_factory=Prior)
     particles: int = 1000
     thinned: int = 192
-    moves: int = 2
-    max_trial_moves: int = 240
-    min_ess: float = 0.5
+    moves: Moving = field(default_factory=Moving)
     detection_limit_mv: float = 0.005
     response_threshold_mv: float = 0.02
     device: str = "cpu"
 
     def __post_init__(self) -> None:
-        # Half of the particles move at a time, so that neither half may be empty.
-        for name, least in (("particles", 2), ("thinned", 1), ("moves", 0), ("max_trial_moves", 0)):
-            value = getattr(self, name)
-            if not isinstance(value, int) or value < least:
-                raise InvalidValueError(f"{name} must be a whole number", got=value, expected=f"{least} or more")
-        if not 0.0 <= self.min_ess <= 1.0:
-            raise InvalidValueError("min_ess is a share of the particles", got=self.min_ess, expected="0–1")
-        if not (self.detection_limit_mv > 0 and self.response_threshold_mv > 0):
-            raise InvalidValueError(
-                "a detection limit and a threshold are positive",
-                got=(self.detection_limit_mv, self.response_threshold_mv),
-            )
+        check_wholes(self, "particles", least=2)  # half of them move at a time
+        check_wholes(self, "thinned", least=1)
+        check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
 
-    def prior(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
+    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
         """The posterior before the first trial."""
-        latents = self.beliefs.sample(people, self.particles, step_generator(self.device, seed, 0))
+        latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0))
         size, device = latents.present.shape, latents.present.device
         return ParticlePosterior(
             model=self,
@@ -95,16 +109,16 @@ class ParticleModel:
         after = self.reweighted(posterior, observation)
         generator = step_generator(self.device, posterior.seed, after.trials)
         after = self._resampled(after, generator)
-        mover = Mover(self.beliefs, posterior.space, after.history, generator)
+        mover = Mover(self.prior, posterior.space, after.history, generator)
         latents, log_likelihood = after.latents, after.log_likelihood
-        for _ in range(self._sweeps(after.trials)):
+        for _ in range(self.moves.sweeps_after(after.trials)):
             latents, log_likelihood = mover.sweep(latents, log_likelihood)
         return replace(after, latents=latents, log_likelihood=log_likelihood)
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
         """Draw one person from the prior, and a MEP at each ISI; see `SimulatesPeople`."""
         generator = step_generator(self.device, seed, SIMULATED)
-        person = self.beliefs.person(self.beliefs.sample(1, 1, generator), space)
+        person = self.prior.person(self.prior.sample(1, 1, generator), space)
         isis_ms = torch.as_tensor(isi_ms, dtype=torch.float32, device=self.device).unsqueeze(0)
         gain = log_gain(person.response, torch.arange(isis_ms.shape[-1], dtype=torch.float32, device=self.device))
         log_mep = draw_log_mep(person.response, levels(person, isis_ms), generator, gain)
@@ -126,17 +140,12 @@ class ParticleModel:
             history=posterior.history.appended(trial),
         )
 
-    def _sweeps(self, trials: int) -> int:
-        """More sweeps where the history is short, fewer where it has become long."""
-        early = min(5.0, max(1.0, 25 / max(1, trials)))
-        return min(int(self.moves * early), max(1, self.max_trial_moves // max(1, trials)))
-
     def _resampled(self, posterior: ParticlePosterior, generator: torch.Generator) -> ParticlePosterior:
         """Resample those people whose effective sample size has fallen; nobody else notices."""
         # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
         shuffled = torch.randperm(self.particles, generator=generator, device=generator.device)
         ess = torch.exp(-torch.logsumexp(2.0 * posterior.log_weights, dim=-1, keepdim=True))
-        worn = ess < self.min_ess * self.particles
+        worn = ess < self.moves.min_ess * self.particles
         if not bool(worn.any()):
             return posterior
         kept = torch.arange(self.particles, device=shuffled.device)
@@ -181,7 +190,7 @@ class ParticlePosterior:
     @cached_property
     def person(self) -> Person:
         """What the particles mean."""
-        return self.model.beliefs.person(self.latents, self.space)
+        return self.model.prior.person(self.latents, self.space)
 
     @cached_property
     def _thinned(self) -> PersonSample:
@@ -206,9 +215,7 @@ class ParticlePosterior:
 
     def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> ParticlePosterior:
         """The same particles, weighted by an imagined trial; see `Conditions`."""
-        unknown = torch.full_like(mep_mv, torch.nan)
-        imagined = Observation(isi_ms, mep_mv, isi_sd_ms=torch.zeros_like(mep_mv), response=unknown)
-        return self.model.reweighted(self, imagined)
+        return self.model.reweighted(self, Observation.of(isi_ms, mep_mv))
 
     def log_evidence(self) -> Tensor:
         """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""

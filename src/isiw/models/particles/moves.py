@@ -12,7 +12,7 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.models.particles.likelihood import total_log_likelihood
-from isiw.models.particles.prior import LATENTS, NOISE_LATENTS, SHAPE_LATENTS, Latents, Prior
+from isiw.models.particles.prior import Latents, Prior, block
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 
@@ -75,11 +75,11 @@ class Mover:
             torch.gather(theirs.z, 1, self._pick(people, size, theirs.z.shape[1]).unsqueeze(-1).expand_as(mine.z))
             for _ in range(2)
         )
-        block = torch.bucketize(
+        part = torch.bucketize(
             self._uniform(mine.present), torch.tensor(BLOCK_PROBABILITY, device=mine.z.device).cumsum(0)[:-1]
         ).unsqueeze(-1)
-        is_shape = torch.arange(len(LATENTS), device=mine.z.device) < SHAPE_LATENTS.stop
-        moves = (block == 0) | ((block == 1) & is_shape) | ((block == 2) & ~is_shape)
+        of_profile = block("place", "form", device=mine.z.device)
+        moves = (part == 0) | ((part == 1) & of_profile) | ((part == 2) & ~of_profile)
         scale = torch.where(self._uniform(mine.present) < 0.1, 1.0, 0.15 + 0.7 * self._uniform(mine.present))
         blur = 0.02 * self._normal(mine.z)
         return mine._replace(z=mine.z + moves * (scale.unsqueeze(-1) * (first - second) + blur))
@@ -91,11 +91,10 @@ class Mover:
         which = self._uniform(mine.present)
         new_form, new_window = which < FORM_JUMPS, which >= FORM_JUMPS + NOISE_JUMPS
         new_noise = ~(new_form | new_window)
-        index = torch.arange(len(LATENTS), device=mine.z.device)
         redraw = (
-            (new_form.unsqueeze(-1) & (index == SHAPE_LATENTS.stop - 1))
-            | (new_noise.unsqueeze(-1) & (index >= NOISE_LATENTS.start))
-            | (new_window.unsqueeze(-1) & (index < SHAPE_LATENTS.stop))
+            (new_form.unsqueeze(-1) & block("form", device=mine.z.device))
+            | (new_noise.unsqueeze(-1) & block("noise", device=mine.z.device))
+            | (new_window.unsqueeze(-1) & block("place", "form", device=mine.z.device))
         )
         return Latents(
             z=torch.where(redraw, fresh, mine.z),

@@ -56,12 +56,13 @@ PERSISTENCE = 0.97
 
 
 class NoiseKind(IntEnum):
-    """Where the noise enters."""
+    """Where the noise enters; a recruitment curve is a forearm's muscle's or a hand's."""
 
-    GAIN = 0
+    CONSTANT_CV = 0
     MISSING = 1
-    RECRUITMENT = 2
+    FOREARM = 2
     ALL_OR_NONE = 3
+    HAND = 4
 
 
 class Response(NamedTuple):
@@ -155,7 +156,7 @@ class _Curve(NamedTuple):
 
 
 def _curve(response: Response, gain: Tensor | float = 0.0) -> _Curve:
-    recruits = _is(response, NoiseKind.RECRUITMENT)
+    recruits = _recruits(response)
     width = response.spread.unsqueeze(-1)
     log_gamma, slope = _log_gamma_nodes(response.spread)
     spread = torch.where(recruits, width * _nodes(width), log_gamma - FAR_BELOW)
@@ -170,6 +171,11 @@ def _is(response: Response, kind: NoiseKind) -> Tensor:
     return (response.kind == kind).unsqueeze(-1)
 
 
+def _recruits(response: Response) -> Tensor:
+    """Which particles have a recruitment curve, shape (..., p, 1)."""
+    return _is(response, NoiseKind.FOREARM) | _is(response, NoiseKind.HAND)
+
+
 def _size(response: Response, level: Tensor) -> Tensor:
     """How large a response is, as a share of that at the best ISI, by facilitation (..., p, t)."""
     return torch.where(_is(response, NoiseKind.ALL_OR_NONE), 1.0, level)
@@ -179,7 +185,7 @@ def _drive(response: Response, level: Tensor) -> Tensor:
     """Drive in logits by facilitation (..., p, t)."""
     linear = response.rest.unsqueeze(-1) + response.boost.unsqueeze(-1) * level
     log_size = torch.log(_size(response, level).clamp_min(1e-9))
-    return torch.where(_is(response, NoiseKind.RECRUITMENT), linear, log_size)
+    return torch.where(_recruits(response), linear, log_size)
 
 
 def _response_probability(response: Response, level: Tensor) -> Tensor:
@@ -202,7 +208,7 @@ def evoked_mean(response: Response, level: Tensor) -> Tensor:
     spread = response.spread.unsqueeze(-1) * _nodes(level) / ON_NODES
     share = _over_nodes(torch.sigmoid(_drive(response, level).unsqueeze(-2) + spread.unsqueeze(-1)))
     recruited = share * torch.exp(0.5 * response.output_log_sd.square()).unsqueeze(-1)
-    size = torch.where(_is(response, NoiseKind.RECRUITMENT), recruited, _size(response, level))
+    size = torch.where(_recruits(response), recruited, _size(response, level))
     mean = response.log_ratio.exp().unsqueeze(-1) * size
     return mean * _response_probability(response, level)
 

@@ -14,7 +14,8 @@ from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import highest_facilitation
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
-from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
+from isiw.models.windows import least_excess_mv
+from isiw.window import EDGE_LEVEL
 
 __all__ = ["PersonSample"]
 
@@ -49,8 +50,7 @@ class PersonSample:
         excess = self._evoked - self._evoked[..., :1]
         highest = highest_facilitation(self.person.shape, self.space.low_ms, self.space.high_ms)
         peak = interpolated(excess.unsqueeze(-1), highest.unsqueeze(-1))[..., 0, 0]
-        least_mv = (MIN_EXCESS_OF_BASELINE * self.baselines_mv()).clamp_min(MIN_EXCESS_MV)
-        enough = peak * response.log_floor.exp() >= least_mv
+        enough = least_excess_mv(peak * response.log_floor.exp(), self.baselines_mv()).isfinite()
         share = (excess / peak.clamp_min(1e-12).unsqueeze(-1)).contiguous()
         right = torch.searchsorted(share, torch.full_like(share[..., :1], EDGE_LEVEL)).clamp(1, LEVELS - 1)
         low, high = share.gather(-1, right - 1), share.gather(-1, right)

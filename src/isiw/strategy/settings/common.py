@@ -1,122 +1,229 @@
-"""What the families of strategies share: acquisition functions by name, and when a posterior is known well enough."""
+"""What can be set about a named strategy: the fields of its parts, each under a key of its own.
+
+A family of strategies is a frozen dataclass of three parts: the model, what is asked, and when to stop. The keys that a
+configuration, a log and `make_strategy` know are the names of the parts' fields, so that no setting is written down
+twice. A field that a part marks with `metadata={"spread": True}` gives its own fields keys in its place.
+"""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Final, Protocol
+import difflib
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from typing import Any, Protocol, TypeVar, get_args, get_type_hints
 
-from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep, OwnProposal, RandomIsi, SobolIsi
-from isiw.acquisition.improvement import KnowledgeGradient, LogExpectedImprovement, Thompson, UpperConfidenceBound
-from isiw.acquisition.information import Alternating, MutualInformation, WindowGain, WindowInformation
-from isiw.acquisition.levelset import IntegratedFeasibility, Straddle
+import numpy as np
+
 from isiw.acquisition.protocol import AcquisitionFunction
-from isiw.acquisition.twostep import TwoStep
-from isiw.acquisition.variance import EdgeVariance, IntegratedVariance, ProfileVariance
+from isiw.acquisition.registry import acquisition_named
+from isiw.checks import check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
+from isiw.errors import StrategyError
 from isiw.models.protocol import ResponseModel
 from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, NoWindow, StoppingRule
+from isiw.toml_files import checked
 
-__all__ = ["ACQUISITIONS", "PosteriorSettings", "Settings", "acquisition_named"]
+__all__ = ["Asking", "Setting", "Settings", "Stopping", "settings_from", "settings_keys", "settings_values"]
 
-ACQUISITIONS: Final[Mapping[str, Callable[[int], AcquisitionFunction]]] = {
-    "alternating": lambda _seed: Alternating(),
-    "window-gain": lambda _seed: WindowGain(),
-    "window-information": lambda _seed: WindowInformation(),
-    "mutual-information": lambda _seed: MutualInformation(),
-    "two-step": lambda _seed: TwoStep(),
-    "edge-variance": lambda _seed: EdgeVariance(),
-    "straddle": lambda _seed: Straddle(),
-    "feasibility": lambda _seed: IntegratedFeasibility(),
-    "variance": lambda _seed: ProfileVariance(),
-    "integrated-variance": lambda _seed: IntegratedVariance(),
-    "log-ei": lambda _seed: LogExpectedImprovement(),
-    "ucb": lambda _seed: UpperConfidenceBound(),
-    "thompson": Thompson,
-    "knowledge-gradient": lambda _seed: KnowledgeGradient(),
-    "even": lambda _seed: EvenSpacing(),
-    "sobol": SobolIsi,
-    "random": RandomIsi,
-    "sweep": lambda _seed: IncrementalSweep(),
-    "own": lambda _seed: OwnProposal(),
-}
-"""Acquisition functions by name; each is made with a strategy's seed."""
+_S = TypeVar("_S", bound="Settings")
 
 
-def acquisition_named(name: str, seed: int) -> AcquisitionFunction:
-    """The acquisition function of a name.
+class AskingPart(Protocol):
+    """What is asked: the second part of a strategy's settings."""
 
-    Raises:
-        InvalidValueError: there is none.
-    """
-    if name not in ACQUISITIONS:
-        raise InvalidValueError("there is no such acquisition function", got=name, expected=", ".join(ACQUISITIONS))
-    return ACQUISITIONS[name](seed)
-
-
-class Settings(Protocol):
-    """Settings of one family of strategies: a frozen dataclass whose fields are TOML values.
-
-    Constructing it checks every field, by making the parts once.
-    """
-
-    def model(self) -> ResponseModel:
-        """The model."""
-
-    def acquisition_function(self, seed: int) -> AcquisitionFunction:
+    def function(self, seed: int) -> AcquisitionFunction:
         """The acquisition function."""
-
-    def stopping(self) -> StoppingRule:
-        """When to stop."""
 
     def initial_ms(self, space: DesignSpace) -> tuple[float, ...]:
         """The ISIs to ask for first [ms]."""
 
 
+class StoppingPart(Protocol):
+    """When to stop: the third part of a strategy's settings."""
+
+    def rule(self, initial: int) -> StoppingRule:
+        """The stopping rule, after so many initial trials."""
+
+
+class Settings(Protocol):
+    """Settings of one family of strategies: a frozen dataclass of three parts, whose fields are TOML values."""
+
+    @property
+    def model(self) -> ResponseModel:
+        """The model."""
+
+    @property
+    def asking(self) -> AskingPart:
+        """What is asked."""
+
+    @property
+    def stopping(self) -> StoppingPart:
+        """When to stop."""
+
+
 @dataclass(frozen=True)
-class PosteriorSettings(ABC):
-    """Settings of all families whose model has a posterior of the window.
+class Asking:
+    """What a strategy with a posterior of the window asks.
 
     Args:
-        acquisition: what chooses the next ISI, one of `ACQUISITIONS`.
+        acquisition: what chooses the next ISI, one of `isiw.acquisition.registry.ACQUISITIONS`.
         initial_trials: how many evenly spaced ISIs to ask for first.
+
+    Raises:
+        InvalidValueError: an unknown acquisition function, or an invalid number.
+    """
+
+    acquisition: str = "alternating"
+    initial_trials: int = 0
+
+    def __post_init__(self) -> None:
+        self.function(0)
+        check_wholes(self, "initial_trials", least=0)
+
+    def function(self, seed: int) -> AcquisitionFunction:
+        """The acquisition function."""
+        return acquisition_named(self.acquisition, seed)
+
+    def initial_ms(self, space: DesignSpace) -> tuple[float, ...]:
+        """The middles of equal parts of the range [ms]."""
+        part_ms = (space.high_ms - space.low_ms) / max(1, self.initial_trials)
+        return tuple(space.low_ms + (part + 0.5) * part_ms for part in range(self.initial_trials))
+
+
+@dataclass(frozen=True)
+class Stopping:
+    """When a strategy with a posterior of the window stops.
+
+    Args:
         max_trials: stop after this many stimuli; mistrials count.
         stop_width_ms: stop when the 90 % credible intervals of both edges are at most this wide [ms], under every kind
             of noise that is still probable where the model weighs more than one.
         stop_no_window: stop when "there is no window" is at least this probable.
 
     Raises:
-        InvalidValueError: a value that cannot be.
+        InvalidValueError: an invalid number.
     """
 
-    acquisition: str = "alternating"
-    initial_trials: int = 0
     max_trials: int = 80
     stop_width_ms: float = 30.0
     stop_no_window: float = 0.9
 
     def __post_init__(self) -> None:
-        self.model()
-        self.acquisition_function(0)
-        self.stopping()
-        if isinstance(self.initial_trials, bool) or not isinstance(self.initial_trials, int) or self.initial_trials < 0:
-            raise InvalidValueError("initial_trials must be a whole number from 0 up", got=self.initial_trials)
+        check_wholes(self, "max_trials", least=1)
+        check_numbers(self, "stop_width_ms", above=0)
+        check_numbers(self, "stop_no_window", above=0, most=1)
 
-    @abstractmethod
-    def model(self) -> ResponseModel:
-        """The model."""
-
-    def acquisition_function(self, seed: int) -> AcquisitionFunction:
-        """The acquisition function."""
-        return acquisition_named(self.acquisition, seed)
-
-    def stopping(self) -> StoppingRule:
+    def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - the budget counts from the first stimulus
         """Known well enough, no window, or the budget used up."""
         return AnyOf((CredibleWidth(self.stop_width_ms), NoWindow(self.stop_no_window), Budget(self.max_trials)))
 
-    def initial_ms(self, space: DesignSpace) -> tuple[float, ...]:
-        """The middles of equal parts of the range [ms]."""
-        part_ms = (space.high_ms - space.low_ms) / max(1, self.initial_trials)
-        return tuple(space.low_ms + (part + 0.5) * part_ms for part in range(self.initial_trials))
+
+@dataclass(frozen=True)
+class Setting:
+    """One thing that can be set.
+
+    Args:
+        path: the fields that lead to it, from the family's settings on.
+        owner: the class of the last of them.
+        kind: its type.
+        default: its value where nothing is set.
+    """
+
+    path: tuple[str, ...]
+    owner: type
+    kind: Any
+    default: Any
+
+
+def settings_keys(kind: type[Settings]) -> dict[str, Setting]:
+    """What can be set about a family of strategies, by key.
+
+    Args:
+        kind: the family's settings class.
+    """
+    defaults = kind()
+    parts = ((part.name, getattr(defaults, part.name)) for part in fields(kind))  # type: ignore[arg-type] # a dataclass
+    return {setting.path[-1]: setting for name, part in parts for setting in _settings_of(part, (name,))}
+
+
+def _settings_of(part: Any, path: tuple[str, ...]) -> Iterator[Setting]:
+    kinds = get_type_hints(type(part))
+    for f in fields(part):
+        value = getattr(part, f.name)
+        if f.metadata.get("spread"):
+            yield from _settings_of(value, (*path, f.name))
+        else:
+            yield Setting((*path, f.name), type(part), kinds[f.name], value)
+
+
+def settings_values(settings: Settings) -> dict[str, Any]:
+    """All settings by key, as TOML values."""
+    values = {}
+    for key, setting in settings_keys(type(settings)).items():
+        value: Any = settings
+        for name in setting.path:
+            value = getattr(value, name)
+        if value is not None:  # which TOML does not have
+            values[key] = _plain(value)
+    return values
+
+
+def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
+    """Settings of a family, by key; what is not given is as by default.
+
+    Args:
+        kind: the family's settings class.
+        values: settings by key, as TOML values or as the objects that they stand for; of nested ones a part is enough.
+        name: of the strategy, for messages.
+
+    Raises:
+        StrategyError: a key that the family does not have.
+        ConfigError: a nested key or value that cannot be used.
+        InvalidValueError: an invalid value.
+    """
+    known = settings_keys(kind)
+    for key in values:
+        if key not in known:
+            close = difflib.get_close_matches(key, known, n=1)
+            raise StrategyError(
+                f"the strategy {name!r} has no setting {key!r}",
+                expected=", ".join(known),
+                remedy=f"{f'Did you mean {close[0]}? ' if close else ''}Correct it or remove it.",
+            )
+    settings = kind()
+    for key, value in values.items():
+        settings = _with(settings, known[key].path, _converted(known[key], value, f"the setting {key} of {name}"))
+    return settings
+
+
+def _with(owner: Any, path: tuple[str, ...], value: Any) -> Any:
+    first, *rest = path
+    inner = _with(getattr(owner, first), tuple(rest), value) if rest else value
+    return replace(owner, **{first: inner})
+
+
+def _converted(setting: Setting, value: Any, source: str) -> Any:
+    """The value as the field's type; nested ones are made from what is given and, for the rest, the default."""
+    kind = next((k for k in (setting.kind, *get_args(setting.kind)) if is_dataclass(k)), None)
+    if kind is None or not isinstance(value, Mapping):
+        return value.item() if isinstance(value, np.generic) else value
+    default = {} if setting.default is None else asdict(setting.default)
+    return checked(kind, _merged(default, value), source)  # type: ignore[arg-type] # a dataclass
+
+
+def _merged(default: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """The default, with what is given in its place, nested values merged in the same way."""
+    merged = dict(default)
+    for key, value in given.items():
+        inner = default.get(key)
+        merged[key] = _merged(inner, value) if isinstance(inner, Mapping) and isinstance(value, Mapping) else value
+    return merged
+
+
+def _plain(value: Any) -> Any:
+    """As TOML has it: tables, lists, and plain values."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {key: _plain(inner) for key, inner in asdict(value).items() if inner is not None}
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items()}
+    return [_plain(inner) for inner in value] if isinstance(value, tuple) else value

@@ -2,81 +2,50 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from isiw.acquisition.fixed import OwnProposal
 from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.acquisition.registry import acquisition_named
+from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
 from isiw.models.dissertation.bootstrap import BootstrapFilter
-from isiw.models.dissertation.curves import Floor, FloorKind, Segments
 from isiw.models.dissertation.gpr import GaussianProcessRegression
-from isiw.models.dissertation.incremental import SweepModel, SweepRule
+from isiw.models.dissertation.incremental import SweepModel
 from isiw.models.dissertation.nonlinear import NonlinearRegression
-from isiw.models.dissertation.regression import RegressionMethod, RegressionModel
+from isiw.models.dissertation.regression import RegressionModel
 from isiw.models.dissertation.svr import SupportVectorRegression
-from isiw.strategy.settings.common import acquisition_named
 from isiw.strategy.stopping import AnyOf, Budget, EdgeVariance, ParticleSpread, StoppingRule, SweptPast
 
 __all__ = ["GPRSettings", "NRSettings", "PFSettings", "SVMRSettings", "SweepSettings"]
 
 
 @dataclass(frozen=True)
-class RegressionSettings(ABC):
-    """What the dissertation's regressions have in common (4.3).
+class EvenStart:
+    """What the dissertation's regressions ask (4.3).
 
     Args:
         initial: how many evenly spaced ISIs to begin with, both ends of the range among them.
-        acquisition: what chooses the next ISI, one of `ACQUISITIONS`; the text does not define its own.
-        stop_variance_ms2: stop when the variance [ms²] of the last values of the edges is below this,
-        stop_last: how many values,
-        stop_edges: and of which edges: "both" (the text), or "either" (the pseudo-code).
-        max_iterations: stop after this many stimuli beyond the initial ones; mistrials count.
-        floor: what is done about the floor: "subtracted", "zeroed" or "raw"; see `isiw.models.dissertation.curves.Floor`.
-        threshold_mv: what is "zeroed" below [mV].
-        segments: "all" segments of the window, or the one with the "peak".
+        acquisition: what chooses the next ISI, one of `isiw.acquisition.registry.ACQUISITIONS`; the text does not
+            define its own.
 
     Raises:
-        InvalidValueError: a value that cannot be.
+        InvalidValueError: fewer than two initial ISIs, or an unknown acquisition function.
     """
 
     initial: int = 7
     acquisition: str = "variance"
-    stop_variance_ms2: float = 50.0
-    stop_last: int = 5
-    stop_edges: Literal["both", "either"] = "both"
-    max_iterations: int = 99
-    floor: FloorKind = "subtracted"
-    threshold_mv: float = 0.025
-    segments: Segments = "peak"
 
     def __post_init__(self) -> None:
-        if isinstance(self.initial, bool) or not isinstance(self.initial, int) or self.initial < 2:
-            raise InvalidValueError("initial must be a whole number of at least 2: both ends", got=self.initial)
-        self.model()
-        self.acquisition_function(0)
-        self.stopping()
+        check_wholes(self, "initial", least=2)  # both ends
+        self.function(0)
 
-    @abstractmethod
-    def method(self) -> RegressionMethod:
-        """What fits the curve."""
-
-    def model(self) -> RegressionModel:
-        """The regression."""
-        return RegressionModel(self.method(), Floor(self.floor, self.threshold_mv), self.segments)
-
-    def acquisition_function(self, seed: int) -> AcquisitionFunction:
+    def function(self, seed: int) -> AcquisitionFunction:
         """The acquisition function."""
         return acquisition_named(self.acquisition, seed)
-
-    def stopping(self) -> StoppingRule:
-        """The edges have settled, or the iterations are used up."""
-        settled = EdgeVariance(self.stop_variance_ms2, self.stop_last, self.stop_edges)
-        return AnyOf((settled, Budget(self.initial + self.max_iterations)))
 
     def initial_ms(self, space: DesignSpace) -> tuple[float, ...]:
         """Evenly spaced ISIs, both ends included [ms]."""
@@ -84,69 +53,141 @@ class RegressionSettings(ABC):
 
 
 @dataclass(frozen=True)
-class NRSettings(RegressionSettings):
-    """Nonlinear regression; the rest as in `RegressionSettings`.
+class OwnPlan:
+    """A method that has a plan of its own: nothing can be set."""
 
-    Args:
-        peaks: how many Gaussians, 1 or 2.
-        width_ms: width of a window before anything is known [ms] (mean of Table 4.1).
-        min_width_ms: the narrowest window that is fitted [ms].
-        max_width_ms: the widest [ms].
-        amplitude_mv: amplitude before anything is known [mV]; 0: as much as the largest MEP so far.
-    """
+    def function(self, seed: int) -> AcquisitionFunction:  # noqa: ARG002 - it draws nothing
+        """The method's own proposal."""
+        return OwnProposal()
 
-    initial: int = 6
-    peaks: int = 1
-    width_ms: float = 108.0
-    min_width_ms: float = 40.0
-    max_width_ms: float = 250.0
-    amplitude_mv: float = 0.05
-
-    def method(self) -> NonlinearRegression:
-        """Least squares of Gaussians."""
-        return NonlinearRegression(self.peaks, self.width_ms, self.min_width_ms, self.max_width_ms, self.amplitude_mv)
+    def initial_ms(self, space: DesignSpace) -> tuple[float, ...]:  # noqa: ARG002 - others depend on the space
+        """None: the plan begins with the first trial."""
+        return ()
 
 
 @dataclass(frozen=True)
-class SVMRSettings(RegressionSettings):
-    """Support vector regression; the rest as in `RegressionSettings`. The text gives no hyperparameters.
+class Settling:
+    """When the dissertation's regressions stop (4.3).
 
     Args:
-        c: cost of a residual (scikit-learn's default).
-        epsilon: residual that costs nothing, as a share of the largest excess (scikit-learn's default).
-        length_ms: SD of the kernel [ms] (about half the mean window of Table 4.1).
-        committee: regressions on bootstrapped trials, whose spread stands in for uncertainty.
+        stop_variance_ms2: stop when the variance [ms²] of the last values of the edges is below this,
+        stop_last: how many values,
+        stop_edges: and of which edges: "both" (the text), or "either" (the pseudo-code).
+        max_iterations: stop after this many stimuli beyond the initial ones; mistrials count.
+
+    Raises:
+        InvalidValueError: an invalid number, or another word for the edges.
     """
 
-    c: float = 1.0
-    epsilon: float = 0.1
-    length_ms: float = 50.0
-    committee: int = 10
+    stop_variance_ms2: float = 50.0
+    stop_last: int = 5
+    stop_edges: Literal["both", "either"] = "both"
+    max_iterations: int = 99
 
-    def method(self) -> SupportVectorRegression:
-        """Support vector regression."""
-        return SupportVectorRegression(self.c, self.epsilon, self.length_ms, self.committee)
+    def __post_init__(self) -> None:
+        check_numbers(self, "stop_variance_ms2", above=0)
+        check_wholes(self, "stop_last", least=2)
+        check_choice(self, "stop_edges", ("both", "either"))
+        check_wholes(self, "max_iterations", least=0)
+
+    def rule(self, initial: int) -> StoppingRule:
+        """The edges have settled, or the iterations are used up."""
+        settled = EdgeVariance(self.stop_variance_ms2, self.stop_last, self.stop_edges)
+        return AnyOf((settled, Budget(initial + self.max_iterations)))
 
 
 @dataclass(frozen=True)
-class GPRSettings(RegressionSettings):
-    """Gaussian process regression; the rest as in `RegressionSettings`. The text gives no hyperparameters.
+class Converging:
+    """When the particle filter stops.
 
     Args:
-        length_ms: the kernel's length where the search for it starts [ms].
-        min_length_ms: shortest length [ms]: that of a window of 50 ms.
-        max_length_ms: longest length [ms]: that of a window of 200 ms.
-        noise: noise SD where the search starts, as a share of the largest excess.
+        stop_sd_ms: stop when the SD of the particles is at most this [ms] (4.6).
+        max_trials: stop after this many stimuli; mistrials count (as many as a full conventional search, 4.2.1).
+
+    Raises:
+        InvalidValueError: an invalid number.
     """
 
-    length_ms: float = 40.0
-    min_length_ms: float = 25.0
-    max_length_ms: float = 100.0
-    noise: float = 0.3
+    stop_sd_ms: float = 25.0
+    max_trials: int = 600
 
-    def method(self) -> GaussianProcessRegression:
-        """Gaussian process regression."""
-        return GaussianProcessRegression(self.length_ms, self.min_length_ms, self.max_length_ms, self.noise)
+    def __post_init__(self) -> None:
+        check_numbers(self, "stop_sd_ms", above=0)
+        check_wholes(self, "max_trials", least=1)
+
+    def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - there are no initial ISIs
+        """The particles have converged, or the budget is used up."""
+        return AnyOf((ParticleSpread(self.stop_sd_ms), Budget(self.max_trials)))
+
+
+@dataclass(frozen=True)
+class Passing:
+    """When the incremental sweep stops (4.2.1).
+
+    Args:
+        quiet_ms: stop when nothing was enhanced for so long behind a window [ms]; 0 sweeps the whole budget.
+        max_trials: stop after this many stimuli; mistrials count. Twelve at each 5 ms of 500 ms are 1212.
+
+    Raises:
+        InvalidValueError: an invalid number.
+    """
+
+    quiet_ms: float = 25.0
+    max_trials: int = 1212
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "quiet_ms", least=0)
+        check_wholes(self, "max_trials", least=1)
+
+    def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - there are no initial ISIs
+        """The window was passed, or the budget is used up."""
+        budget = Budget(self.max_trials)
+        return AnyOf((SweptPast(self.quiet_ms), budget)) if self.quiet_ms else budget
+
+
+@dataclass(frozen=True)
+class NRSettings:
+    """Nonlinear regression.
+
+    Args:
+        model: the regression, and the least squares that fit its curve.
+        asking: what is asked.
+        stopping: when to stop.
+    """
+
+    model: RegressionModel = field(default_factory=lambda: RegressionModel(NonlinearRegression()))
+    asking: EvenStart = field(default_factory=lambda: EvenStart(initial=6))
+    stopping: Settling = field(default_factory=Settling)
+
+
+@dataclass(frozen=True)
+class SVMRSettings:
+    """Support vector regression.
+
+    Args:
+        model: the regression, and the support vectors that fit its curve.
+        asking: what is asked.
+        stopping: when to stop.
+    """
+
+    model: RegressionModel = field(default_factory=lambda: RegressionModel(SupportVectorRegression()))
+    asking: EvenStart = field(default_factory=EvenStart)
+    stopping: Settling = field(default_factory=Settling)
+
+
+@dataclass(frozen=True)
+class GPRSettings:
+    """Gaussian process regression.
+
+    Args:
+        model: the regression, and the Gaussian process that fits its curve.
+        asking: what is asked.
+        stopping: when to stop.
+    """
+
+    model: RegressionModel = field(default_factory=lambda: RegressionModel(GaussianProcessRegression()))
+    asking: EvenStart = field(default_factory=EvenStart)
+    stopping: Settling = field(default_factory=Settling)
 
 
 @dataclass(frozen=True)
@@ -154,48 +195,14 @@ class PFSettings:
     """The bootstrap particle filter.
 
     Args:
-        particles: how many particles, and so stimuli a generation (4.4.4: 30 or 40).
-        diffusion_ms: SD of the noise on each particle [ms]; the text gives none.
-        lattice_ms: particles lie on multiples of this [ms] (Fig. 4.20).
-        half_width_ms: the window is the posterior expectation plus and minus this [ms] (4.3.2; Fig. 4.13 has 50).
-        floor: what is done about the floor before a MEP is a weight; the text has MEPs as they are.
-        threshold_mv: what is "zeroed" below [mV].
-        stop_sd_ms: stop when the SD of the particles is at most this [ms] (4.6).
-        max_trials: stop after this many stimuli; mistrials count (as many as a full conventional search, 4.2.1).
-
-    Raises:
-        InvalidValueError: a value that cannot be.
+        model: the filter.
+        asking: nothing can be set.
+        stopping: when to stop.
     """
 
-    particles: int = 30
-    diffusion_ms: float = 10.0
-    lattice_ms: float = 5.0
-    half_width_ms: float = 75.0
-    floor: FloorKind = "raw"
-    threshold_mv: float = 0.025
-    stop_sd_ms: float = 25.0
-    max_trials: int = 600
-
-    def __post_init__(self) -> None:
-        self.model()
-        self.stopping()
-
-    def model(self) -> BootstrapFilter:
-        """The particle filter."""
-        floor = Floor(self.floor, self.threshold_mv)
-        return BootstrapFilter(self.particles, self.diffusion_ms, self.lattice_ms, self.half_width_ms, floor)
-
-    def acquisition_function(self, seed: int) -> OwnProposal:  # noqa: ARG002 - the filter has its own
-        """The particles."""
-        return OwnProposal()
-
-    def stopping(self) -> StoppingRule:
-        """The particles have converged, or the budget is used up."""
-        return AnyOf((ParticleSpread(self.stop_sd_ms), Budget(self.max_trials)))
-
-    def initial_ms(self, space: DesignSpace) -> tuple[float, ...]:  # noqa: ARG002 - others depend on the space
-        """None: the first generation covers the range."""
-        return ()
+    model: BootstrapFilter = field(default_factory=BootstrapFilter)
+    asking: OwnPlan = field(default_factory=OwnPlan)
+    stopping: Converging = field(default_factory=Converging)
 
 
 @dataclass(frozen=True)
@@ -203,52 +210,11 @@ class SweepSettings:
     """The incremental sweep (4.2.1).
 
     Args:
-        step_ms: from one ISI to the next [ms].
-        trials_per_isi: trials at each.
-        discarded: the first so many of them are left out.
-        rule: the window is where means exceed the "baseline", or the 0.135 "share" of the largest excess.
-        neighbours: so many ISIs (an odd number) are averaged before the rule judges them.
-        evidence_se: standard errors by which the largest of them exceeds the baseline where there is a window.
-        floor: what the baseline is.
-        threshold_mv: what is "zeroed" below [mV].
-        quiet_ms: stop when nothing was enhanced for so long behind a window [ms]; 0 sweeps the whole budget.
-        max_trials: stop after this many stimuli; mistrials count. Twelve at each 5 ms of 500 ms are 1212.
-
-    Raises:
-        InvalidValueError: a value that cannot be.
+        model: the means by ISI.
+        asking: nothing can be set.
+        stopping: when to stop.
     """
 
-    step_ms: float = 5.0
-    trials_per_isi: int = 12
-    discarded: int = 2
-    rule: SweepRule = "baseline"
-    neighbours: int = 3
-    evidence_se: float = 3.0
-    floor: FloorKind = "subtracted"
-    threshold_mv: float = 0.025
-    quiet_ms: float = 25.0
-    max_trials: int = 1212
-
-    def __post_init__(self) -> None:
-        self.model()
-        self.stopping()
-
-    def model(self) -> SweepModel:
-        """The means by ISI."""
-        floor = Floor(self.floor, self.threshold_mv)
-        return SweepModel(
-            self.step_ms, self.trials_per_isi, self.discarded, self.rule, self.neighbours, self.evidence_se, floor
-        )
-
-    def acquisition_function(self, seed: int) -> OwnProposal:  # noqa: ARG002 - a sweep has no choice
-        """The next ISI of the sweep."""
-        return OwnProposal()
-
-    def stopping(self) -> StoppingRule:
-        """The window was passed, or the budget is used up."""
-        budget = Budget(self.max_trials)
-        return AnyOf((SweptPast(self.quiet_ms), budget)) if self.quiet_ms else budget
-
-    def initial_ms(self, space: DesignSpace) -> tuple[float, ...]:  # noqa: ARG002 - others depend on the space
-        """None: the sweep begins at the low end."""
-        return ()
+    model: SweepModel = field(default_factory=SweepModel)
+    asking: OwnPlan = field(default_factory=OwnPlan)
+    stopping: Passing = field(default_factory=Passing)

@@ -1,0 +1,201 @@
+"""Checks of values that come from outside: a number, a whole number, a choice, each said and done once.
+
+The plain functions return the value as Python's own type, so that what is compared is what is kept: a subclass of float
+may say anything about itself. The others check fields of a frozen dataclass in its `__post_init__`, and put the plain
+value in their place.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+from numbers import Integral, Real
+from typing import Any, TypedDict, Unpack
+
+from isiw.errors import InvalidValueError
+
+__all__ = [
+    "ascending",
+    "check_choice",
+    "check_numbers",
+    "check_probabilities",
+    "check_wholes",
+    "choice",
+    "deadline",
+    "number",
+    "whole",
+]
+
+
+class Bounds(TypedDict, total=False):
+    """What a number must keep; a bound that is not given is none."""
+
+    above: float
+    least: float
+    below: float
+    most: float
+
+
+def number(what: str, value: object, **bounds: Unpack[Bounds]) -> float:
+    """A finite number within some bounds.
+
+    Args:
+        what: its name, for the message.
+        value: what was given.
+        **bounds: `above` and `below` exclude the bound itself, `least` and `most` include it.
+
+    Raises:
+        InvalidValueError: anything else.
+    """
+    plain = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    if not (math.isfinite(plain) and _within(plain, bounds)):
+        raise InvalidValueError(f"{what} must be {_described('a finite number', bounds)}", got=value)
+    return plain
+
+
+def deadline(what: str, value: object) -> float | None:
+    """A time from 0 up [s], or None, as infinity is, where there is no deadline.
+
+    Args:
+        what: its name, for the message.
+        value: what was given.
+
+    Raises:
+        InvalidValueError: anything else.
+    """
+    return None if value is None or value == math.inf else number(what, value, least=0)
+
+
+def whole(what: str, value: object, **bounds: Unpack[Bounds]) -> int:
+    """A whole number within some bounds.
+
+    Args:
+        what: its name, for the message.
+        value: what was given.
+        **bounds: as for `number`.
+
+    Raises:
+        InvalidValueError: anything else, also a float such as 3.0.
+    """
+    plain = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
+    if plain is None or not _within(plain, bounds):
+        raise InvalidValueError(f"{what} must be {_described('a whole number', bounds)}", got=value)
+    return plain
+
+
+def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
+    """One of some known values.
+
+    Args:
+        what: its name, for the message.
+        value: what was given.
+        known: the values.
+
+    Raises:
+        InvalidValueError: none of them.
+    """
+    values = tuple(known)
+    if not any(value == each and type(value) is type(each) for each in values):
+        raise InvalidValueError(f"{what} is unknown", got=value, expected=" or ".join(map(str, values)))
+    return value
+
+
+def ascending(what: str, values: Iterable[object], **bounds: Unpack[Bounds]) -> tuple[float, ...]:
+    """Numbers of which each is larger than the one before.
+
+    Args:
+        what: their name, for the message.
+        values: what was given.
+        **bounds: of each, as for `number`.
+
+    Raises:
+        InvalidValueError: anything else.
+    """
+    plain = tuple(number(what, value, **bounds) for value in values)
+    if any(later <= earlier for earlier, later in itertools.pairwise(plain)):
+        raise InvalidValueError(f"{what} must ascend", got=plain)
+    return plain
+
+
+def check_numbers(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
+    """Check fields of a frozen dataclass that are numbers.
+
+    Args:
+        owner: the instance.
+        *names: its fields.
+        optional: whether None is allowed.
+        **bounds: as for `number`.
+
+    Raises:
+        InvalidValueError: a field that is not such a number.
+    """
+    for name in names:
+        value = getattr(owner, name)
+        if not (optional and value is None):
+            _put(owner, name, number(f"{type(owner).__name__}.{name}", value, **bounds))
+
+
+def check_probabilities(owner: object, *names: str) -> None:
+    """Check fields of a frozen dataclass that are probabilities; as `check_numbers` with bounds of 0 and 1.
+
+    Args:
+        owner: the instance.
+        *names: its fields.
+
+    Raises:
+        InvalidValueError: a field that is no probability.
+    """
+    check_numbers(owner, *names, least=0.0, most=1.0)
+
+
+def check_wholes(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
+    """Check fields of a frozen dataclass that are whole numbers.
+
+    Args:
+        owner: the instance.
+        *names: its fields.
+        optional: whether None is allowed.
+        **bounds: as for `number`.
+
+    Raises:
+        InvalidValueError: a field that is not such a number.
+    """
+    for name in names:
+        value = getattr(owner, name)
+        if not (optional and value is None):
+            _put(owner, name, whole(f"{type(owner).__name__}.{name}", value, **bounds))
+
+
+def check_choice(owner: object, name: str, known: Iterable[Any]) -> None:
+    """Check a field of a dataclass that is one of some known values.
+
+    Args:
+        owner: the instance.
+        name: its field.
+        known: the values.
+
+    Raises:
+        InvalidValueError: none of them.
+    """
+    choice(f"{type(owner).__name__}.{name}", getattr(owner, name), known)
+
+
+def _put(owner: object, name: str, value: object) -> None:
+    object.__setattr__(owner, name, value)
+
+
+def _within(plain: float, bounds: Bounds) -> bool:
+    return bounds.get("above", -math.inf) < plain < bounds.get("below", math.inf) and bounds.get(
+        "least", -math.inf
+    ) <= plain <= bounds.get("most", math.inf)
+
+
+_WORDS = {"above": "above", "least": "of at least", "below": "below", "most": "of at most"}
+
+
+def _described(kind: str, bounds: Bounds) -> str:
+    if "least" in bounds and "most" in bounds:
+        return f"{kind} from {bounds['least']:g} to {bounds['most']:g}"
+    said = [f"{word} {bounds[name]:g}" for name, word in _WORDS.items() if name in bounds]  # type: ignore[literal-required]
+    return f"{kind} {' and '.join(said)}".strip()

@@ -1,0 +1,61 @@
+"""What is done about the EMG floor before a curve is fitted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from isiw.checks import check_choice, check_numbers
+from isiw.models.shared.history import PersonTrials
+from isiw.types import FloatArray
+
+__all__ = ["FloorKind", "FloorTreatment"]
+
+FloorKind: TypeAlias = Literal["subtracted", "zeroed", "raw"]
+
+
+@dataclass(frozen=True)
+class FloorTreatment:
+    """What an MEP amounts to where the tap does nothing, and what becomes of it before a curve is fitted.
+
+    The dissertation's plots have amplitudes of zero outside the window; it does not say how they came about (4.3).
+
+    Args:
+        floor: `"subtracted"`: the expected MEP of TMS alone is subtracted, or a guess at it where that was not told.
+            `"zeroed"`: an MEP below the threshold is 0. `"raw"`: MEPs as they are; where the floor exceeds 0.135 of the
+            peak, such a curve has no edges.
+        threshold_mv: of `"zeroed"` [mV]; the dissertation's thresholds of a response are 0.015–0.033 mV (4.1.1).
+
+    Raises:
+        InvalidValueError: another kind, or a threshold that is not positive.
+    """
+
+    floor: FloorKind = "subtracted"
+    threshold_mv: float = 0.025
+
+    def __post_init__(self) -> None:
+        check_choice(self, "floor", get_args(FloorKind))
+        check_numbers(self, "threshold_mv", above=0)
+
+    def level_mv(self, trials: PersonTrials) -> float:
+        """What is subtracted from the MEPs of one person [mV].
+
+        The mean of the MEPs of TMS alone; where there are none, the median of all MEPs, since most of the range is
+        outside the window.
+        """
+        if self.floor != "subtracted":
+            return 0.0
+        if len(trials.baseline_mv):
+            return float(trials.baseline_mv.mean())
+        return float(np.median(trials.mep_mv)) if len(trials.mep_mv) else 0.0
+
+    def excess_mv(self, mep_mv: FloatArray, level_mv: FloatArray | float = 0.0) -> FloatArray:
+        """What MEPs have above the floor [mV], broadcast shape.
+
+        Args:
+            mep_mv: the MEPs [mV].
+            level_mv: what is subtracted from them [mV].
+        """
+        return np.where(mep_mv < self.threshold_mv, 0.0, mep_mv) if self.floor == "zeroed" else mep_mv - level_mv

@@ -1,0 +1,68 @@
+"""Scales: what a standard normal latent stands for."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import torch
+
+from isiw.errors import InvalidValueError
+from isiw.models.protocol import Tensor
+
+__all__ = ["Scale", "check_scales"]
+
+
+class Scale(NamedTuple):
+    """A latent z stands for the median plus SD z + tail z³, of the logarithm where the quantity is positive.
+
+    Args:
+        median: the quantity's median.
+        sd: its SD, or that of its natural logarithm.
+        tail: cubic tail. The SD is that of the people who were measured; the tail reaches those whom nobody measured.
+    """
+
+    median: float
+    sd: float
+    tail: float = 0.0
+
+    def normal(self, z: Tensor) -> Tensor:
+        """The quantity at some latents, same shape."""
+        return self.median + self.sd * z + self.tail * z**3
+
+    def log_normal(self, z: Tensor) -> Tensor:
+        """The positive quantity at some latents, same shape."""
+        return torch.exp(Scale(math.log(self.median), self.sd, self.tail).normal(z))
+
+    def probability(self, z: Tensor) -> Tensor:
+        """The probability, whose logit the scale is of, at some latents, same shape."""
+        return torch.sigmoid(self.normal(z))
+
+
+def check_scales(owner: object, *names: str, positive: bool = True) -> None:
+    """Check fields of a frozen dataclass that are scales, and make scales of tuples and lists.
+
+    Args:
+        owner: the instance.
+        *names: its fields.
+        positive: whether the quantities are positive.
+
+    Raises:
+        InvalidValueError: a field that is not a scale.
+    """
+    for name in names:
+        value = tuple(getattr(owner, name))
+        if not _is_scale(value, positive=positive):
+            raise InvalidValueError(
+                f"{type(owner).__name__}.{name} must be a scale",
+                got=value,
+                expected="a median, an SD, and a cubic tail",
+            )
+        object.__setattr__(owner, name, Scale(*map(float, value)))
+
+
+def _is_scale(value: tuple[object, ...], *, positive: bool) -> bool:
+    if not 2 <= len(value) <= 3 or not all(isinstance(x, int | float) and math.isfinite(x) for x in value):
+        return False
+    median, sd, tail = Scale(*value)  # type: ignore[arg-type] # they are numbers
+    return sd > 0 and tail >= 0 and (median > 0 or not positive)

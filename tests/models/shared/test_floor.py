@@ -1,0 +1,41 @@
+"""What is done about the EMG floor."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.models.shared.floor import FloorTreatment
+from isiw.models.shared.history import PersonTrials
+
+
+def trials(mep_mv: list[float], baseline_mv: list[float] | None = None) -> PersonTrials:
+    return PersonTrials(np.arange(float(len(mep_mv))), np.array(mep_mv), np.array(baseline_mv or []))
+
+
+def test_the_floor_is_the_mean_of_the_meps_of_tms_alone_where_there_are_any() -> None:
+    assert FloorTreatment().level_mv(trials([0.1, 0.2], [0.01, 0.03])) == pytest.approx(0.02)
+
+
+def test_without_tms_alone_the_floor_is_the_median_of_all_meps() -> None:
+    assert FloorTreatment().level_mv(trials([0.01, 0.3, 0.02])) == 0.02
+    assert FloorTreatment().level_mv(trials([])) == 0.0
+
+
+@pytest.mark.parametrize("kind", ["zeroed", "raw"])
+def test_only_a_subtracted_floor_is_above_zero(kind: str) -> None:
+    assert FloorTreatment(kind).level_mv(trials([0.1, 0.2], [0.01])) == 0.0
+
+
+def test_what_is_above_the_floor_depends_on_its_kind() -> None:
+    mep_mv = np.array([0.01, 0.03])
+    assert FloorTreatment("subtracted").excess_mv(mep_mv, 0.02).tolist() == pytest.approx([-0.01, 0.01])
+    assert FloorTreatment("zeroed", threshold_mv=0.02).excess_mv(mep_mv, 0.0).tolist() == [0.0, 0.03]
+    assert FloorTreatment("raw").excess_mv(mep_mv, 0.0).tolist() == [0.01, 0.03]
+
+
+@pytest.mark.parametrize("settings", [{"floor": "cut"}, {"threshold_mv": 0.0}, {"threshold_mv": float("nan")}])
+def test_an_unknown_treatment_is_refused(settings: dict[str, object]) -> None:
+    with pytest.raises(InvalidValueError, match=r"floor|threshold_mv"):
+        FloorTreatment(**settings)

@@ -1,0 +1,58 @@
+"""What a standard normal latent stands for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import pytest
+import torch
+
+from isiw.errors import InvalidValueError
+from isiw.models.shared.scales import Scale, check_scales
+
+Z = torch.linspace(-3, 3, 61)
+
+
+@dataclass(frozen=True)
+class Believed:
+    width: Scale = Scale(100.0, 0.4, 0.02)
+    rest: Scale = Scale(-4.5, 0.4)
+
+    def __post_init__(self) -> None:
+        check_scales(self, "width")
+        check_scales(self, "rest", positive=False)
+
+
+def test_the_median_is_that_of_the_quantity_and_the_sd_that_of_its_logarithm() -> None:
+    scale = Scale(100.0, 0.4)
+    assert scale.log_normal(torch.tensor([0.0])).item() == pytest.approx(100.0)
+    assert scale.log_normal(torch.tensor([1.0])).item() == pytest.approx(100.0 * math.exp(0.4))
+    assert scale.normal(torch.tensor([-1.0])).item() == pytest.approx(99.6)
+    assert Scale(0.0, 1.0).probability(torch.tensor([0.0])).item() == 0.5
+
+
+def test_a_tail_reaches_further_and_leaves_the_middle_where_it_is() -> None:
+    plain, tailed = (Scale(0.0, 1.0, tail).normal(Z) for tail in (0.0, 0.1))
+    assert (tailed.diff() > 0).all()
+    assert tailed[-1] - plain[-1] == pytest.approx(2.7)
+    assert (tailed - plain).abs()[Z.abs() < 0.5].max() < 0.02
+
+
+def test_pairs_and_lists_are_scales() -> None:
+    believed = Believed(width=[80, 0.3, 0], rest=(-4, 1))
+    assert believed == Believed(width=Scale(80.0, 0.3, 0.0), rest=Scale(-4.0, 1.0, 0.0))
+    assert isinstance(believed.width, Scale)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [(math.nan, 0.5), (80.0,), (80.0, 0.3, 0.1, 0.1), (80.0, 0.0), (80.0, 0.3, -0.1), (-80.0, 0.3), ("80", 0.3)],
+)
+def test_anything_else_is_refused_by_name(wrong: tuple[object, ...]) -> None:
+    with pytest.raises(InvalidValueError, match=r"Believed\.width"):
+        Believed(width=wrong)
+
+
+def test_only_positive_quantities_need_a_positive_median() -> None:
+    assert Believed(rest=(-80.0, 0.3)).rest.median == -80.0

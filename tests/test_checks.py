@@ -1,0 +1,139 @@
+"""Numbers and choices from outside."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from isiw.checks import (
+    ascending,
+    check_choice,
+    check_numbers,
+    check_probabilities,
+    check_wholes,
+    choice,
+    deadline,
+    number,
+    whole,
+)
+from isiw.errors import InvalidValueError
+
+
+class Boastful(float):
+    """A float that says that it is smaller than it is."""
+
+    def __le__(self, other: object) -> bool:
+        return True
+
+    def __lt__(self, other: object) -> bool:
+        return True
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False, width=32))
+def test_a_number_of_any_kind_becomes_a_plain_float(value: float) -> None:
+    for kind in (float, np.float32, np.float64, Fraction):
+        got = number("x", kind(value))
+        assert type(got) is float
+        assert got == value
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, True, "5", None, 1j, [1.0], np.array([1.0])])
+def test_what_is_not_a_finite_number_is_refused_by_name(value: object) -> None:
+    with pytest.raises(InvalidValueError, match="isi_ms must be a finite number"):
+        number("isi_ms", value)
+
+
+def test_what_is_compared_is_the_plain_number() -> None:
+    with pytest.raises(InvalidValueError, match="of at most 500"):
+        number("isi_ms", Boastful(5000.0), most=500)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "inside", "outside", "words"),
+    [
+        ({"above": 0}, (1e-9, 5), (0, -1), "above 0"),
+        ({"least": 0}, (0, 5), (-1e-9,), "of at least 0"),
+        ({"below": 1}, (0.9,), (1, 2), "below 1"),
+        ({"most": 1}, (1,), (1.1,), "of at most 1"),
+        ({"least": 0, "most": 1}, (0, 0.5, 1), (-0.1, 1.1), "from 0 to 1"),
+        ({"above": 0, "below": 1}, (0.5,), (0, 1), "above 0 and below 1"),
+    ],
+)
+def test_bounds_are_kept_and_said(bounds, inside, outside, words) -> None:
+    for value in inside:
+        assert number("x", value, **bounds) == value
+    for value in outside:
+        with pytest.raises(InvalidValueError, match=f"a finite number {words}"):
+            number("x", value, **bounds)
+
+
+def test_a_whole_number_is_an_integer_of_any_kind() -> None:
+    assert [whole("n", value, least=1) for value in (3, np.int64(3), np.uint8(3))] == [3, 3, 3]
+    assert type(whole("n", np.int64(3))) is int
+
+
+@pytest.mark.parametrize("value", [3.0, True, "3", None, 0, math.nan])
+def test_anything_else_is_not_a_whole_number(value: object) -> None:
+    with pytest.raises(InvalidValueError, match="n must be a whole number of at least 1"):
+        whole("n", value, least=1)
+
+
+def test_infinity_and_none_are_no_deadline() -> None:
+    assert [deadline("deadline_s", value) for value in (None, math.inf, 0, 2.5)] == [None, None, 0.0, 2.5]
+    for wrong in (-1.0, math.nan, -math.inf, "soon"):
+        with pytest.raises(InvalidValueError, match="deadline_s"):
+            deadline("deadline_s", wrong)
+
+
+def test_a_choice_is_one_of_the_known_values() -> None:
+    assert choice("the edges", "both", ("both", "either")) == "both"
+    for wrong in ("one", None, 1):
+        with pytest.raises(InvalidValueError, match=r"the edges is unknown.*both or either"):
+            choice("the edges", wrong, ("both", "either"))
+    with pytest.raises(InvalidValueError, match="peaks"):
+        choice("peaks", 1.0, (1, 2))
+
+
+def test_numbers_ascend() -> None:
+    assert ascending("window", [15, 35]) == (15.0, 35.0)
+    for wrong in ((35, 15), (15, 15), (15, math.nan), (-1, 5)):
+        with pytest.raises(InvalidValueError, match="window must"):
+            ascending("window", wrong, least=0)
+
+
+@dataclass(frozen=True)
+class Checked:
+    width_ms: float = 1.0
+    share: float = 0.5
+    trials: int = 1
+    limit: float | None = None
+    most: int | None = None
+    kind: str = "a"
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "width_ms", above=0)
+        check_numbers(self, "limit", optional=True)
+        check_probabilities(self, "share")
+        check_wholes(self, "trials", least=1)
+        check_wholes(self, "most", optional=True)
+        check_choice(self, "kind", ("a", "b"))
+
+
+def test_fields_become_plain_values() -> None:
+    checked = Checked(width_ms=np.float32(2), trials=np.int64(3), limit=1)
+    assert (checked.width_ms, checked.trials, checked.limit, checked.most) == (2.0, 3, 1.0, None)
+    assert [type(value) for value in (checked.width_ms, checked.trials, checked.limit)] == [float, int, float]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"width_ms": 0}, {"share": 1.5}, {"trials": 0}, {"limit": "x"}, {"most": 2.5}, {"kind": "c"}]
+)
+def test_a_wrong_field_is_named_with_its_class(wrong: dict[str, object]) -> None:
+    with pytest.raises(InvalidValueError, match=rf"Checked\.{next(iter(wrong))}"):
+        Checked(**wrong)
