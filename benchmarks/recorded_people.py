@@ -2,7 +2,7 @@
 
 Profiles and hit delays are those of the cohort `gaussian`; what facilitation does to the amplitude is put together from
 sweeps that were recorded at rest and after stronger pulses. The sweeps (University of Eastern Finland, BSD-3-Clause,
-repository NeuromodulationUEF/MEPFeatX) are not part of this repository.
+repository NeuromodulationUEF/MEPFeatX) are those of the tests.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from isiw.subjects.responses import EmgFloor, ResponseCurve, TrialNoise
 from isiw.subjects.subject import SimulatedSubject
 from isiw.types import ArrayLike, FloatArray
 
-FOLDER = Path("../shared/data/uef")
+FOLDER = Path(__file__).parents[1] / "tests" / "data" / "uef"
 AT_REST_MV = 0.013
 """The forearm's recruitment curve has fourteen sweeps without a MEP, below this."""
 NO_FLOOR = EmgFloor(1e-6, 0.0)

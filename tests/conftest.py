@@ -123,8 +123,5 @@ def scripted_device() -> type[ScriptedDevice]:
 
 @pytest.fixture(scope="session")
 def recordings_folder() -> Path:
-    """The recorded EMG, where it is at hand."""
-    folder = Path(__file__).parents[1].parent / "shared" / "data" / "uef"
-    if not folder.is_dir():
-        pytest.skip("the recorded EMG (../shared/data/uef) is not at hand")
-    return folder
+    """Recorded EMG sweeps."""
+    return Path(__file__).parent / "data" / "uef"

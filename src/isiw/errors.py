@@ -73,6 +73,10 @@ class StudyError(IsiwError):
     """A study that cannot be run, gone on with or read."""
 
 
+class OtherVersionsWarning(UserWarning):
+    """A session goes on with other versions than those it was logged with, and may ask something else than it would."""
+
+
 class LogError(IsiwError):
     """A log that cannot be written or read."""
 

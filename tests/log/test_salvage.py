@@ -8,6 +8,9 @@ import pytest
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.reader import read_session
 from isiw.log.salvage import current_file, salvage
+from isiw.log.schema import Intent, Waveform
+from isiw.log.writer import LogWriter
+from isiw.trials import Channel, Status, Trial
 
 
 def sample(below, size):
@@ -125,3 +128,20 @@ def test_the_part_is_read_where_there_are_both(tmp_path):
 def test_what_can_be_no_file_is_an_error_of_its_own(path):
     with pytest.raises(LogError):
         salvage(path)
+
+
+def test_a_channel_of_the_devices_own_is_known_without_the_block_that_defines_it(tmp_path, header):
+    with LogWriter.create(tmp_path / "s.mcap", header) as log:
+        for trial in range(3):
+            log.append(Intent(trial=trial, isi_ms=5.0))
+            log.sync()
+            log.append(Waveform.of(trial, Channel(np.arange(4.0), 1000.0, "N")), "grip")
+            log.append(Trial(trial, Status.ACCEPTED, 5.0, isi_ms=5.0, mep_mv=0.1))
+            log.sync()
+    whole = bytearray((tmp_path / "s.mcap").read_bytes())
+    blocks = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
+    whole[blocks[2] + 30] ^= 1  # the first with a grip: behind the header and the first intent
+    (tmp_path / "s.mcap").write_bytes(whole)
+    record = read_session(tmp_path / "s.mcap")
+    assert "fails its checksum" in record.losses[0]
+    assert [sorted(record.sweep(trial)) for trial in range(3)] == [[], ["grip"], ["grip"]]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.log.schema import TOPICS, Estimate, Event, Intent, Waveform, decode, encode, json_schema, topic_of
+from isiw.log.schema import CHANNEL_IDS, Estimate, Event, Intent, Waveform, decode, encode, json_schema, topic_of
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, MistrialReason, Status, Trial
 from isiw.window import Window, WindowEstimate
@@ -49,7 +49,7 @@ def test_what_is_not_finite_is_written_as_a_string():
     assert written["end_ms"] == "Infinity"
 
 
-@pytest.mark.parametrize("topic", TOPICS)
+@pytest.mark.parametrize("topic", CHANNEL_IDS)
 def test_every_schema_is_an_object_without_references_to_elsewhere(topic):
     _, schema = json_schema(topic)
     root = json.loads(schema)
@@ -57,9 +57,9 @@ def test_every_schema_is_an_object_without_references_to_elsewhere(topic):
     assert all(f'"$ref": "{outside}' not in schema.decode() for outside in ("http", "file"))
 
 
-def test_the_topics_are_those_of_the_format():
-    own = {"/header", "/intent", "/trial", "/estimate", "/event"}
-    assert set(TOPICS) == own | {"/emg", "/acceleration", "/pressure", "/force", "/valve"}
+def test_the_channel_numbers_are_frozen():
+    topics = ("header", "intent", "trial", "estimate", "event", "emg", "acceleration", "pressure", "force", "valve")
+    assert dict(CHANNEL_IDS) == {f"/{topic}": number for number, topic in enumerate(topics, start=1)}
 
 
 @pytest.mark.parametrize("name", ["trial", "header", "", None])

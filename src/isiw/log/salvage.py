@@ -19,7 +19,7 @@ from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.durable import disk_errors, log_of, part_of
-from isiw.log.schema import TOPICS
+from isiw.log.schema import ANNOUNCEMENT, CHANNEL_IDS
 
 __all__ = ["Message", "Salvage", "current_file", "salvage"]
 
@@ -71,7 +71,7 @@ class Salvage:
     attachments: dict[str, bytes] = field(default_factory=dict)
     losses: list[str] = field(default_factory=list)
     finished: bool = False
-    topics: dict[int, str] = field(default_factory=lambda: dict(enumerate(TOPICS, start=1)))
+    topics: dict[int, str] = field(default_factory=lambda: {number: topic for topic, number in CHANNEL_IDS.items()})
 
 
 def current_file(path: str | Path) -> Path:
@@ -129,11 +129,8 @@ def _read(file: IO[bytes], found: Salvage) -> None:
     readable_to, chunks, sealed = 0, 0, False
     try:
         for record in reader.records:
-            if isinstance(record, mcap.Chunk):
-                _read_chunk(record, readable_to, found)
-                chunks += 1
-            elif isinstance(record, mcap.Attachment):
-                _keep_attachment(record, file, readable_to, found)
+            _keep(record, file, readable_to, found)
+            chunks += isinstance(record, mcap.Chunk)
             readable_to = file.tell()
             sealed = sealed or isinstance(record, mcap.DataEnd)
             found.finished = found.finished or isinstance(record, mcap.Footer)
@@ -152,6 +149,16 @@ def _read(file: IO[bytes], found: Salvage) -> None:
             found.losses.insert(0, f"The log is torn or damaged at byte {readable_to} of {found.size}.")
     if found.finished and not sealed:
         found.losses.append("The mark behind the last record is damaged. No record is affected.")
+
+
+def _keep(record: mcap.McapRecord, file: IO[bytes], start: int, found: Salvage) -> None:
+    """Keep what a record that has just been read holds."""
+    if isinstance(record, mcap.Chunk):
+        _read_chunk(record, start, found)
+    elif isinstance(record, mcap.Attachment):
+        _keep_attachment(record, file, start, found)
+    elif isinstance(record, mcap.Metadata) and record.name.startswith(ANNOUNCEMENT):
+        found.topics[int(record.metadata["id"])] = record.metadata["topic"]
 
 
 def _keep_attachment(attachment: mcap.Attachment, file: IO[bytes], start: int, found: Salvage) -> None:

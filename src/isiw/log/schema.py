@@ -15,7 +15,8 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from types import MappingProxyType
+from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, WithJsonSchema
@@ -31,9 +32,9 @@ from isiw.types import FloatArray
 from isiw.window import Window, WindowEstimate
 
 __all__ = [
-    "CHANNEL_NAMES",
+    "ANNOUNCEMENT",
+    "CHANNEL_IDS",
     "SCHEMA_VERSION",
-    "TOPICS",
     "Estimate",
     "Event",
     "EventKind",
@@ -43,14 +44,16 @@ __all__ = [
     "StrategyRecipe",
     "Waveform",
     "adapter",
+    "announcement",
     "decode",
     "encode",
     "json_schema",
     "topic_of",
 ]
 
-SCHEMA_VERSION = 1
-CHANNEL_NAMES = ("emg", "acceleration", "pressure", "force", "valve")
+SCHEMA_VERSION = 2
+"""2 since 0.1.0: other settings of the strategies, hypotheses by name. Versions before the first release wrote 1."""
+
 PROFILE_DECIMALS = 6  # a nanovolt; the profile is a picture of the posterior, not a measurement
 
 Number: TypeAlias = Annotated[float, WithJsonSchema({"type": ["number", "string"]})]
@@ -228,8 +231,32 @@ _KINDS: dict[str, type[Any]] = {
 }
 _TOPIC_OF_KIND = {kind: topic for topic, kind in _KINDS.items()}
 
-TOPICS = (*_KINDS, *(f"/{name}" for name in CHANNEL_NAMES))
-"""The topics of every log, in the order of their channel numbers from 1."""
+CHANNEL_IDS: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        "/header": 1,
+        "/intent": 2,
+        "/trial": 3,
+        "/estimate": 4,
+        "/event": 5,
+        "/emg": 6,
+        "/acceleration": 7,
+        "/pressure": 8,
+        "/force": 9,
+        "/valve": 10,
+    }
+)
+"""The channel numbers of the topics that every log has. They are frozen: a damaged log is read by them.
+
+Any other topic takes the next free number in its file, and announces it there (`announcement`).
+"""
+
+ANNOUNCEMENT = "channel "
+
+
+def announcement(number: int, topic: str) -> tuple[str, dict[str, str]]:
+    """Name and content of the metadata that say which topic a further channel number has."""
+    return f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic}
+
 
 _ADAPTERS: dict[str, TypeAdapter[Any]] = {topic: TypeAdapter(kind) for topic, kind in _KINDS.items()}
 _WAVEFORM: TypeAdapter[Any] = TypeAdapter(Waveform)

@@ -15,7 +15,7 @@ from mcap.writer import Writer
 from isiw.errors import LogError
 from isiw.log.durable import DurableFile, begun, disk_errors, log_of, part_of, refuse_if_locked, sync_folder
 from isiw.log.salvage import Message, Salvage, current_file
-from isiw.log.schema import TOPICS, Header, Record, encode, json_schema, topic_of
+from isiw.log.schema import CHANNEL_IDS, Header, Record, announcement, encode, json_schema, topic_of
 
 __all__ = ["CONFIGURATION", "LogWriter"]
 
@@ -43,7 +43,7 @@ class LogWriter:
         self._log_time_ns = 0
         self._replaces = False
         self._writer.start(profile="isiw", library="isiw")
-        for topic in TOPICS:
+        for topic in CHANNEL_IDS:
             self._register(topic)
 
     @classmethod
@@ -174,9 +174,12 @@ class LogWriter:
     def _register(self, topic: str) -> int:
         if topic not in self._channels:
             name, schema = json_schema(topic)
-            self._channels[topic] = self._writer.register_channel(
+            number = self._writer.register_channel(
                 topic, "json", self._writer.register_schema(name, "jsonschema", schema)
             )
+            if topic not in CHANNEL_IDS:
+                self._writer.add_metadata(*announcement(number, topic))
+            self._channels[topic] = number
         return self._channels[topic]
 
 

@@ -73,6 +73,12 @@ class SessionResult:
     log: Path
 
 
+def versions() -> dict[str, str]:
+    """The versions that what a strategy asks depends on, by package."""
+    installed = {package: importlib.metadata.version(package) for package in _PACKAGES}
+    return {"isiw": isiw.__version__, "python": platform.python_version()} | installed
+
+
 def learn(strategy: Strategy, trial: Trial) -> None:
     """Tell a strategy one trial, or count it where there is nothing to tell."""
     if trial.told:
@@ -166,7 +172,7 @@ class Session:
             signals=self._signals,
             timeout_s=timeout_s,
             ask_deadline_s=ask_deadline_s,
-            versions={"python": platform.python_version()} | {p: importlib.metadata.version(p) for p in _PACKAGES},
+            versions={name: version for name, version in versions().items() if name != "isiw"},
             config=dict(config or {}),
         )
         self._open_log: Callable[[Header], LogWriter] = partial(LogWriter.create, log)

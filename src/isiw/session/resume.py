@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,12 +11,12 @@ from pathlib import Path
 from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, HasMemory
-from isiw.errors import DeviceError, InvalidValueError, StrategyError
+from isiw.errors import DeviceError, InvalidValueError, OtherVersionsWarning, StrategyError
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Header, Intent
+from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent
 from isiw.log.writer import LogWriter
-from isiw.session.loop import Session, SessionUpdate, learn
+from isiw.session.loop import Session, SessionUpdate, learn, versions
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus, Trial, TrialTable
@@ -49,19 +50,24 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         on_trial: as for `Session`.
         timeout_s: another time for one delivery than the logged one [s].
         ask_deadline_s: another time for one ask than the logged one [s].
-        verify: whether the strategy must ask again what the log says it asked. With other versions or on another
-            machine it may not; without verification the logged trials are told as they are.
+        verify: whether the strategy must ask again what the log says it asked. With other versions than those that
+            were logged a difference is a warning; without verification the logged trials are told as they are.
 
     Raises:
         LogError: no such log, or one of which not even the header can be read.
-        StrategyError: the strategy cannot be made again, or asks something else.
+        StrategyError: the strategy cannot be made again, or asks something else with the same versions.
         DeviceError: a simulated device for a session with a real one, or the other way round.
+
+    Warns:
+        OtherVersionsWarning: with other versions than those that were logged the strategy asks something else.
     """
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
     header = record.header
     _require_as_real(device, header)
     replayed = replay(record, strategy.restarted() if strategy else _strategy_of(header), verify=verify)
+    if replayed.differing:
+        warnings.warn(_differing_text(replayed, header), OtherVersionsWarning, stacklevel=2)
     if isinstance(device, HasMemory):
         device.resume_after([Stimulus(trial.index, trial.commanded_isi_ms) for trial in replayed.trials])
     session = Session(
@@ -96,11 +102,13 @@ class Replayed:
         strategy: the strategy.
         trials: all trials, those with unknown outcome included.
         unknown: the trials whose outcome is not in the log.
+        differing: trials in which it would have asked something else than was logged with other versions.
     """
 
     strategy: Strategy
     trials: TrialTable
     unknown: tuple[Trial, ...]
+    differing: tuple[int, ...] = ()
 
 
 def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) -> Replayed:
@@ -114,16 +122,18 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
         verify: whether to compare what the strategy asks with what it asked then.
 
     Raises:
-        StrategyError: it asks something else.
+        StrategyError: it asks something else, although the versions are those that were logged.
     """
     told: list[Trial] = []
+    differing: list[int] = []
     by_fallback = {event.trial for event in record.events if event.kind == "fallback"}
     for entry in record.history:
         if isinstance(entry, Intent):
             # Behind a lost trial the strategy knew more than the log does.
             comparable = entry.trial == len(told) and entry.trial not in by_fallback
-            if verify and comparable:
-                _verify(strategy, entry, record.header)
+            if verify and comparable and (asked_ms := strategy.ask()) != entry.isi_ms:
+                _require_other_versions(entry, asked_ms, record.header)
+                differing.append(entry.trial)
         elif isinstance(entry, Trial):
             learn(strategy, entry)
             told.append(entry)
@@ -137,7 +147,7 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
     for trial in unknown:
         learn(strategy, trial)
     table = TrialTable(tuple(sorted((*told, *unknown), key=lambda trial: trial.index)))
-    return Replayed(strategy, table, unknown)
+    return Replayed(strategy, table, unknown, tuple(differing))
 
 
 def exclude(path: str | Path, trial: int, reason: str) -> None:
@@ -195,21 +205,35 @@ def _strategy_of(header: Header) -> Strategy:
     return make_strategy(recipe.name, space=header.space, seed=recipe.seed, **recipe.settings)
 
 
-def _verify(strategy: Strategy, intent: Intent, header: Header) -> None:
-    asked_ms = strategy.ask()
-    if asked_ms != intent.isi_ms:
-        versions = ", ".join(f"{name} {version}" for name, version in header.versions.items())
+def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
+    """Raise where the strategy has no reason to ask something else than it did."""
+    if header.schema_version == SCHEMA_VERSION and versions() == {**header.versions, "isiw": header.isiw_version}:
         raise StrategyError(
             f"the strategy does not ask again what was asked in trial {intent.trial}",
             got=f"{asked_ms:g} ms",
-            expected=f"{intent.isi_ms} ms, as logged with isiw {header.isiw_version}, {versions}",
-            remedy="Resume with the same strategy, machine and versions, or without verification: the logged trials "
+            expected=f"{intent.isi_ms} ms, as logged with {_versions_text(header)}",
+            remedy="Resume with the same strategy and on the same machine, or without verification: the logged trials "
             "are then told as they are.",
         )
 
 
+def _versions_text(header: Header) -> str:
+    return ", ".join(f"{name} {version}" for name, version in {"isiw": header.isiw_version, **header.versions}.items())
+
+
+def _differing_text(replayed: Replayed, header: Header) -> str:
+    return (
+        f"The session was logged with {_versions_text(header)}, log schema {header.schema_version}. With the versions "
+        f"installed here the strategy would have asked something else in {len(replayed.differing)} of "
+        f"{len(replayed.trials)} trials. The logged trials count as they were; asks from here on may differ from those "
+        "of an uninterrupted session."
+    )
+
+
 def _resumption_text(record: SessionRecord, replayed: Replayed) -> str:
     sentences = [f"Resumed after {len(replayed.trials)} trials."]
+    if replayed.differing:
+        sentences.append(_differing_text(replayed, record.header))
     if replayed.unknown:
         numbers = ", ".join(str(trial.index) for trial in replayed.unknown)
         sentences.append(f"Outcome unknown: {numbers}.")

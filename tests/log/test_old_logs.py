@@ -1,0 +1,106 @@
+"""Logs that earlier versions wrote, as they wrote them: each opens, is drawn, and goes on."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import warnings
+from pathlib import Path
+
+import pytest
+
+import isiw
+from isiw.errors import OtherVersionsWarning
+from isiw.plots import save_session_plot
+from isiw.report import final_statement
+
+FOLDER = Path(__file__).parents[1] / "data" / "logs"
+LOGS = sorted(path.name for path in FOLDER.glob("*.mcap*"))
+DIGESTS = {
+    "06ce820-default.mcap": "5f90af0009d8aed690ed1dab4200fc1cf24f86c5e1a9d3fef4f42d68bfe69964",
+    "06ce820-killed.mcap.part": "feeb16e3a3b786f7e8959772295c129d5588e80f008121ea5318972c4fd02a92",
+    "217a22d-default.mcap": "c2701192d0ac1669704b44815de8f0f1474758d402a5bd90c4562f74f108ef26",
+    "e31d040-default.mcap": "83587e93485c31eb5620952acd995a7a39f71615834c76714506633e3644f3c5",
+    "e31d040-killed.mcap.part": "7554daa23acf26ecbff3cb96996ea3411159702cdee6656bc2e70cfa66adf254",
+    "e31d040-nr.mcap": "9d815ce87a32f76f4a4bf706e352e8c2a3adea78f279f141fe969a914e067ea1",
+    "e31d040-pf.mcap": "1c78c73e1c6f44db1909f75ab4adcf4e7fe5f5fad4b37941026c5c176c68d69c",
+    "e31d040-resumed.mcap": "290aaecc3a22f95aa72cd5a928820bb192bdffe1b827db11bace82cc1d9f54e3",
+    "e31d040-waveforms.mcap": "3a6af29cdbf3943ea5ff2d794ee29807b36b65322c19bebafb0a29dd7049c07e",
+    "f2fd174-default.mcap": "2a545e6c25d097b6b0960154cc9c85f075f93e389cad11fbe15f05692a2afe09",
+    "f2fd174-killed.mcap.part": "a793ea096e05c2346da3909bcd782a13c6ee70c38c745799f1d11689b5f3113c",
+}
+
+
+def log_of(name: str) -> str:
+    return name.removesuffix(".part")
+
+
+@pytest.fixture
+def copy(tmp_path):
+    def copied(name: str) -> Path:
+        shutil.copyfile(FOLDER / name, tmp_path / name)
+        return tmp_path / log_of(name)
+
+    return copied
+
+
+def person(name: str):
+    if "waveforms" in name:
+        answer = type("Answer", (), {"mep_mv": 0.2})()
+        return isiw.Tapper(lambda _: answer, "subject2", isiw.TapperSettings(rate_hz=1000.0))
+    begun = isiw.subjects.cohort("drift", 1, 3)[0].begin(3)
+    return isiw.SimulatedPerson(lambda isi_ms: begun.respond(isi_ms, "valve"), "valve")
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_it_is_what_it_was(name):
+    assert hashlib.sha256((FOLDER / name).read_bytes()).hexdigest() == DIGESTS[name]
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_it_opens_whole(name):
+    record = isiw.read_session(FOLDER / log_of(name))
+    assert record.losses == ()
+    assert record.finished is not name.endswith(".part")
+    assert record.header.schema_version == 1
+    assert [trial.index for trial in record.table] == list(range(len(record.table)))
+    assert {estimate.trial for estimate in record.estimates} == {trial.index for trial in record.table}
+    assert final_statement(record)
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_it_is_drawn(name, tmp_path):
+    record = isiw.read_session(FOLDER / log_of(name))
+    assert save_session_plot(record, tmp_path / "session.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_it_goes_on(name, copy):
+    log = copy(name)
+    before = isiw.read_session(log)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OtherVersionsWarning)  # the strategies have changed since
+        session = isiw.resume(log, isiw.SimulatedDevice(person(name)))
+    result = session.run()
+    known = [trial for trial in result.trials if trial.index < len(before.table)]
+    assert known == list(before.table)
+    assert len(result.trials) >= len(before.table) + len(before.unknown)
+    after = isiw.read_session(log)
+    assert after.losses == ()
+    assert after.finished
+    assert [trial.index for trial in after.table] == list(range(len(after.table)))
+
+
+def test_the_killed_session_delivers_what_is_left_of_its_budget(copy):
+    log = copy("e31d040-killed.mcap.part")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OtherVersionsWarning)
+        trials = isiw.resume(log, isiw.SimulatedDevice(person("killed"))).run().trials
+    assert len(trials) == 6
+    assert [trial.reason for trial in trials].count("outcome unknown") == 1
+
+
+def test_the_recorded_waveforms_are_there():
+    record = isiw.read_session(FOLDER / "e31d040-waveforms.mcap")
+    assert set(record.sweep(0)) == {"emg", "acceleration", "pressure", "valve"}
+    assert record.sweep(0)["emg"].values.size == 1000
