@@ -29,7 +29,7 @@ from isiw.metrics import trials_to_lasting
 from isiw.plots.study import save_study_plot
 from isiw.studies import Processes, Study, StudyStrategy, conduct, paired_sessions, run_study, summarise
 from isiw.subjects.cohorts import COHORTS
-from oracle import ORACLE_COHORTS, simulate_oracle
+from oracle import SPANS, simulate_oracle
 
 MARKS = (5, 10, 12, 15, 20, 25, 30, 40, 60, 80)
 LASTING = (0.8, 0.9, 0.95)
@@ -161,7 +161,7 @@ def run(study: Study, folder: Path, workers: int, progress: Progress) -> pd.Data
 
 def run_oracle(study: Study, workers: int, progress: Progress) -> pd.DataFrame:
     """The oracle on the same people, in those cohorts whose profiles it knows; their amplitudes as they are."""
-    cohorts = [name for name in study.cohorts if name in ORACLE_COHORTS]
+    cohorts = [name for name in study.cohorts if name in SPANS]
     plan = {"seed": study.seed, "trials": study.trials, "marks": study.marks, "space": study.space}
     sessions = paired_sessions(["oracle"], cohorts, study.people, **plan)
     if not sessions:

@@ -30,7 +30,7 @@ BINS = 72
 
 
 class Spans(NamedTuple):
-    """The windows of a cohort: any start with any width [ms], starts all as likely, widths by their shares."""
+    """The windows of a cohort: start [ms from the impact], width [ms] and share of each, shape (k,)."""
 
     starts_ms: FloatArray
     widths_ms: FloatArray
@@ -41,24 +41,58 @@ def _uniform(low_ms: float, high_ms: float, step_ms: float) -> FloatArray:
     return np.linspace(low_ms, high_ms, round((high_ms - low_ms) / step_ms) + 1)
 
 
-def _usual_spans() -> Spans:
-    widths_ms = np.geomspace(40.0, 230.0, 48)
+def _log_normal(median_ms: float, log_sd: float, low_ms: float, high_ms: float) -> tuple[FloatArray, FloatArray]:
+    """Widths of a clipped log-normal law, and their shares; what is clipped lies at the ends."""
+    widths_ms = np.geomspace(low_ms, high_ms, 48)
     between_ms = np.sqrt(widths_ms[1:] * widths_ms[:-1])
-    below = norm.cdf(np.log(between_ms / 100.0) / 0.42)  # what is clipped lies at the ends
-    return Spans(_uniform(5, 110, 3), widths_ms, np.diff(below, prepend=0.0, append=1.0))
+    below = norm.cdf(np.log(between_ms / median_ms) / log_sd)
+    return widths_ms, np.diff(below, prepend=0.0, append=1.0)
 
 
-def _even_spans(starts_ms: FloatArray, widths_ms: FloatArray) -> Spans:
-    return Spans(starts_ms, widths_ms, np.full(len(widths_ms), 1 / len(widths_ms)))
+def _even(widths_ms: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return widths_ms, np.full(len(widths_ms), 1 / len(widths_ms))
 
 
-USUAL_SPANS: Final = _usual_spans()
-OTHER_SPANS: Final[Mapping[str, Spans]] = {
-    "narrow": _even_spans(_uniform(5, 110, 3), _uniform(35, 50, 1)),
-    "wide": _even_spans(_uniform(5, 110, 3), _uniform(180, 230, 2)),
-    "kim11": _even_spans(_uniform(20, 100, 2.5), np.array(WIDTHS_KIM_MS, dtype=float)),
+def _any_with_any(starts_ms: FloatArray, widths: tuple[FloatArray, FloatArray]) -> Spans:
+    """Any start with any width, starts all as likely."""
+    start, width = (x.ravel() for x in np.meshgrid(starts_ms, widths[0], indexing="ij"))
+    return Spans(start, width, np.tile(widths[1], len(starts_ms)) / len(starts_ms))
+
+
+def _either(*parts: tuple[float, Spans]) -> Spans:
+    columns = zip(*(part._replace(shares=share * part.shares) for share, part in parts), strict=True)
+    return Spans(*(np.concatenate(column) for column in columns))
+
+
+_STARTS: Final = _uniform(5, 110, 3)
+_USUAL: Final = _any_with_any(_STARTS, _log_normal(100.0, 0.42, 40.0, 230.0))
+_LATE: Final = _any_with_any(_uniform(80, 200, 3), _log_normal(100.0, 0.42, 40.0, 230.0))
+_VERY_WIDE: Final = _any_with_any(_uniform(0, 60, 3), _log_normal(200.0, 0.25, 120.0, 320.0))
+
+SPANS: Final[Mapping[str, Spans]] = {
+    **dict.fromkeys(
+        ("gaussian", "low-response", "outliers", "drift", "jitter", "jitter-untold", "recruitment"), _USUAL
+    ),
+    "narrow": _any_with_any(_STARTS, _even(_uniform(35, 50, 1))),
+    "wide": _any_with_any(_STARTS, _even(_uniform(180, 230, 2))),
+    "kim11": _any_with_any(_uniform(20, 100, 2.5), _even(np.array(WIDTHS_KIM_MS, dtype=float))),
+    **dict.fromkeys(("other-rig", "steep", "flat", "weak", "rmt-off", "hand"), _USUAL),
+    "late": _LATE,
+    "very-wide": _VERY_WIDE,
+    "odd": _either((5 / 7, _USUAL), (1 / 7, _LATE), (1 / 7, _VERY_WIDE)),
 }
-"""What `cohorts` says of start and width: of most cohorts, and of those that differ."""
+"""What `cohorts` says of start and width, of the cohorts whose profile's family the oracle knows: one symmetric peak."""
+
+
+def spans_of(cohort: str) -> Spans:
+    """The windows of a cohort.
+
+    Raises:
+        ValueError: the oracle does not know its profiles.
+    """
+    if cohort not in SPANS:
+        raise ValueError(f"the oracle does not know the windows of {cohort}; it knows {', '.join(SPANS)}")
+    return SPANS[cohort]
 
 
 def _quantile_nodes(count: int) -> FloatArray:
@@ -96,10 +130,6 @@ def outcome_table(subject: SimulatedSubject) -> tuple[FloatArray, FloatArray]:
     return edges, mass / mass.sum(1, keepdims=True)
 
 
-ORACLE_COHORTS = ("gaussian", "narrow", "wide", "low-response", "outliers", "drift", "jitter", "recruitment", "kim11")
-"""Cohorts whose profile's family the oracle knows: one symmetric peak."""
-
-
 @dataclass
 class Oracle:
     """One session of the oracle with one person.
@@ -112,12 +142,12 @@ class Oracle:
 
     subject: SimulatedSubject
     space: DesignSpace
-    spans: Spans = USUAL_SPANS
+    spans: Spans
 
     def __post_init__(self) -> None:
         if not isinstance(self.subject.profile, PeakProfile):
             raise TypeError(self.subject.profile)
-        starts, widths = (x.ravel() for x in np.meshgrid(self.spans.starts_ms, self.spans.widths_ms, indexing="ij"))
+        starts, widths = self.spans.starts_ms, self.spans.widths_ms
         shift = self.subject.hit_delay_ms if self.space.reference == "valve" else 0.0
         grid = self.space.grid_ms
         middle, sd = starts + widths / 2 + shift, widths / 4
@@ -126,7 +156,7 @@ class Oracle:
         self._middle, self._sd = middle, sd
         self._level_at = self._levels(self.candidates_ms)
         self._masks = self._windows(self._facilitation(grid))
-        self._log_weights = np.log(np.tile(self.spans.shares, len(self.spans.starts_ms)) / len(self.spans.starts_ms))
+        self._log_weights = np.log(self.spans.shares)
 
     def _windows(self, facilitation: FloatArray) -> BoolArray:
         """Windows by the 0.135 rule, empty where the range reaches too little, shape of `facilitation`."""
@@ -176,5 +206,4 @@ class Oracle:
 
 def simulate_oracle(session: SimulatedSession) -> pd.DataFrame:
     """Run one session of a study with the oracle."""
-    spans = OTHER_SPANS.get(session.cohort, USUAL_SPANS)
-    return play(session, Oracle(session.subject(), session.space, spans))
+    return play(session, Oracle(session.subject(), session.space, spans_of(session.cohort)))

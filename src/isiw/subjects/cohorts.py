@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final
+from types import MappingProxyType
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -21,7 +22,8 @@ WIDTHS_KIM_MS: Final = (75, 65, 80, 70, 110, 120, 220, 145, 135, 110, 60)
 """Window widths of the dissertation's eleven subjects [ms] (Table 4.1)."""
 
 
-_Shape = Callable[[np.random.Generator, float, float], Profile]
+_Pair: TypeAlias = tuple[float, float]
+_Shape: TypeAlias = Callable[[np.random.Generator, float, float], Profile]
 
 
 def _gaussian(_rng: np.random.Generator, start_ms: float, width_ms: float) -> Profile:
@@ -57,21 +59,88 @@ def _gain(rng: np.random.Generator) -> GainResponse:
     return GainResponse(floor, _log_normal(rng, 0.06, 0.5), float(rng.uniform(0.4, 0.9)))
 
 
-def _recruitment(rng: np.random.Generator, boost_pct_rmt: tuple[float, float] = (6, 18)) -> RecruitmentResponse:
-    floor = EmgFloor(_log_normal(rng, 0.010, 0.25), float(rng.uniform(0.12, 0.25)))
-    return RecruitmentResponse(
-        floor,
-        amplitude_mv=_log_normal(rng, 0.16, 0.35),
-        slope_per_pct=0.30,
-        x50_pct_rmt=float(rng.uniform(103, 107)),
-        boost_pct_rmt=float(rng.uniform(*boost_pct_rmt)),
-        sigma_x_pct_rmt=float(rng.uniform(5, 9)),
-        sigma_y=float(rng.uniform(0.3, 0.5)),
-    )
+@dataclass(frozen=True)
+class _Law:
+    """Who has a recruitment curve: pairs are the ends of a uniform law, or median and log SD of a log-normal one.
+
+    The first of those who are drawn by the usual law are the cohort `recruitment`.
+    """
+
+    start_ms: _Pair = (5, 110)
+    width_ms: _Pair = (100, 0.42)
+    width_limits_ms: _Pair = (40, 230)
+    hit_delay_ms: _Pair = (170, 190)
+    amplitude_mv: _Pair = (0.16, 0.35)
+    slope_per_pct: float = 0.30
+    x50_pct_rmt: _Pair = (103, 107)
+    boost_pct_rmt: _Pair = (6, 18)
+    sigma_x_pct_rmt: _Pair = (5, 9)
+    intensity_sd_pct_rmt: float = 0.0
+    intensities_pct_rmt: tuple[float, ...] = (90.0,)
+
+    def response(self, rng: np.random.Generator) -> RecruitmentResponse:
+        floor = EmgFloor(_log_normal(rng, 0.010, 0.25), float(rng.uniform(0.12, 0.25)))
+        return RecruitmentResponse(
+            floor,
+            amplitude_mv=_log_normal(rng, *self.amplitude_mv),
+            slope_per_pct=self.slope_per_pct,
+            x50_pct_rmt=float(rng.uniform(*self.x50_pct_rmt)),
+            boost_pct_rmt=float(rng.uniform(*self.boost_pct_rmt)),
+            sigma_x_pct_rmt=float(rng.uniform(*self.sigma_x_pct_rmt)),
+            sigma_y=float(rng.uniform(0.3, 0.5)),
+        )
+
+    def subject(self, rng: np.random.Generator) -> SimulatedSubject:
+        start_ms = float(rng.uniform(*self.start_ms))
+        width_ms = float(np.clip(_log_normal(rng, *self.width_ms), *self.width_limits_ms))
+        response = self.response(rng)
+        subject = replace(
+            _subject(rng, PeakProfile(start_ms, width_ms), response, self.hit_delay_ms),
+            input_correlation=float(rng.uniform(0, 0.2)),
+        )
+        intensity = float(rng.choice(self.intensities_pct_rmt)) + self.intensity_sd_pct_rmt * rng.standard_normal()
+        return replace(subject, response=replace(response, intensity_pct_rmt=intensity))
 
 
-def _subject(rng: np.random.Generator, profile: Profile, response: ResponseCurve) -> SimulatedSubject:
-    return SimulatedSubject(profile, response, float(rng.uniform(170, 190)), float(rng.uniform(1, 4)))
+_USUAL: Final = _Law()
+
+_OFF_THE_MAP: Final[Mapping[str, _Law]] = MappingProxyType(
+    {
+        "other-rig": _Law(hit_delay_ms=(20, 300)),
+        "late": _Law(start_ms=(80, 200)),
+        "very-wide": _Law(start_ms=(0, 60), width_ms=(200, 0.25), width_limits_ms=(120, 320)),
+        "steep": _Law(sigma_x_pct_rmt=(2, 4), slope_per_pct=0.6),
+        "flat": _Law(sigma_x_pct_rmt=(9, 14), slope_per_pct=0.2),
+        "weak": _Law(boost_pct_rmt=(4, 8)),
+        "rmt-off": _Law(intensity_sd_pct_rmt=6.0),
+        "hand": _Law(
+            amplitude_mv=(1.0, 0.6),
+            slope_per_pct=0.23,
+            x50_pct_rmt=(112, 122),
+            boost_pct_rmt=(8, 24),
+            intensities_pct_rmt=(90.0, 100.0, 110.0),
+        ),
+    }
+)
+"""People whom the usual law does not have."""
+
+_KINDS_OF_ODD: Final = ("other-rig", "late", "very-wide", ("steep", "flat"), "weak", "rmt-off", "hand")
+
+
+def _off_the_map(rng: np.random.Generator, name: str) -> SimulatedSubject:
+    subject = _OFF_THE_MAP[name].subject(rng)
+    return replace(subject, stated_hit_delay_ms=(subject.hit_delay_ms, 6.0)) if name == "other-rig" else subject
+
+
+def _odd(rng: np.random.Generator) -> SimulatedSubject:
+    kind = _KINDS_OF_ODD[int(rng.integers(len(_KINDS_OF_ODD)))]
+    return _off_the_map(rng, kind if isinstance(kind, str) else str(rng.choice(kind)))
+
+
+def _subject(
+    rng: np.random.Generator, profile: Profile, response: ResponseCurve, hit_delay_ms: _Pair = (170, 190)
+) -> SimulatedSubject:
+    return SimulatedSubject(profile, response, float(rng.uniform(*hit_delay_ms)), float(rng.uniform(1, 4)))
 
 
 def _gain_subject(
@@ -90,23 +159,18 @@ def _jitter_subject(rng: np.random.Generator, *, told: bool) -> SimulatedSubject
     return replace(_gain_subject(rng), isi_jitter_ms=float(rng.uniform(1, 5)), jitter_told=told)
 
 
-def _recruitment_subject(rng: np.random.Generator) -> SimulatedSubject:
-    subject = _subject(rng, PeakProfile(*_span(rng)), _recruitment(rng))
-    return replace(subject, input_correlation=float(rng.uniform(0, 0.2)))
-
-
 def _nonresponder(rng: np.random.Generator, *, kind: bool) -> SimulatedSubject:
     profile = PeakProfile(*_span(rng))
     if kind:
         return _subject(rng, profile, replace(_gain(rng), gain_mv=0.0))
-    subject = _subject(rng, profile, replace(_recruitment(rng), boost_pct_rmt=0.0))
+    subject = _subject(rng, profile, replace(_USUAL.response(rng), boost_pct_rmt=0.0))
     return replace(subject, input_correlation=float(rng.uniform(0, 0.2)))
 
 
 def _kim_subject(index: int) -> SimulatedSubject:
     rng = np.random.default_rng([zlib.crc32(b"kim11"), 4, index])
     profile = PeakProfile(float(rng.uniform(20, 100)), WIDTHS_KIM_MS[index])
-    subject = _subject(rng, profile, _recruitment(rng, boost_pct_rmt=(6, 14)))
+    subject = _subject(rng, profile, replace(_USUAL, boost_pct_rmt=(6, 14)).response(rng))
     return replace(subject, input_correlation=float(rng.uniform(0, 0.2)))
 
 
@@ -122,7 +186,9 @@ _DRAW: Final[dict[str, Callable[[np.random.Generator], SimulatedSubject]]] = {
     "drift": lambda rng: replace(_gain_subject(rng), drift=Drift()),
     "jitter": partial(_jitter_subject, told=True),
     "jitter-untold": partial(_jitter_subject, told=False),
-    "recruitment": _recruitment_subject,
+    "recruitment": _USUAL.subject,
+    **{name: partial(_off_the_map, name=name) for name in _OFF_THE_MAP},
+    "odd": _odd,
 }
 
 COHORTS: Final = (*_DRAW, "nonresponder", "kim11")

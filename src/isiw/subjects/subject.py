@@ -69,6 +69,8 @@ class SimulatedSubject:
         isi_jitter_ms: SD of the realised about the commanded ISI, beside the hit delay's [ms].
         jitter_told: whether the jittered ISI is told, or the commanded one with its SD.
         scale: factor on every amplitude.
+        stated_hit_delay_ms: mean and SD of the hit delay that the rig states, where it knows itself [ms]; by default
+            the tapping robot's, over people.
     """
 
     profile: Profile
@@ -81,6 +83,7 @@ class SimulatedSubject:
     isi_jitter_ms: float = 0.0
     jitter_told: bool = True
     scale: float = 1.0
+    stated_hit_delay_ms: tuple[float, float] = (180.0, 6.0)
 
     def facilitation(self, isi_ms: FloatArray, reference: Reference) -> FloatArray:
         """Facilitation in 0–1 at ISIs on a reference [ms], at the mean hit delay; same shape."""
