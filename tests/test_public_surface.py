@@ -9,17 +9,17 @@ import isiw
 
 
 @pytest.mark.parametrize("name", isiw.__all__)
-def test_every_public_name_is_there(name):
+def test_every_public_name_is_there(name) -> None:
     assert getattr(isiw, name) is not None
     assert name in {"__version__", *dir(isiw)}
 
 
-def test_an_unknown_name_is_an_attribute_error():
+def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="windwo"):
         isiw.windwo  # noqa: B018
 
 
-def test_the_surface_that_lab_software_relies_on_is_pinned():
+def test_the_surface_that_lab_software_relies_on_is_pinned() -> None:
     assert {
         "CallbackDevice", "DesignSpace", "Device", "DeviceInfo", "Limits", "Measurement", "Session", "Stimulus",
         "StopDecision", "Sweep", "Trial", "TrialTable", "VirtualClock", "Window", "WindowEstimate", "errors",
@@ -28,6 +28,6 @@ def test_the_surface_that_lab_software_relies_on_is_pinned():
     } <= set(isiw.__all__)  # fmt: skip
 
 
-def test_importing_isiw_loads_nothing_heavy():
+def test_importing_isiw_loads_nothing_heavy() -> None:
     heavy = "{'torch', 'numpy', 'pandas', 'matplotlib', 'scipy', 'pydantic'}"
     subprocess.run([sys.executable, "-c", f"import sys, isiw; assert not {heavy} & set(sys.modules)"], check=True)  # noqa: S603

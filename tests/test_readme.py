@@ -16,7 +16,7 @@ def blocks(language):
     return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
 
 
-def test_the_python_examples_run_one_after_the_other(tmp_path, monkeypatch, capsys):
+def test_the_python_examples_run_one_after_the_other(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     assert len(blocks("python")) == 4
     for block in blocks("python"):
@@ -26,27 +26,27 @@ def test_the_python_examples_run_one_after_the_other(tmp_path, monkeypatch, caps
     assert "nothing is missing" in printed
 
 
-def test_a_copied_device_waits_between_its_trials():
+def test_a_copied_device_waits_between_its_trials() -> None:
     assert "simulated=" not in "".join(blocks("python"))
 
 
-def test_the_examples_are_as_short_as_promised():
+def test_the_examples_are_as_short_as_promised() -> None:
     for block in blocks("python")[:1]:
         assert len([line for line in block.splitlines() if line.strip()]) <= 20
 
 
-def test_the_configuration_is_valid(tmp_path):
+def test_the_configuration_is_valid(tmp_path) -> None:
     (block,) = blocks("toml")
     (tmp_path / "session.toml").write_text(block)
     config = load_config(tmp_path / "session.toml")
     assert config.strategy.settings["max_trials"] == tomllib.loads(block)["strategy"]["settings"]["max_trials"]
 
 
-def test_there_are_exactly_two_commands_to_set_up():
+def test_there_are_exactly_two_commands_to_set_up() -> None:
     commands = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("pip")]
     assert commands == ["pip install -e . && isiw run", 'pip install -e ".[test]" && pytest']
 
 
-def test_every_linked_file_exists():
+def test_every_linked_file_exists() -> None:
     for target in re.findall(r"\]\((?!http)([^)]+)\)", TEXT):
         assert (ROOT / target).is_file(), target

@@ -47,7 +47,7 @@ TABLE = {
 
 
 @pytest.mark.parametrize("name", TABLE)
-def test_the_presets_reproduce_the_event_table_by_detection_on_their_waveforms(name):
+def test_the_presets_reproduce_the_event_table_by_detection_on_their_waveforms(name) -> None:
     expected, taps = TABLE[name]
     table = study_preset(name, taps=taps, isi_ms=(), seed=1).event_table
     assert set(table.index) == set(expected)
@@ -58,7 +58,7 @@ def test_the_presets_reproduce_the_event_table_by_detection_on_their_waveforms(n
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_the_gaussian_preset_has_the_pooled_isi_error_and_no_mistrials(seed):
+def test_the_gaussian_preset_has_the_pooled_isi_error_and_no_mistrials(seed) -> None:
     study = study_preset("cushion", seed=seed)
     assert len(study.commanded_ms) == 900
     assert study.pooled_sd_ms == pytest.approx(1.93, abs=0.3)
@@ -67,13 +67,13 @@ def test_the_gaussian_preset_has_the_pooled_isi_error_and_no_mistrials(seed):
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_the_timing_fault_preset_has_negative_isis_at_10_ms_only(seed):
+def test_the_timing_fault_preset_has_negative_isis_at_10_ms_only(seed) -> None:
     table = study_preset("timing-fault", seed=seed).error_table
     assert table.loc[10.0, "mistrials"] == pytest.approx(8, abs=5)
     assert (table.drop(10.0)["mistrials"] == 0).all()
 
 
-def test_a_mistrial_counts_and_is_left_out_of_the_statistics():
+def test_a_mistrial_counts_and_is_left_out_of_the_statistics() -> None:
     commanded = np.array([10.0, 10.0, 10.0, 10.0, np.nan])
     table = error_table(commanded, np.array([11.0, 9.5, -3.0, np.nan, 5.0]))
     assert table.loc[10.0].to_dict() == pytest.approx(
@@ -81,7 +81,7 @@ def test_a_mistrial_counts_and_is_left_out_of_the_statistics():
     )
 
 
-def test_an_event_that_was_never_found_is_not_in_the_table():
+def test_an_event_that_was_never_found_is_not_in_the_table() -> None:
     nowhere = np.full(3, np.nan)
     events = TapEvents(nowhere, nowhere, np.array([680.0, 682.0, np.nan]), nowhere, nowhere)
     table = event_table(events)
@@ -89,7 +89,7 @@ def test_an_event_that_was_never_found_is_not_in_the_table():
     assert table.loc["hit", ["mean_ms", "low_ms", "high_ms", "n"]].tolist() == [681.0, 680.0, 682.0, 2.0]
 
 
-def test_the_pooled_sd_leaves_the_means_of_the_sets_out():
+def test_the_pooled_sd_leaves_the_means_of_the_sets_out() -> None:
     study = study_preset("subject4", taps=50, isi_ms=(30.0, 60.0), seed=3)
     shifted = type(study)(
         "shifted", study.events, study.commanded_ms, study.realised_ms + np.where(study.commanded_ms > 40, 7.0, 0.0)
@@ -98,14 +98,14 @@ def test_the_pooled_sd_leaves_the_means_of_the_sets_out():
 
 
 @pytest.mark.parametrize("lost", [(), (10.0,), (10.0, 20.0, 30.0)])
-def test_an_isi_of_which_every_trial_is_lost_leaves_the_pooled_sd_as_it_is(lost):
+def test_an_isi_of_which_every_trial_is_lost_leaves_the_pooled_sd_as_it_is(lost) -> None:
     commanded = np.array([50.0, 50.0, 50.0, *lost])
     realised = np.array([49.0, 50.0, 51.0, *(-1.0 for _ in lost)])
     events = TapEvents(*(np.full(len(commanded), np.nan) for _ in range(5)))
     assert TimingStudy("hand-made", events, commanded, realised).pooled_sd_ms == pytest.approx(1.0)
 
 
-def test_recorded_sweeps_are_studied_like_a_preset():
+def test_recorded_sweeps_are_studied_like_a_preset() -> None:
     class Silent:
         mep_mv = 0.0
 
@@ -125,7 +125,7 @@ def on_the_pulses_clock(sweep):
     return replace(sweep, channels=channels, t_valve_ms=sweep.t_valve_ms - pulse_ms, t_tms_ms=0.0)
 
 
-def test_a_sweep_clock_that_begins_elsewhere_changes_nothing():
+def test_a_sweep_clock_that_begins_elsewhere_changes_nothing() -> None:
     class Silent:
         mep_mv = 0.0
 
@@ -140,7 +140,7 @@ def test_a_sweep_clock_that_begins_elsewhere_changes_nothing():
     assert usual.event_table.loc["hit", "mean_ms"] == pytest.approx(682, abs=2.0)
 
 
-def test_a_logged_session_is_studied_like_a_preset(tmp_path, scripted_strategy):
+def test_a_logged_session_is_studied_like_a_preset(tmp_path, scripted_strategy) -> None:
     class Silent:
         mep_mv = 0.0
 
@@ -159,7 +159,7 @@ def test_a_logged_session_is_studied_like_a_preset(tmp_path, scripted_strategy):
 
 @pytest.mark.parametrize("fault", [0.0, np.nan])
 @pytest.mark.parametrize("name", ["acceleration", "emg"])
-def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path, scripted_strategy, name, fault):
+def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path, scripted_strategy, name, fault) -> None:
     class Silent:
         mep_mv = 0.0
 
@@ -182,7 +182,7 @@ def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path, scripted_st
     assert "4 taps" in timing_report(study)
 
 
-def test_the_report_says_all_of_it():
+def test_the_report_says_all_of_it() -> None:
     study = study_preset("cushion", taps=10, seed=4)
     report = timing_report(study)
     assert "90 taps" in report
@@ -190,13 +190,13 @@ def test_the_report_says_all_of_it():
     assert all(f"\n{isi:7g}" in report for isi in STUDY_ISI_MS)
 
 
-def test_a_study_of_nothing_is_an_error():
+def test_a_study_of_nothing_is_an_error() -> None:
     with pytest.raises(InvalidValueError, match="taps must be"):
         study_preset("bench", taps=0)
     with pytest.raises(InvalidValueError, match="needs sweeps"):
         study_sweeps("nothing", [], [])
 
 
-def test_a_seed_that_is_none_is_refused():
+def test_a_seed_that_is_none_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="seed"):
         study_preset("subject1", taps=1, seed=-1)

@@ -7,7 +7,7 @@ from isiw.errors import InvalidValueError
 from isiw.response_counts import STIMULATION, effective_window, response_counts, study_counts
 
 
-def test_responses_are_counted_by_isi():
+def test_responses_are_counted_by_isi() -> None:
     counts = response_counts([20, 10, 10, 20, 20], [0.05, 0.01, 0.04, 0.06, 0.02], threshold_mv=0.03)
     assert counts.index.tolist() == [10.0, 20.0]
     assert counts["trials"].tolist() == [2, 3]
@@ -15,23 +15,23 @@ def test_responses_are_counted_by_isi():
     assert counts["share"].tolist() == pytest.approx([1 / 2, 2 / 3])
 
 
-def test_exactly_40_percent_is_not_effective():
+def test_exactly_40_percent_is_not_effective() -> None:
     counts = response_counts([0] * 5 + [5] * 5, [1, 1, 0, 0, 0, 1, 1, 1, 0, 0], threshold_mv=0.5)
     window = effective_window(counts)
     assert (window.start_ms, window.end_ms) == (5.0, 5.0)
 
 
-def test_no_responses_make_no_window():
+def test_no_responses_make_no_window() -> None:
     assert effective_window(response_counts([0, 5, 10], [0.0, 0.01, 0.0], threshold_mv=0.03)) is None
 
 
 @pytest.mark.parametrize(("kind", "width_ms"), [("electrical", 20.0), ("mechanical", 50.0)])
-def test_the_two_kinds_of_stimulation_have_the_widths_of_the_dissertation(kind, width_ms):
+def test_the_two_kinds_of_stimulation_have_the_widths_of_the_dissertation(kind, width_ms) -> None:
     study = study_counts(STIMULATION[kind], np.arange(0.0, 140.0), trials=300, seed=1)
     assert (study.counts["share"] > 0.4).sum() == pytest.approx(width_ms, abs=4)
 
 
-def test_the_window_depends_on_the_threshold():
+def test_the_window_depends_on_the_threshold() -> None:
     widths = [
         study_counts(STIMULATION["mechanical"], np.arange(0.0, 140.0, 5.0), trials=200, threshold_mv=threshold, seed=1)
         for threshold in (0.02, 0.03, 0.05)
@@ -43,6 +43,6 @@ def test_the_window_depends_on_the_threshold():
 @pytest.mark.parametrize(
     ("isi", "mep", "threshold"), [([1, 2], [1], 0.1), ([1], [np.nan], 0.1), ([1], [1], 0.0), ([np.inf], [1], 0.1)]
 )
-def test_what_cannot_be_counted_is_an_error(isi, mep, threshold):
+def test_what_cannot_be_counted_is_an_error(isi, mep, threshold) -> None:
     with pytest.raises(InvalidValueError):
         response_counts(isi, mep, threshold)

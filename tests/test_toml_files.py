@@ -21,7 +21,7 @@ class Whole:
     people: int = 3
 
 
-def test_values_become_the_dataclass():
+def test_values_become_the_dataclass() -> None:
     assert checked(Whole, {"parts": [{"name": "a"}], "people": 4}, "f.toml") == Whole((Part("a"),), 4)
 
 
@@ -34,12 +34,12 @@ def test_values_become_the_dataclass():
         ({"people": 3}, r"the key parts is missing"),
     ],
 )
-def test_what_is_wrong_is_named(values, message):
+def test_what_is_wrong_is_named(values, message) -> None:
     with pytest.raises(ConfigError, match=message):
         checked(Whole, values, "f.toml")
 
 
-def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path):
+def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path) -> None:
     (tmp_path / "broken.toml").write_text("people = = 3")
     with pytest.raises(ConfigError, match=r"broken\.toml is not valid TOML"):
         read_toml(tmp_path / "broken.toml")

@@ -40,25 +40,25 @@ def table():
     return TrialTable(tuple(trials))
 
 
-def test_a_simulated_device_conforms(space):
+def test_a_simulated_device_conforms(space) -> None:
     check_device(lambda: SimulatedDevice(SimulatedPerson(responder(), "valve")), space)
 
 
-def test_a_device_of_recorded_sweeps_conforms(space):
+def test_a_device_of_recorded_sweeps_conforms(space) -> None:
     check_device(lambda: SimulatedDevice(RecordedPerson(responder(), "valve", made_up_recordings(), seed=1)), space)
 
 
-def test_a_replaying_device_conforms(space):
+def test_a_replaying_device_conforms(space) -> None:
     check_device(lambda: SimulatedDevice(RecordedTrials(table(), "valve")), space)
 
 
-def test_a_device_of_functions_conforms(space):
+def test_a_device_of_functions_conforms(space) -> None:
     info = DeviceInfo("functions", "valve")
     device = CallbackDevice(lambda stimulus, timeout_s: Measurement(timeout_s, stimulus.isi_ms), info)
     check_device(lambda: device, space, clock=VirtualClock())
 
 
-def test_a_limited_device_conforms(space):
+def test_a_limited_device_conforms(space) -> None:
     limits = Limits.of_space(space, min_iti_s=0.0)
     device = SimulatedDevice(SimulatedPerson(responder(), "valve"))
     check_device(lambda: LimitedDevice(device, limits, VirtualClock()), space)
@@ -67,7 +67,7 @@ def test_a_limited_device_conforms(space):
 class Careless(SimulatedDevice):
     """Fires although it is stopped."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__(SimulatedPerson(responder(), "valve"))
 
     def deliver(self, stimulus, timeout_s):
@@ -78,7 +78,7 @@ class Careless(SimulatedDevice):
 class Forgetful(SimulatedDevice):
     """Begins anew instead of resuming."""
 
-    def resume_after(self, stimuli):
+    def resume_after(self, stimuli) -> None:
         del stimuli
 
 
@@ -91,22 +91,22 @@ class Inaccurate(SimulatedDevice):
         return Measurement(answer.mep_mv, late_ms)
 
 
-def test_the_suite_finds_a_device_that_fires_unarmed(space):
+def test_the_suite_finds_a_device_that_fires_unarmed(space) -> None:
     with pytest.raises(AssertionError, match=r"before stage\(\)"):
         check_device(Careless, space)
 
 
-def test_the_suite_finds_a_device_that_cannot_resume(space):
+def test_the_suite_finds_a_device_that_cannot_resume(space) -> None:
     with pytest.raises(AssertionError, match="never been interrupted"):
         check_device(lambda: Forgetful(SimulatedPerson(responder(), "valve")), space)
 
 
-def test_the_suite_finds_a_device_with_wrong_timing(space):
+def test_the_suite_finds_a_device_with_wrong_timing(space) -> None:
     with pytest.raises(AssertionError, match=r"ISI off .* 20.* ms for 0"):
         check_device(lambda: Inaccurate(SimulatedPerson(responder(), "valve")), space)
 
 
-def test_the_suite_finds_a_device_on_another_reference(space):
+def test_the_suite_finds_a_device_on_another_reference(space) -> None:
     with pytest.raises(AssertionError, match="reference"):
         check_device(lambda: SimulatedDevice(SimulatedPerson(responder("impact"), "impact")), space)
 
@@ -114,14 +114,14 @@ def test_the_suite_finds_a_device_on_another_reference(space):
 class Hardware:
     """Stays armed until it is told otherwise, fails at one delivery, and remembers when it fired."""
 
-    def __init__(self, fails_at=None, clock=None):
+    def __init__(self, fails_at=None, clock=None) -> None:
         self.fails_at, self.clock = fails_at, clock or VirtualClock()
         self.armed, self.taken, self.fired_s = False, False, []
 
     def describe(self):
         return DeviceInfo("hardware", "valve")
 
-    def stage(self):
+    def stage(self) -> None:
         self.armed = self.taken = True
 
     def deliver(self, stimulus, timeout_s):
@@ -133,17 +133,17 @@ class Hardware:
             raise DeviceTimeoutError("no answer")
         return Measurement(0.1, stimulus.isi_ms)
 
-    def stop(self):
+    def stop(self) -> None:
         self.armed = False
 
-    def unstage(self):
+    def unstage(self) -> None:
         self.armed = self.taken = False
 
 
 class RememberingHardware(Hardware):
     """Has a memory."""
 
-    def resume_after(self, stimuli):
+    def resume_after(self, stimuli) -> None:
         del stimuli
 
 
@@ -163,7 +163,7 @@ class LateHardware(Hardware):
         (LateHardware(), AssertionError),
     ],
 )
-def test_a_device_that_fails_the_suite_is_left_disarmed(space, device, error):
+def test_a_device_that_fails_the_suite_is_left_disarmed(space, device, error) -> None:
     with pytest.raises(error):
         check_device(lambda: device, space, clock=VirtualClock())
     assert device.fired_s
@@ -171,28 +171,28 @@ def test_a_device_that_fails_the_suite_is_left_disarmed(space, device, error):
     assert not device.taken
 
 
-def test_an_inter_trial_interval_passes_before_each_delivery(space):
+def test_an_inter_trial_interval_passes_before_each_delivery(space) -> None:
     device = RememberingHardware()
     check_device(lambda: device, space, clock=device.clock)
     assert len(device.fired_s) == 8
     assert np.diff([0.0, *device.fired_s]).min() >= 5.0
 
 
-def test_the_suite_waits_in_real_time_for_a_device_that_is_not_simulated(space):
+def test_the_suite_waits_in_real_time_for_a_device_that_is_not_simulated(space) -> None:
     device = Hardware(clock=MonotonicClock())
     check_device(lambda: device, space, iti_s=0.01)
     assert np.diff(device.fired_s).min() >= 0.01
 
 
 @pytest.mark.parametrize("iti_s", [-1.0, np.nan, np.inf])
-def test_an_interval_that_nobody_can_wait_for_is_an_error(space, iti_s):
+def test_an_interval_that_nobody_can_wait_for_is_an_error(space, iti_s) -> None:
     device = Hardware()
     with pytest.raises(InvalidValueError, match="iti_s"):
         check_device(lambda: device, space, iti_s=iti_s)
     assert not device.fired_s
 
 
-def test_the_suite_finds_what_is_no_device(space):
+def test_the_suite_finds_what_is_no_device(space) -> None:
     with pytest.raises(AssertionError, match="describe, stage"):
         check_device(object, space)
 
@@ -206,7 +206,7 @@ class Slow(Hardware):
         return answer
 
 
-def test_the_suite_finds_a_device_that_ignores_its_timeout(space):
+def test_the_suite_finds_a_device_that_ignores_its_timeout(space) -> None:
     with pytest.raises(AssertionError, match="within its timeout"):
         check_device(Slow, space, clock=VirtualClock(), timeout_s=0.05)
 
@@ -214,7 +214,7 @@ def test_the_suite_finds_a_device_that_ignores_its_timeout(space):
 class Rig(Hardware):
     """Answers with sweeps of some channels and lengths."""
 
-    def __init__(self, *, unit="mV", length_ms=600, other=None):
+    def __init__(self, *, unit="mV", length_ms=600, other=None) -> None:
         super().__init__()
         self.unit, self.length_ms, self.other = unit, length_ms, other
 
@@ -228,7 +228,7 @@ class Rig(Hardware):
         return Sweep(channels, t_valve_ms=100.0, t_tms_ms=100.0 + (stimulus.isi_ms or 0.0))
 
 
-def test_a_device_of_sweeps_conforms(space):
+def test_a_device_of_sweeps_conforms(space) -> None:
     check_device(Rig, space, clock=VirtualClock())
 
 
@@ -240,6 +240,6 @@ def test_a_device_of_sweeps_conforms(space):
         ({"length_ms": 310}, "can use .*missing channel"),
     ],
 )
-def test_the_suite_finds_sweeps_that_no_session_could_use(space, rig, broken):
+def test_the_suite_finds_sweeps_that_no_session_could_use(space, rig, broken) -> None:
     with pytest.raises(AssertionError, match=broken):
         check_device(lambda: Rig(**rig), space, clock=VirtualClock())

@@ -8,6 +8,7 @@ from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError
 from isiw.trials import Stimulus
+from typing import Never
 
 LIMITS = Limits(low_ms=0, high_ms=200, min_iti_s=5.0, max_pulses=3)
 
@@ -30,7 +31,7 @@ def limited(inner, clock):
 
 
 @pytest.mark.parametrize("isi_ms", [-0.001, 200.001, 1e9])
-def test_an_isi_beyond_the_range_is_refused_before_anything_is_delivered(limited, inner, isi_ms):
+def test_an_isi_beyond_the_range_is_refused_before_anything_is_delivered(limited, inner, isi_ms) -> None:
     with pytest.raises(LimitExceededError, match="beyond the limits"):
         limited.deliver(Stimulus(0, isi_ms), 1.0)
     assert inner.delivered == []
@@ -38,12 +39,12 @@ def test_an_isi_beyond_the_range_is_refused_before_anything_is_delivered(limited
 
 
 @pytest.mark.parametrize("isi_ms", [0.0, 200.0, None])
-def test_the_ends_of_the_range_and_tms_alone_are_allowed(limited, inner, isi_ms):
+def test_the_ends_of_the_range_and_tms_alone_are_allowed(limited, inner, isi_ms) -> None:
     limited.deliver(Stimulus(0, isi_ms), 1.0)
     assert inner.delivered == [Stimulus(0, isi_ms)]
 
 
-def test_a_stimulus_before_the_interval_is_over_is_refused(limited, inner, clock):
+def test_a_stimulus_before_the_interval_is_over_is_refused(limited, inner, clock) -> None:
     limited.deliver(Stimulus(0, 10), 1.0)
     clock.sleep_s(4.999)
     with pytest.raises(LimitExceededError, match="too early"):
@@ -54,8 +55,8 @@ def test_a_stimulus_before_the_interval_is_over_is_refused(limited, inner, clock
     assert len(inner.delivered) == 2
 
 
-def test_the_interval_runs_from_the_end_of_the_last_attempt(inner, clock):
-    def slow(stimulus):
+def test_the_interval_runs_from_the_end_of_the_last_attempt(inner, clock) -> None:
+    def slow(stimulus) -> Never:
         del stimulus
         clock.sleep_s(3.0)
         raise DeviceError("no answer")
@@ -68,8 +69,8 @@ def test_the_interval_runs_from_the_end_of_the_last_attempt(inner, clock):
     assert limited.wait_s() == 5.0
 
 
-def test_a_delivery_that_fails_counts_as_delivered(limited, inner):
-    def failing(stimulus):
+def test_a_delivery_that_fails_counts_as_delivered(limited, inner) -> None:
+    def failing(stimulus) -> Never:
         raise RuntimeError(stimulus)
 
     inner.answer = failing
@@ -78,7 +79,7 @@ def test_a_delivery_that_fails_counts_as_delivered(limited, inner):
     assert limited.pulses_left == 2
 
 
-def test_no_pulse_beyond_the_largest_number_is_delivered(limited, inner, clock):
+def test_no_pulse_beyond_the_largest_number_is_delivered(limited, inner, clock) -> None:
     for trial in range(3):
         limited.deliver(Stimulus(trial, 10), 1.0)
         clock.sleep_s(5.0)
@@ -88,7 +89,7 @@ def test_no_pulse_beyond_the_largest_number_is_delivered(limited, inner, clock):
     assert len(inner.delivered) == 3
 
 
-def test_pulses_of_an_earlier_run_count(inner, clock):
+def test_pulses_of_an_earlier_run_count(inner, clock) -> None:
     limited = LimitedDevice(inner, LIMITS, clock, delivered=3)
     limited.stage()
     with pytest.raises(LimitExceededError, match="limit of 3 pulses"):
@@ -96,12 +97,12 @@ def test_pulses_of_an_earlier_run_count(inner, clock):
     assert inner.delivered == []
 
 
-def test_the_first_stimulus_after_a_resumption_waits_a_whole_interval(inner, clock):
+def test_the_first_stimulus_after_a_resumption_waits_a_whole_interval(inner, clock) -> None:
     limited = LimitedDevice(inner, LIMITS, clock, delivered=1)
     assert limited.wait_s() == LIMITS.min_iti_s
 
 
-def test_nothing_is_delivered_unless_staged(inner, clock):
+def test_nothing_is_delivered_unless_staged(inner, clock) -> None:
     limited = LimitedDevice(inner, LIMITS, clock)
     with pytest.raises(DeviceError, match="not staged"):
         limited.deliver(Stimulus(0, 10), 1.0)
@@ -113,8 +114,8 @@ def test_nothing_is_delivered_unless_staged(inner, clock):
     assert limited.pulses_left == 3
 
 
-def test_a_device_that_fails_to_stage_stays_disarmed(inner, clock):
-    def broken():
+def test_a_device_that_fails_to_stage_stays_disarmed(inner, clock) -> None:
+    def broken() -> Never:
         raise DeviceError("no power")
 
     inner.stage = broken
@@ -140,11 +141,11 @@ def test_a_device_that_fails_to_stage_stays_disarmed(inner, clock):
         {"max_pulses": True},
     ],
 )
-def test_limits_that_limit_nothing_are_refused(values):
+def test_limits_that_limit_nothing_are_refused(values) -> None:
     with pytest.raises(InvalidValueError):
         Limits(**({"low_ms": 0, "high_ms": 200} | values))
 
 
-def test_limits_of_a_space_hold_exactly_its_isis(space):
+def test_limits_of_a_space_hold_exactly_its_isis(space) -> None:
     limits = Limits.of_space(space, max_pulses=7)
     assert (limits.low_ms, limits.high_ms, limits.max_pulses) == (space.low_ms, space.high_ms, 7)

@@ -26,7 +26,7 @@ def staged(recordings, mep_mv, seed=0, reference="valve"):
 
 @pytest.mark.parametrize("mep_mv", [0.03, 0.1, 0.7, 3.0])
 @pytest.mark.parametrize("trial", range(8))
-def test_a_sweep_has_the_amplitude_that_the_person_answered_with(recordings, space, mep_mv, trial):
+def test_a_sweep_has_the_amplitude_that_the_person_answered_with(recordings, space, mep_mv, trial) -> None:
     sweep = staged(recordings, mep_mv).deliver(Stimulus(trial, 100.0), 1.0)
     judged = judge(sweep, Stimulus(trial, 100.0), space)
     assert judged.status is Status.ACCEPTED
@@ -35,19 +35,19 @@ def test_a_sweep_has_the_amplitude_that_the_person_answered_with(recordings, spa
 
 
 @pytest.mark.parametrize("trial", range(8))
-def test_without_a_mep_the_recorded_floor_remains(recordings, space, trial):
+def test_without_a_mep_the_recorded_floor_remains(recordings, space, trial) -> None:
     sweep = staged(recordings, 0.0).deliver(Stimulus(trial, 100.0), 1.0)
     floor_mv = judge(sweep, Stimulus(trial, 100.0), space).mep_mv
     assert 0.001 < floor_mv < 0.02
 
 
-def test_the_emg_before_the_pulse_is_the_quiet_recording_untouched(recordings):
+def test_the_emg_before_the_pulse_is_the_quiet_recording_untouched(recordings) -> None:
     emg = staged(recordings, 3.0).deliver(Stimulus(0, 100.0), 1.0).channels["emg"]
     before = recordings.time_ms < 10
     assert any(np.array_equal(emg.values[before], quiet[before]) for quiet in recordings.quiet_mv)
 
 
-def test_the_choice_of_sweeps_depends_on_seed_and_trial_alone(recordings):
+def test_the_choice_of_sweeps_depends_on_seed_and_trial_alone(recordings) -> None:
     def emg(seed, trials, last):
         device = staged(recordings, 0.1, seed)
         for trial in trials:
@@ -59,20 +59,20 @@ def test_the_choice_of_sweeps_depends_on_seed_and_trial_alone(recordings):
     assert not np.array_equal(emg(1, [], 5), emg(2, [], 5))
 
 
-def test_the_isi_counts_from_the_reference(recordings):
+def test_the_isi_counts_from_the_reference(recordings) -> None:
     valve = staged(recordings, 0.1).deliver(Stimulus(0, 100.0), 1.0)
     impact = staged(recordings, 0.1, reference="impact").deliver(Stimulus(0, 100.0), 1.0)
     assert (valve.t_valve_ms, valve.t_hit_ms) == (-100.0, None)
     assert (impact.t_valve_ms, impact.t_hit_ms) == (None, -100.0)
 
 
-def test_the_recordings_sort_into_quiet_sweeps_and_clear_meps(recordings):
+def test_the_recordings_sort_into_quiet_sweeps_and_clear_meps(recordings) -> None:
     assert len(recordings.quiet_mv) >= 10
     assert len(recordings.mep_mv) >= 40
     assert recordings.rate_hz == pytest.approx(3000.0)
 
 
-def test_a_folder_without_recordings_is_refused_with_the_way_out(tmp_path):
+def test_a_folder_without_recordings_is_refused_with_the_way_out(tmp_path) -> None:
     with pytest.raises(DeviceError, match=r"not found.*--data"):
         load_recordings(tmp_path)
 
@@ -80,7 +80,7 @@ def test_a_folder_without_recordings_is_refused_with_the_way_out(tmp_path):
 @pytest.mark.parametrize(
     "content", [b"", b"trial,0.0\n0,1.0\n", gzip.compress(b"trial,0.0\n0,none\n"), gzip.compress(b"")]
 )
-def test_a_damaged_recording_is_named(tmp_path, content):
+def test_a_damaged_recording_is_named(tmp_path, content) -> None:
     (tmp_path / "uef_1_ECR_epochs_uV_3kHz.csv.gz").write_bytes(content)
     with pytest.raises(DeviceError, match="cannot be read"):
         load_recordings(tmp_path)

@@ -39,19 +39,19 @@ def meps(device, *isis):
     return [device.deliver(Stimulus(trial, isi), 1.0).mep_mv for trial, isi in enumerate(isis)]
 
 
-def test_the_same_asks_get_the_same_answers_in_order(device):
+def test_the_same_asks_get_the_same_answers_in_order(device) -> None:
     assert meps(device, 10.0, 50.0, 50.0) == [0.01, 0.05, 0.07]
 
 
-def test_another_ask_gets_the_nearest_trial_at_its_own_isi(device):
+def test_another_ask_gets_the_nearest_trial_at_its_own_isi(device) -> None:
     assert device.deliver(Stimulus(0, 35.0), 1.0).isi_ms == 49.0
 
 
-def test_tms_alone_is_answered_by_tms_alone(device):
+def test_tms_alone_is_answered_by_tms_alone(device) -> None:
     assert meps(device, None) == [0.02]
 
 
-def test_each_trial_answers_once(device):
+def test_each_trial_answers_once(device) -> None:
     meps(device, 10.0, 50.0, 50.0)
     with pytest.raises(DeviceError, match=r"no recorded trial is left.*max_pulses"):
         device.deliver(Stimulus(3, 50.0), 1.0)
@@ -80,7 +80,7 @@ def run_again(recording, log, tolerance_ms):
     return Session(device, make_strategy(space=space, particles=200), log=log, limits=limits).run()
 
 
-def test_another_strategy_learns_from_every_recorded_trial_of_a_session(recording, person, tmp_path):
+def test_another_strategy_learns_from_every_recorded_trial_of_a_session(recording, person, tmp_path) -> None:
     result = run_again(recording, tmp_path / "again.mcap", tolerance_ms=1000.0)
     assert all(trial.told for trial in result.trials)
     recorded = {(trial.isi_ms, trial.mep_mv) for trial in recording.table.told}
@@ -89,7 +89,7 @@ def test_another_strategy_learns_from_every_recorded_trial_of_a_session(recordin
     assert f1(result.estimate, person.window(VALVE_SPACE), VALVE_SPACE) > 0.9
 
 
-def test_with_the_usual_tolerance_most_recorded_trials_are_mistrials_for_another_strategy(recording, tmp_path):
+def test_with_the_usual_tolerance_most_recorded_trials_are_mistrials_for_another_strategy(recording, tmp_path) -> None:
     result = run_again(recording, tmp_path / "again.mcap", tolerance_ms=10.0)
     lost = [trial for trial in result.trials if trial.reason is MistrialReason.ISI_OFF]
     assert len(lost) > len(result.trials) / 2

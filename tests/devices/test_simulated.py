@@ -7,20 +7,20 @@ from isiw.subjects.subject import Response
 from isiw.trials import Measurement, Stimulus
 
 
-def test_it_reports_what_the_person_answers_at_the_realised_isi():
+def test_it_reports_what_the_person_answers_at_the_realised_isi() -> None:
     device = SimulatedDevice(SimulatedPerson(lambda isi_ms: Response(isi_ms + 1.5, 0.07, 2.0), "impact"))
     device.stage()
     measured = device.deliver(Stimulus(0, 40.0), 1.0)
     assert (measured.isi_ms, measured.mep_mv, measured.isi_sd_ms) == (41.5, 0.07, 2.0)
 
 
-def test_it_says_that_it_is_simulated():
+def test_it_says_that_it_is_simulated() -> None:
     info = SimulatedDevice(SimulatedPerson(lambda isi_ms: Response(isi_ms, 0.0), "impact")).describe()
     assert info.simulated
     assert info.reference == "impact"
 
 
-def test_resuming_answers_only_what_was_not_answered_before():
+def test_resuming_answers_only_what_was_not_answered_before() -> None:
     asked = []
 
     def respond(isi_ms):
@@ -34,11 +34,11 @@ def test_resuming_answers_only_what_was_not_answered_before():
     assert asked == [10.0, 20.0, None]
 
 
-def test_what_was_refused_before_is_refused_again_and_counts_as_asked():
+def test_what_was_refused_before_is_refused_again_and_counts_as_asked() -> None:
     class Choosy:
         info = DeviceInfo("choosy", "impact", simulated=True)
 
-        def __init__(self):
+        def __init__(self) -> None:
             self.answered = []
 
         def answer(self, stimulus):

@@ -32,7 +32,7 @@ def make_header(**changes):
     return Header(**(values | changes))
 
 
-def write_trials(log, trials):
+def write_trials(log, trials) -> None:
     """Write as a session does: intent, sync, waveform, trial, sync."""
     rng = np.random.default_rng(0)
     for k in trials:

@@ -53,12 +53,12 @@ def person(name: str):
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_it_is_what_it_was(name):
+def test_it_is_what_it_was(name) -> None:
     assert hashlib.sha256((FOLDER / name).read_bytes()).hexdigest() == DIGESTS[name]
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_it_opens_whole(name):
+def test_it_opens_whole(name) -> None:
     record = isiw.read_session(FOLDER / log_of(name))
     assert record.losses == ()
     assert record.finished is not name.endswith(".part")
@@ -69,13 +69,13 @@ def test_it_opens_whole(name):
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_it_is_drawn(name, tmp_path):
+def test_it_is_drawn(name, tmp_path) -> None:
     record = isiw.read_session(FOLDER / log_of(name))
     assert save_session_plot(record, tmp_path / "session.png").stat().st_size > 5000
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_it_goes_on(name, copy):
+def test_it_goes_on(name, copy) -> None:
     log = copy(name)
     before = isiw.read_session(log)
     with warnings.catch_warnings():
@@ -91,7 +91,7 @@ def test_it_goes_on(name, copy):
     assert [trial.index for trial in after.table] == list(range(len(after.table)))
 
 
-def test_the_killed_session_delivers_what_is_left_of_its_budget(copy):
+def test_the_killed_session_delivers_what_is_left_of_its_budget(copy) -> None:
     log = copy("e31d040-killed.mcap.part")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OtherVersionsWarning)
@@ -100,7 +100,7 @@ def test_the_killed_session_delivers_what_is_left_of_its_budget(copy):
     assert [trial.reason for trial in trials].count("outcome unknown") == 1
 
 
-def test_the_recorded_waveforms_are_there():
+def test_the_recorded_waveforms_are_there() -> None:
     record = isiw.read_session(FOLDER / "e31d040-waveforms.mcap")
     assert set(record.sweep(0)) == {"emg", "acceleration", "pressure", "valve"}
     assert record.sweep(0)["emg"].values.size == 1000

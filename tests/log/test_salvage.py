@@ -23,7 +23,7 @@ def content(record):
 
 
 @pytest.mark.parametrize("kind", ["finished_log", "broken_log"])
-def test_no_flipped_bit_changes_what_is_read_unnoticed(kind, request):
+def test_no_flipped_bit_changes_what_is_read_unnoticed(kind, request) -> None:
     log = request.getfixturevalue(kind)
     whole, original = log.read_bytes(), content(read_session(log))
     noticed = 0
@@ -42,7 +42,7 @@ def test_no_flipped_bit_changes_what_is_read_unnoticed(kind, request):
     assert noticed == 300 if kind == "finished_log" else noticed > 150
 
 
-def test_a_flipped_bit_costs_no_more_than_its_own_block(finished_log):
+def test_a_flipped_bit_costs_no_more_than_its_own_block(finished_log) -> None:
     whole, all_trials = finished_log.read_bytes(), set(range(8))
     for position in sample(8 * len(whole), 200):
         flipped = bytearray(whole)
@@ -52,7 +52,7 @@ def test_a_flipped_bit_costs_no_more_than_its_own_block(finished_log):
         assert len(all_trials - kept) <= 1
 
 
-def test_a_length_that_swallows_other_blocks_costs_none_of_them(finished_log):
+def test_a_length_that_swallows_other_blocks_costs_none_of_them(finished_log) -> None:
     whole = bytearray(finished_log.read_bytes())
     blocks = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
     first, other = blocks[4], blocks[12]
@@ -64,7 +64,7 @@ def test_a_length_that_swallows_other_blocks_costs_none_of_them(finished_log):
     assert record.losses
 
 
-def test_a_log_torn_anywhere_keeps_every_trial_before_the_tear(broken_log):
+def test_a_log_torn_anywhere_keeps_every_trial_before_the_tear(broken_log) -> None:
     whole = broken_log.read_bytes()
     ends = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
     for cut in sample(len(whole) - ends[0] - 2000, 60):
@@ -77,12 +77,12 @@ def test_a_log_torn_anywhere_keeps_every_trial_before_the_tear(broken_log):
         assert record.losses or record.unknown or len(record.table) == (complete + 1) // 2
 
 
-def test_a_session_that_was_killed_between_records_has_lost_nothing(broken_log):
+def test_a_session_that_was_killed_between_records_has_lost_nothing(broken_log) -> None:
     record = read_session(broken_log)
     assert (len(record.table), record.losses, record.finished) == (8, (), False)
 
 
-def test_what_is_lost_is_said_in_words(finished_log):
+def test_what_is_lost_is_said_in_words(finished_log) -> None:
     whole = bytearray(finished_log.read_bytes())
     third = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)][5]
     whole[third + 60] ^= 0xFF
@@ -93,7 +93,7 @@ def test_what_is_lost_is_said_in_words(finished_log):
     assert len(record.table) + len(record.unknown) == 8
 
 
-def test_without_its_first_block_a_log_still_has_its_header(finished_log):
+def test_without_its_first_block_a_log_still_has_its_header(finished_log) -> None:
     whole = bytearray(finished_log.read_bytes())
     original = read_session(finished_log)
     first = whole.find(b"\x04\x00\x00\x00zstd")
@@ -106,18 +106,18 @@ def test_without_its_first_block_a_log_still_has_its_header(finished_log):
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAP0\r\n", bytes(5000)])
-def test_what_is_no_log_is_refused(tmp_path, content):
+def test_what_is_no_log_is_refused(tmp_path, content) -> None:
     (tmp_path / "s.mcap").write_bytes(content)
     with pytest.raises(DamagedLogError):
         read_session(tmp_path / "s.mcap")
 
 
-def test_a_log_that_does_not_exist_is_named(tmp_path):
+def test_a_log_that_does_not_exist_is_named(tmp_path) -> None:
     with pytest.raises(LogError, match=r"no such log.*nowhere"):
         salvage(tmp_path / "nowhere.mcap")
 
 
-def test_the_part_is_read_where_there_are_both(tmp_path):
+def test_the_part_is_read_where_there_are_both(tmp_path) -> None:
     for name in ("s.mcap", "s.mcap.part"):
         (tmp_path / name).write_bytes(b"x")
     for name in ("s.mcap", "s.mcap.part"):
@@ -125,12 +125,12 @@ def test_the_part_is_read_where_there_are_both(tmp_path):
 
 
 @pytest.mark.parametrize("path", ["", ".", "/", 300 * "s"])
-def test_what_can_be_no_file_is_an_error_of_its_own(path):
+def test_what_can_be_no_file_is_an_error_of_its_own(path) -> None:
     with pytest.raises(LogError):
         salvage(path)
 
 
-def test_a_channel_of_the_devices_own_is_known_without_the_block_that_defines_it(tmp_path, header):
+def test_a_channel_of_the_devices_own_is_known_without_the_block_that_defines_it(tmp_path, header) -> None:
     with LogWriter.create(tmp_path / "s.mcap", header) as log:
         for trial in range(3):
             log.append(Intent(trial=trial, isi_ms=5.0))

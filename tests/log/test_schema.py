@@ -24,12 +24,12 @@ from isiw.window import Window, WindowEstimate
         Event(kind="fault", text="line one\nline two"),
     ],
 )
-def test_a_record_survives_being_written_and_read(record):
+def test_a_record_survives_being_written_and_read(record) -> None:
     topic = topic_of(record)
     assert decode(topic, encode(topic, record)) == record
 
 
-def test_a_waveform_survives_with_what_is_not_finite():
+def test_a_waveform_survives_with_what_is_not_finite() -> None:
     channel = Channel(np.array([0.1, math.nan, math.inf, -math.inf, -0.0]), 3000.0, "mV", t0_ms=-50.0)
     record = Waveform.of(7, channel)
     again = decode("/emg", encode("/emg", record)).channel()
@@ -37,39 +37,39 @@ def test_a_waveform_survives_with_what_is_not_finite():
     assert (again.rate_hz, again.unit, again.t0_ms) == (3000.0, "mV", -50.0)
 
 
-def test_a_header_from_before_the_times_allowed_were_logged_can_be_read(header):
+def test_a_header_from_before_the_times_allowed_were_logged_can_be_read(header) -> None:
     written = json.loads(encode("/header", header))
     assert written.pop("timeout_s") == 30.0
     assert written.pop("ask_deadline_s") is None
     assert decode("/header", json.dumps(written).encode()) == header
 
 
-def test_what_is_not_finite_is_written_as_a_string():
+def test_what_is_not_finite_is_written_as_a_string() -> None:
     written = json.loads(encode("/estimate", Estimate(trial=0, probability=0.9, end_ms=math.inf)))
     assert written["end_ms"] == "Infinity"
 
 
 @pytest.mark.parametrize("topic", CHANNEL_IDS)
-def test_every_schema_is_an_object_without_references_to_elsewhere(topic):
+def test_every_schema_is_an_object_without_references_to_elsewhere(topic) -> None:
     _, schema = json_schema(topic)
     root = json.loads(schema)
     assert root["type"] == "object"
     assert all(f'"$ref": "{outside}' not in schema.decode() for outside in ("http", "file"))
 
 
-def test_the_channel_numbers_are_frozen():
+def test_the_channel_numbers_are_frozen() -> None:
     topics = ("header", "intent", "trial", "estimate", "event", "emg", "acceleration", "pressure", "force", "valve")
     assert dict(CHANNEL_IDS) == {f"/{topic}": number for number, topic in enumerate(topics, start=1)}
 
 
 @pytest.mark.parametrize("name", ["trial", "header", "", None])
-def test_a_channel_cannot_take_the_name_of_another_topic(name):
+def test_a_channel_cannot_take_the_name_of_another_topic(name) -> None:
     waveform = Waveform.of(0, Channel(np.zeros(3), 1000.0, "mV"))
     with pytest.raises(InvalidValueError, match="channel cannot have this name"):
         topic_of(waveform, name)
 
 
-def test_an_estimate_keeps_window_intervals_and_profile():
+def test_an_estimate_keeps_window_intervals_and_profile() -> None:
     grid = np.arange(0.0, 50.0)
     estimate = WindowEstimate(
         probability=0.8,
@@ -92,18 +92,18 @@ def test_an_estimate_keeps_window_intervals_and_profile():
     assert record.next_isi_ms == 7.0
 
 
-def test_an_estimate_of_a_method_without_posterior_has_gaps():
+def test_an_estimate_of_a_method_without_posterior_has_gaps() -> None:
     record = Estimate.of(0, WindowEstimate(None, Window(1, 2)), StopDecision(stop=True, reason=""), None)
     assert record.window == Window(1, 2)
     assert record.start_low_ms is None
     assert record.grid_ms == ()
 
 
-def test_a_record_from_a_later_version_with_more_keys_is_read():
+def test_a_record_from_a_later_version_with_more_keys_is_read() -> None:
     assert decode("/intent", b'{"trial": 1, "isi_ms": 2.0, "mood": "good"}') == Intent(trial=1, isi_ms=2.0)
 
 
 @pytest.mark.parametrize("data", [b"", b"{}", b'{"trial": "x", "isi_ms": 1}', b"\xff\xfe"])
-def test_what_is_no_record_is_refused(data):
+def test_what_is_no_record_is_refused(data) -> None:
     with pytest.raises(ValueError, match="validation error"):
         decode("/intent", data)

@@ -14,22 +14,23 @@ from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel
+from typing import Never
 
 
-def test_a_log_is_a_part_until_it_is_closed(tmp_path, header):
+def test_a_log_is_a_part_until_it_is_closed(tmp_path, header) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
     assert [path.name for path in tmp_path.iterdir()] == ["s.mcap.part"]
     log.close()
     assert [path.name for path in tmp_path.iterdir()] == ["s.mcap"]
 
 
-def test_the_header_is_on_disk_at_once(tmp_path, header):
+def test_the_header_is_on_disk_at_once(tmp_path, header) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
     assert read_session(tmp_path / "s.mcap").header == header
     log.close()
 
 
-def test_what_was_synced_can_be_read_while_the_session_runs(tmp_path, header, writes):
+def test_what_was_synced_can_be_read_while_the_session_runs(tmp_path, header, writes) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
     for k in range(3):
         writes(log, [k])
@@ -41,14 +42,14 @@ def test_what_was_synced_can_be_read_while_the_session_runs(tmp_path, header, wr
 
 
 @pytest.mark.parametrize("name", ["s.mcap", "s.mcap.part"])
-def test_an_existing_log_is_never_overwritten(tmp_path, header, name):
+def test_an_existing_log_is_never_overwritten(tmp_path, header, name) -> None:
     (tmp_path / name).write_bytes(b"precious")
     with pytest.raises(LogError, match=r"never overwritten.*isiw resume"):
         LogWriter.create(tmp_path / "s.mcap", header)
     assert (tmp_path / name).read_bytes() == b"precious"
 
 
-def test_a_file_that_appears_meanwhile_is_not_overwritten_at_the_end(tmp_path, header, writes):
+def test_a_file_that_appears_meanwhile_is_not_overwritten_at_the_end(tmp_path, header, writes) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
     writes(log, range(2))
     (tmp_path / "s.mcap").write_bytes(b"precious")
@@ -58,17 +59,17 @@ def test_a_file_that_appears_meanwhile_is_not_overwritten_at_the_end(tmp_path, h
     assert len(read_session(tmp_path / "s.mcap.part").table) == 2
 
 
-def test_a_folder_that_cannot_be_made_is_named(tmp_path, header):
+def test_a_folder_that_cannot_be_made_is_named(tmp_path, header) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(LogError, match="cannot be made"):
         LogWriter.create(tmp_path / "file" / "s.mcap", header)
 
 
-def full_disk(_):
+def full_disk(_) -> Never:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def test_a_full_disk_is_an_error_and_what_was_synced_is_safe(tmp_path, header, writes, monkeypatch):
+def test_a_full_disk_is_an_error_and_what_was_synced_is_safe(tmp_path, header, writes, monkeypatch) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
     writes(log, range(3))
     with monkeypatch.context() as patched:
@@ -80,7 +81,7 @@ def test_a_full_disk_is_an_error_and_what_was_synced_is_safe(tmp_path, header, w
 
 
 @pytest.mark.parametrize("config", [{"operator": None}, {"rig": object()}, {"name": "\ud800"}])
-def test_a_header_that_cannot_be_written_leaves_no_file(tmp_path, header, config):
+def test_a_header_that_cannot_be_written_leaves_no_file(tmp_path, header, config) -> None:
     unwritable = header.model_copy(update={"config": config})
     with pytest.raises(LogError, match=r"header cannot be written.*TOML values"):
         LogWriter.create(tmp_path / "s.mcap", unwritable)
@@ -88,7 +89,7 @@ def test_a_header_that_cannot_be_written_leaves_no_file(tmp_path, header, config
     LogWriter.create(tmp_path / "s.mcap", header).close()
 
 
-def test_a_log_that_cannot_be_begun_leaves_no_file(tmp_path, header, monkeypatch):
+def test_a_log_that_cannot_be_begun_leaves_no_file(tmp_path, header, monkeypatch) -> None:
     monkeypatch.setattr(os, "fsync", full_disk)
     with pytest.raises(LogError, match="No space left"):
         LogWriter.create(tmp_path / "s.mcap", header)
@@ -96,7 +97,7 @@ def test_a_log_that_cannot_be_begun_leaves_no_file(tmp_path, header, monkeypatch
 
 
 @pytest.mark.parametrize("trouble", ["header", "disk"])
-def test_a_log_that_cannot_go_on_stays_as_it_was(finished_log, header, monkeypatch, trouble):
+def test_a_log_that_cannot_go_on_stays_as_it_was(finished_log, header, monkeypatch, trouble) -> None:
     before, found = finished_log.read_bytes(), salvage(finished_log)
     unwritable = header.model_copy(update={"config": {"operator": None}})
     with monkeypatch.context() as patched:
@@ -108,7 +109,7 @@ def test_a_log_that_cannot_go_on_stays_as_it_was(finished_log, header, monkeypat
     LogWriter.continuing(finished_log, found, header).close()
 
 
-def test_any_mcap_reader_reads_a_finished_log(finished_log):
+def test_any_mcap_reader_reads_a_finished_log(finished_log) -> None:
     with finished_log.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         topics = [channel.topic for _, channel, _ in reader.iter_messages()]
@@ -121,19 +122,19 @@ def test_any_mcap_reader_reads_a_finished_log(finished_log):
     assert b"answer = 42" in attachments["configuration.toml"]
 
 
-def test_the_times_of_the_records_never_run_backwards(finished_log):
+def test_the_times_of_the_records_never_run_backwards(finished_log) -> None:
     with finished_log.open("rb") as file:
         times = [message.log_time for _, _, message in make_reader(file).iter_messages(log_time_order=False)]
     assert times == sorted(times)
 
 
-def test_a_channel_that_isiw_does_not_know_is_kept(tmp_path, header):
+def test_a_channel_that_isiw_does_not_know_is_kept(tmp_path, header) -> None:
     with LogWriter.create(tmp_path / "s.mcap", header) as log:
         log.append(Waveform.of(0, Channel(np.arange(4.0), 100.0, "N")), "left_hand")
     assert read_session(tmp_path / "s.mcap").sweep(0)["left_hand"].values.tolist() == [0, 1, 2, 3]
 
 
-def test_continuing_keeps_all_records_and_appends(finished_log):
+def test_continuing_keeps_all_records_and_appends(finished_log) -> None:
     before = read_session(finished_log)
     with LogWriter.continuing(finished_log, salvage(finished_log), before.header) as log:
         log.append(Event(kind="resume", trial=8))
@@ -144,7 +145,7 @@ def test_continuing_keeps_all_records_and_appends(finished_log):
     assert list(finished_log.parent.iterdir()) == [finished_log]
 
 
-def test_continuing_twice_keeps_metadata_names_unique(broken_log, header):
+def test_continuing_twice_keeps_metadata_names_unique(broken_log, header) -> None:
     for _ in range(2):
         LogWriter.continuing(broken_log, salvage(broken_log), header).close()
     finished = broken_log.with_suffix("")
@@ -154,26 +155,26 @@ def test_continuing_twice_keeps_metadata_names_unique(broken_log, header):
         assert [attachment.name for attachment in reader.iter_attachments()] == ["configuration.toml"]
 
 
-def test_while_a_log_goes_on_it_holds_all_that_was_there_before(broken_log, header):
+def test_while_a_log_goes_on_it_holds_all_that_was_there_before(broken_log, header) -> None:
     log = LogWriter.continuing(broken_log, salvage(broken_log), header)
     assert len(read_session(broken_log).table) == 8
     assert [path.name for path in broken_log.parent.iterdir()] == ["s.mcap.part"]
     log.close()
 
 
-def test_a_copy_left_by_a_killed_resumption_is_no_obstacle(broken_log, header):
+def test_a_copy_left_by_a_killed_resumption_is_no_obstacle(broken_log, header) -> None:
     broken_log.with_name("s.mcap.resuming").write_bytes(b"half a copy")
     LogWriter.continuing(broken_log, salvage(broken_log), header).close()
     assert [path.name for path in broken_log.parent.iterdir()] == ["s.mcap"]
     assert len(read_session(broken_log).table) == 8
 
 
-def _no_links(new, old):
+def _no_links(new, old) -> Never:
     raise OSError(errno.EPERM, f"no link from {new} to {old}")
 
 
 @pytest.mark.parametrize("links", [True, False])
-def test_a_damaged_file_is_kept_beside_what_was_salvaged(broken_log, header, monkeypatch, links):
+def test_a_damaged_file_is_kept_beside_what_was_salvaged(broken_log, header, monkeypatch, links) -> None:
     if not links:  # as on a memory stick
         monkeypatch.setattr(Path, "hardlink_to", _no_links)
     damaged = broken_log.read_bytes()[:-40]
@@ -185,7 +186,7 @@ def test_a_damaged_file_is_kept_beside_what_was_salvaged(broken_log, header, mon
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows does not let an open file be replaced anyway")
-def test_a_running_session_cannot_be_resumed_beside_itself(tmp_path, header, writes):
+def test_a_running_session_cannot_be_resumed_beside_itself(tmp_path, header, writes) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
     writes(log, range(2))
     with pytest.raises(LogError, match="running session"):
@@ -196,7 +197,7 @@ def test_a_running_session_cannot_be_resumed_beside_itself(tmp_path, header, wri
 
 
 @pytest.mark.parametrize("name", ["s.mcap.part", "", "folder", 300 * "s"])
-def test_a_name_that_no_log_can_have_is_refused_and_leaves_nothing(tmp_path, header, name):
+def test_a_name_that_no_log_can_have_is_refused_and_leaves_nothing(tmp_path, header, name) -> None:
     (tmp_path / "folder").mkdir()
     before = sorted(tmp_path.iterdir())
     with pytest.raises(LogError):

@@ -11,12 +11,12 @@ def masks(*rows: str) -> torch.Tensor:
     return torch.tensor([[float(c) for c in row] for row in rows])
 
 
-def test_certain_membership_is_reported_as_it_is():
+def test_certain_membership_is_reported_as_it_is() -> None:
     window = best_window(masks("0111001100", "0111001100"), SPACE.grid_ms)
     assert window.segments == ((1.0, 3.0), (6.0, 7.0))
 
 
-def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets():
+def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets() -> None:
     rng = np.random.default_rng(0)
     starts, ends = rng.integers(0, 5, 200), rng.integers(5, 10, 200)
     samples = np.array([[float(a <= t <= b) for t in range(10)] for a, b in zip(starts, ends, strict=True)])
@@ -30,19 +30,19 @@ def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets():
     assert expected_f1(reported) > best - 0.005  # the cuts are a grid
 
 
-def test_an_edge_at_the_border_of_the_range_lies_beyond_it():
+def test_an_edge_at_the_border_of_the_range_lies_beyond_it() -> None:
     edges = edge_samples(masks("1110000000", "0000011111", "0011100000"), SPACE)
     assert edges.tolist() == [[-np.inf, 2.0], [5.0, np.inf], [2.0, 4.0]]
 
 
-def test_more_than_one_segment_has_a_probability_given_a_window():
+def test_more_than_one_segment_has_a_probability_given_a_window() -> None:
     sampled = masks("0111001100", "1100110000", "0011110000", "0000000011", "0000000000")
     estimate = sampled_estimate(sampled, torch.ones(5, 10), SPACE)
     assert estimate.split_probability == 0.5
     assert sampled_estimate(masks("0000000000"), torch.ones(1, 10), SPACE).split_probability is None
 
 
-def test_a_profile_is_reported_up_to_both_ends_of_the_range():
+def test_a_profile_is_reported_up_to_both_ends_of_the_range() -> None:
     for high_ms in (302, 320, 500):
         grid = profile_grid(DesignSpace(0, high_ms))
         assert (grid[0], grid[-1]) == (0, high_ms)

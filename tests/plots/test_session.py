@@ -28,17 +28,17 @@ def labels(axes):
 
 
 @pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
-def test_a_session_is_drawn_into_a_file(record, tmp_path, suffix):
+def test_a_session_is_drawn_into_a_file(record, tmp_path, suffix) -> None:
     path = save_session_plot(record, tmp_path / "new" / f"s{suffix}")
     assert path.stat().st_size > 5000
 
 
-def test_an_unknown_format_is_refused(record, tmp_path):
+def test_an_unknown_format_is_refused(record, tmp_path) -> None:
     with pytest.raises(InvalidValueError, match="format is unknown"):
         save_session_plot(record, tmp_path / "s.docx")
 
 
-def test_the_picture_shows_profile_trials_window_and_truth(record):
+def test_the_picture_shows_profile_trials_window_and_truth(record) -> None:
     profile, edges, _ = session_figure(record, truth=Window(30, 80)).axes
     assert labels(profile) == {
         "window", "90 % interval of its edges", "true window (simulated)", "90 % band", "expected MEP", "trial",
@@ -50,7 +50,7 @@ def test_the_picture_shows_profile_trials_window_and_truth(record):
     assert "after 6 trials" in profile.get_title(loc="left")
 
 
-def test_trials_lie_where_they_were_realised(record):
+def test_trials_lie_where_they_were_realised(record) -> None:
     profile = session_figure(record).axes[0]
     (trials,) = [line for line in profile.lines if line.get_label() == "trial"]
     told = record.table.told
@@ -58,12 +58,12 @@ def test_trials_lie_where_they_were_realised(record):
     assert trials.get_ydata().tolist() == pytest.approx([max(1.0, 1e3 * trial.mep_mv) for trial in told])
 
 
-def test_edges_beyond_the_range_are_drawn_at_its_border(record):
+def test_edges_beyond_the_range_are_drawn_at_its_border(record) -> None:
     for line in session_figure(record).axes[1].lines:
         assert all(math.isfinite(value) and 0 <= value <= 200 for value in line.get_ydata())
 
 
-def test_a_session_without_a_window_is_drawn(record):
+def test_a_session_without_a_window_is_drawn(record) -> None:
     entries = [e.model_copy(update={"segments_ms": ()}) if hasattr(e, "segments_ms") else e for e in record.history]
     none = type(record)(record.path, record.header, tuple(entries), {}, (), True)
     profile = session_figure(none).axes[0]
@@ -71,6 +71,6 @@ def test_a_session_without_a_window_is_drawn(record):
     assert "window" not in labels(profile)
 
 
-def test_a_session_without_trials_is_drawn(record, tmp_path):
+def test_a_session_without_trials_is_drawn(record, tmp_path) -> None:
     empty = type(record)(record.path, record.header, (), {}, (), False)
     assert save_session_plot(empty, tmp_path / "empty.png").stat().st_size > 1000

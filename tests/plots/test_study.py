@@ -18,7 +18,7 @@ def table(*cohorts: str) -> pd.DataFrame:
     return pd.DataFrame([*rows, failed])
 
 
-def test_each_cohort_has_a_panel_with_a_curve_a_strategy():
+def test_each_cohort_has_a_panel_with_a_curve_a_strategy() -> None:
     figure = study_figure(table("wide", "narrow", "drift", "skewed", "plateau"))
     shown = [axes for axes in figure.axes if axes.get_visible()]
     assert [axes.get_title(loc="left") for axes in shown] == ["wide", "narrow", "drift", "skewed", "plateau"]
@@ -27,11 +27,11 @@ def test_each_cohort_has_a_panel_with_a_curve_a_strategy():
         assert axes.containers[0].lines[0].get_ydata().tolist() == [0.6, 0.7]
 
 
-def test_a_study_is_drawn_into_a_file_and_an_unknown_format_is_refused(tmp_path):
+def test_a_study_is_drawn_into_a_file_and_an_unknown_format_is_refused(tmp_path) -> None:
     assert save_study_plot(table("wide"), tmp_path / "study.png").stat().st_size > 5000
     with pytest.raises(InvalidValueError, match="format"):
         save_study_plot(table("wide"), tmp_path / "study.xyz")
 
 
-def test_a_study_without_a_finished_session_has_an_empty_picture():
+def test_a_study_without_a_finished_session_has_an_empty_picture() -> None:
     assert len(study_figure(table()).axes) == 1

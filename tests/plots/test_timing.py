@@ -7,18 +7,18 @@ from isiw.plots.timing import save_timing_plot, timing_figure
 from isiw.repeatability import study_preset
 
 
-def test_the_errors_are_drawn_only_where_isis_were_commanded():
+def test_the_errors_are_drawn_only_where_isis_were_commanded() -> None:
     assert len(timing_figure(study_preset("bench", taps=20, isi_ms=())).axes) == 1
     figure = timing_figure(study_preset("timing-fault", taps=40, isi_ms=(10.0, 50.0)))
     assert len(figure.axes) == 2
     assert [label.get_text() for label in figure.axes[1].get_xticklabels()] == ["10", "50"]
 
 
-def test_the_picture_is_saved(tmp_path):
+def test_the_picture_is_saved(tmp_path) -> None:
     path = save_timing_plot(study_preset("subject1", taps=20, isi_ms=()), tmp_path / "new" / "timing.png")
     assert path.stat().st_size > 10_000
 
 
-def test_an_unknown_format_is_an_error(tmp_path):
+def test_an_unknown_format_is_an_error(tmp_path) -> None:
     with pytest.raises(InvalidValueError, match="format"):
         save_timing_plot(study_preset("bench", taps=5, isi_ms=()), tmp_path / "timing.docx")

@@ -7,6 +7,7 @@ import threading
 import pytest
 
 from isiw.session.interrupts import DeferredInterrupts
+from typing import Never
 
 if os.name == "nt":
     pytest.skip("POSIX signals", allow_module_level=True)
@@ -20,14 +21,14 @@ def terminal():
     signal.signal(signal.SIGHUP, before)
 
 
-def interrupt(number=signal.SIGINT):
+def interrupt(number=signal.SIGINT) -> None:
     signal.raise_signal(number)
 
 
-def test_an_interrupt_waits_until_it_is_allowed():
+def test_an_interrupt_waits_until_it_is_allowed() -> None:
     done = []
 
-    def work():
+    def work() -> None:
         with DeferredInterrupts() as interrupts:
             interrupt()
             done.append("record")
@@ -40,10 +41,10 @@ def test_an_interrupt_waits_until_it_is_allowed():
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_where_allowed_it_comes_at_once(number):
+def test_where_allowed_it_comes_at_once(number) -> None:
     done = []
 
-    def work():
+    def work() -> None:
         with DeferredInterrupts() as interrupts, interrupts.allowed():
             interrupt(number)
             done.append("never")
@@ -53,10 +54,10 @@ def test_where_allowed_it_comes_at_once(number):
     assert done == []
 
 
-def test_an_interrupt_that_found_no_moment_comes_at_the_end():
+def test_an_interrupt_that_found_no_moment_comes_at_the_end() -> None:
     done = []
 
-    def work():
+    def work() -> None:
         with DeferredInterrupts():
             interrupt()
             done.append("all")
@@ -66,10 +67,10 @@ def test_an_interrupt_that_found_no_moment_comes_at_the_end():
     assert done == ["all"]
 
 
-def test_a_second_interrupt_does_not_cut_the_clearing_up_short():
+def test_a_second_interrupt_does_not_cut_the_clearing_up_short() -> None:
     done = []
 
-    def work():
+    def work() -> None:
         with DeferredInterrupts() as interrupts:
             try:
                 with interrupts.allowed():
@@ -83,8 +84,8 @@ def test_a_second_interrupt_does_not_cut_the_clearing_up_short():
     assert done == ["stopped"]
 
 
-def test_an_error_is_not_hidden_by_a_waiting_interrupt():
-    def work():
+def test_an_error_is_not_hidden_by_a_waiting_interrupt() -> None:
+    def work() -> Never:
         with DeferredInterrupts():
             interrupt()
             raise ZeroDivisionError
@@ -93,7 +94,7 @@ def test_an_error_is_not_hidden_by_a_waiting_interrupt():
         work()
 
 
-def test_the_handlers_are_put_back():
+def test_the_handlers_are_put_back() -> None:
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [signal.getsignal(number) for number in numbers]
     with DeferredInterrupts():
@@ -101,10 +102,10 @@ def test_the_handlers_are_put_back():
     assert [signal.getsignal(number) for number in numbers] == before
 
 
-def test_outside_the_main_thread_it_does_nothing():
+def test_outside_the_main_thread_it_does_nothing() -> None:
     failures = []
 
-    def work():
+    def work() -> None:
         try:
             with DeferredInterrupts() as interrupts, interrupts.allowed():
                 pass
@@ -117,7 +118,7 @@ def test_outside_the_main_thread_it_does_nothing():
     assert failures == []
 
 
-def test_what_the_process_ignores_it_goes_on_ignoring():
+def test_what_the_process_ignores_it_goes_on_ignoring() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     done = []
     try:

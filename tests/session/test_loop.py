@@ -19,6 +19,7 @@ from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Recipe
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Sweep, Trial
+from typing import Never
 
 
 @pytest.fixture
@@ -32,7 +33,7 @@ def run_failing(session, error):
     return read_session(session.log_path), str(caught.value)
 
 
-def test_a_session_runs_to_its_budget_and_logs_everything(scripted_strategy, scripted_device, log):
+def test_a_session_runs_to_its_budget_and_logs_everything(scripted_strategy, scripted_device, log) -> None:
     result = Session(scripted_device(), scripted_strategy(6), log=log).run()
     record = read_session(log)
     assert len(result.trials) == len(record.table) == len(record.intents) == len(record.estimates) == 6
@@ -44,12 +45,12 @@ def test_a_session_runs_to_its_budget_and_logs_everything(scripted_strategy, scr
     assert record.losses == ()
 
 
-def test_each_trial_is_logged_as_intent_then_trial_then_estimate(scripted_strategy, scripted_device, log):
+def test_each_trial_is_logged_as_intent_then_trial_then_estimate(scripted_strategy, scripted_device, log) -> None:
     Session(scripted_device(), scripted_strategy(2), log=log).run()
     assert [type(entry) for entry in read_session(log).history] == [Intent, Trial, Estimate] * 2
 
 
-def test_the_intent_is_on_disk_before_the_device_is_called(scripted_strategy, scripted_device, log):
+def test_the_intent_is_on_disk_before_the_device_is_called(scripted_strategy, scripted_device, log) -> None:
     device = scripted_device()
 
     def answer(stimulus):
@@ -62,10 +63,10 @@ def test_the_intent_is_on_disk_before_the_device_is_called(scripted_strategy, sc
     assert len(device.delivered) == 3
 
 
-def test_what_is_reported_is_on_disk(scripted_strategy, scripted_device, log):
+def test_what_is_reported_is_on_disk(scripted_strategy, scripted_device, log) -> None:
     seen = []
 
-    def on_trial(update):
+    def on_trial(update) -> None:
         record = read_session(log)
         assert record.table[-1] == update.trial
         assert record.estimates[-1].next_isi_ms == update.next_isi_ms
@@ -75,14 +76,14 @@ def test_what_is_reported_is_on_disk(scripted_strategy, scripted_device, log):
     assert seen == [3, 2, 1, 0]
 
 
-def test_the_next_stimulus_is_the_announced_one(scripted_strategy, scripted_device, log):
+def test_the_next_stimulus_is_the_announced_one(scripted_strategy, scripted_device, log) -> None:
     device = scripted_device()
     Session(device, scripted_strategy(6), log=log).run()
     announced = [estimate.next_isi_ms for estimate in read_session(log).estimates]
     assert announced == [stimulus.isi_ms for stimulus in device.delivered[1:]] + [None]
 
 
-def test_the_header_tells_how_to_make_the_session_again(scripted_strategy, scripted_device, log):
+def test_the_header_tells_how_to_make_the_session_again(scripted_strategy, scripted_device, log) -> None:
     session = Session(scripted_device(), scripted_strategy(1, seed=9), log=log, subject="P1", config={"a": {"b": 1}})
     session.run()
     header = read_session(log).header
@@ -99,7 +100,7 @@ def session_with_detection_limits(device, strategy, log, *, device_mv, strategy_
     return Session(device, strategy, log=log)
 
 
-def test_another_detection_limit_than_the_strategys_is_refused(scripted_strategy, scripted_device, log):
+def test_another_detection_limit_than_the_strategys_is_refused(scripted_strategy, scripted_device, log) -> None:
     with pytest.raises(DeviceError, match=r"0.05 mV.*0.005 mV.*make_strategy\(..., detection_limit_mv=0.05\)"):
         session_with_detection_limits(scripted_device(), scripted_strategy(), log, device_mv=0.05, strategy_mv=0.005)
     assert not log.exists()
@@ -108,12 +109,12 @@ def test_another_detection_limit_than_the_strategys_is_refused(scripted_strategy
 @pytest.mark.parametrize(("device_mv", "strategy_mv"), [(0.05, 0.05), (None, 0.005), (0.05, None)])
 def test_the_same_or_an_unknown_detection_limit_is_accepted(
     scripted_strategy, scripted_device, log, device_mv, strategy_mv
-):
+) -> None:
     limits = {"device_mv": device_mv, "strategy_mv": strategy_mv}
     assert session_with_detection_limits(scripted_device(), scripted_strategy(2), log, **limits).run().decision.stop
 
 
-def test_the_raw_sweeps_are_logged(scripted_strategy, scripted_device, log):
+def test_the_raw_sweeps_are_logged(scripted_strategy, scripted_device, log) -> None:
     def answer(stimulus):
         emg = 0.001 * np.random.default_rng(stimulus.trial).standard_normal(451)
         return Sweep({"emg": Channel(emg, 3000.0, "mV", -50.0)}, t_valve_ms=-stimulus.isi_ms, t_tms_ms=0.0)
@@ -127,19 +128,19 @@ def test_the_raw_sweeps_are_logged(scripted_strategy, scripted_device, log):
         assert record.sweep(stimulus.trial)["emg"].t0_ms == -50.0
 
 
-def test_a_simulated_session_does_not_sleep_through_its_intervals(scripted_strategy, scripted_device, log):
+def test_a_simulated_session_does_not_sleep_through_its_intervals(scripted_strategy, scripted_device, log) -> None:
     Session(scripted_device(), scripted_strategy(4), log=log).run()
     assert [intent.t_s for intent in read_session(log).intents] == [0.0, 5.0, 10.0, 15.0]
 
 
-def test_the_interval_between_trials_is_waited_for(scripted_strategy, scripted_device, log, space):
+def test_the_interval_between_trials_is_waited_for(scripted_strategy, scripted_device, log, space) -> None:
     clock = VirtualClock(100.0)
     limits = Limits.of_space(space, min_iti_s=7.5)
     Session(scripted_device(simulated=False), scripted_strategy(3), log=log, clock=clock, limits=limits).run()
     assert [intent.t_s for intent in read_session(log).intents] == [100.0, 107.5, 115.0]
 
 
-def test_the_limit_of_pulses_ends_the_session_and_is_logged(scripted_strategy, scripted_device, log, space):
+def test_the_limit_of_pulses_ends_the_session_and_is_logged(scripted_strategy, scripted_device, log, space) -> None:
     limits = Limits.of_space(space, max_pulses=3)
     result = Session(scripted_device(), scripted_strategy(9), log=log, limits=limits).run()
     assert len(result.trials) == 3
@@ -149,7 +150,7 @@ def test_the_limit_of_pulses_ends_the_session_and_is_logged(scripted_strategy, s
     assert record.decision == result.decision
 
 
-def test_an_isi_beyond_the_limits_is_never_delivered(scripted_strategy, scripted_device, log):
+def test_an_isi_beyond_the_limits_is_never_delivered(scripted_strategy, scripted_device, log) -> None:
     device = scripted_device()
     record, message = run_failing(
         Session(device, scripted_strategy(9), log=log, limits=Limits(0.0, 1.0)), LimitExceededError
@@ -161,16 +162,16 @@ def test_an_isi_beyond_the_limits_is_never_delivered(scripted_strategy, scripted
     assert record.finished
 
 
-def test_the_device_is_always_stopped(scripted_strategy, scripted_device, log):
+def test_the_device_is_always_stopped(scripted_strategy, scripted_device, log) -> None:
     device = scripted_device()
     Session(device, scripted_strategy(2), log=log).run()
     assert device.calls == ["stage", "stop", "unstage"]
 
 
-def test_a_device_that_cannot_be_staged_is_stopped_all_the_same(scripted_strategy, scripted_device, log):
+def test_a_device_that_cannot_be_staged_is_stopped_all_the_same(scripted_strategy, scripted_device, log) -> None:
     device = scripted_device()
 
-    def stage():
+    def stage() -> Never:
         raise DeviceError("no air pressure")
 
     device.stage = stage
@@ -180,7 +181,9 @@ def test_a_device_that_cannot_be_staged_is_stopped_all_the_same(scripted_strateg
 
 
 @pytest.mark.parametrize("error", [DeviceError("coil too hot"), RuntimeError("cable"), KeyboardInterrupt()])
-def test_a_device_that_fails_leaves_an_intact_log_and_is_stopped(scripted_strategy, scripted_device, log, error):
+def test_a_device_that_fails_leaves_an_intact_log_and_is_stopped(
+    scripted_strategy, scripted_device, log, error
+) -> None:
     def answer(stimulus):
         if stimulus.trial == 2:
             raise error
@@ -200,7 +203,7 @@ def test_a_device_that_fails_leaves_an_intact_log_and_is_stopped(scripted_strate
 
 
 @pytest.mark.parametrize("mep_mv", [math.nan, math.inf, -math.inf, -0.001])
-def test_an_impossible_amplitude_is_an_error_that_names_it(scripted_strategy, scripted_device, log, mep_mv):
+def test_an_impossible_amplitude_is_an_error_that_names_it(scripted_strategy, scripted_device, log, mep_mv) -> None:
     device = scripted_device(lambda stimulus: Measurement(mep_mv, stimulus.isi_ms))
     session = Session(device, scripted_strategy(), log=log)
     record, message = run_failing(session, InvalidValueError)
@@ -211,7 +214,7 @@ def test_an_impossible_amplitude_is_an_error_that_names_it(scripted_strategy, sc
 
 
 @pytest.mark.parametrize("isi_ms", [math.nan, math.inf])
-def test_an_impossible_isi_is_an_error_that_names_it(scripted_strategy, scripted_device, log, isi_ms):
+def test_an_impossible_isi_is_an_error_that_names_it(scripted_strategy, scripted_device, log, isi_ms) -> None:
     record, message = run_failing(
         Session(scripted_device(lambda _: Measurement(0.1, isi_ms)), scripted_strategy(), log=log), InvalidValueError
     )
@@ -220,19 +223,19 @@ def test_an_impossible_isi_is_an_error_that_names_it(scripted_strategy, scripted
 
 
 @pytest.mark.parametrize("answer", [None, 0.1, (50.0, 0.1)])
-def test_an_answer_that_is_none_is_an_error(scripted_strategy, scripted_device, log, answer):
+def test_an_answer_that_is_none_is_an_error(scripted_strategy, scripted_device, log, answer) -> None:
     _, message = run_failing(Session(scripted_device(lambda _: answer), scripted_strategy(), log=log), DeviceError)
     assert "Sweep or a Measurement" in message
 
 
-def test_an_answer_to_another_kind_of_trial_is_an_error(scripted_strategy, scripted_device, log):
+def test_an_answer_to_another_kind_of_trial_is_an_error(scripted_strategy, scripted_device, log) -> None:
     _, message = run_failing(
         Session(scripted_device(lambda _: Measurement(0.1, None)), scripted_strategy(), log=log), DeviceError
     )
     assert "another kind of trial" in message
 
 
-def test_an_isi_that_is_off_is_a_mistrial_and_asked_again(scripted_strategy, scripted_device, log):
+def test_an_isi_that_is_off_is_a_mistrial_and_asked_again(scripted_strategy, scripted_device, log) -> None:
     def answer(stimulus):
         off_ms = 10.1 if stimulus.trial == 1 else 9.9
         return Measurement(0.1, stimulus.isi_ms + off_ms)
@@ -246,7 +249,7 @@ def test_an_isi_that_is_off_is_a_mistrial_and_asked_again(scripted_strategy, scr
     assert len(session.strategy.posterior.told) == 2
 
 
-def test_an_active_muscle_is_a_mistrial(scripted_strategy, scripted_device, log):
+def test_an_active_muscle_is_a_mistrial(scripted_strategy, scripted_device, log) -> None:
     device = scripted_device(lambda stimulus: Measurement(0.1, stimulus.isi_ms, background_rms_uv=10.5))
     result = Session(device, scripted_strategy(3), log=log).run()
     assert {trial.reason for trial in result.trials} == {MistrialReason.BACKGROUND_ACTIVITY}
@@ -254,14 +257,14 @@ def test_an_active_muscle_is_a_mistrial(scripted_strategy, scripted_device, log)
     assert result.decision.reason == "The budget of 3 stimuli is used up."
 
 
-def test_a_device_that_measures_keeps_the_sessions_limits(scripted_strategy, scripted_device, log):
+def test_a_device_that_measures_keeps_the_sessions_limits(scripted_strategy, scripted_device, log) -> None:
     device = scripted_device(lambda stimulus: Measurement(0.1, stimulus.isi_ms + 3.0))
     result = Session(device, scripted_strategy(2), log=log, signals=SignalLimits(isi_tolerance_ms=2.0)).run()
     assert {trial.reason for trial in result.trials} == {MistrialReason.ISI_OFF}
 
 
-def test_an_error_of_the_observer_ends_the_session_with_an_intact_log(scripted_strategy, scripted_device, log):
-    def on_trial(update):
+def test_an_error_of_the_observer_ends_the_session_with_an_intact_log(scripted_strategy, scripted_device, log) -> None:
+    def on_trial(update) -> Never:
         raise ZeroDivisionError(update)
 
     device = scripted_device()
@@ -271,14 +274,16 @@ def test_an_error_of_the_observer_ends_the_session_with_an_intact_log(scripted_s
     assert device.calls == ["stage", "stop", "unstage"]
 
 
-def test_a_device_on_another_reference_is_refused(scripted_strategy, scripted_device, log):
+def test_a_device_on_another_reference_is_refused(scripted_strategy, scripted_device, log) -> None:
     device = scripted_device()
     object.__setattr__(device.info, "reference", "impact")
     with pytest.raises(DeviceError, match="different events"):
         Session(device, scripted_strategy(), log=log)
 
 
-def test_an_existing_log_stops_the_session_before_anything_is_delivered(scripted_strategy, scripted_device, log):
+def test_an_existing_log_stops_the_session_before_anything_is_delivered(
+    scripted_strategy, scripted_device, log
+) -> None:
     log.write_bytes(b"precious")
     device = scripted_device()
     with pytest.raises(LogError, match="never overwritten"):
@@ -287,11 +292,11 @@ def test_an_existing_log_stops_the_session_before_anything_is_delivered(scripted
     assert log.read_bytes() == b"precious"
 
 
-def test_without_a_writable_log_nothing_is_delivered(scripted_strategy, scripted_device, log, monkeypatch):
+def test_without_a_writable_log_nothing_is_delivered(scripted_strategy, scripted_device, log, monkeypatch) -> None:
     device = scripted_device()
 
     def answer(stimulus):
-        def full(_):
+        def full(_) -> Never:
             raise OSError(28, "No space left on device")
 
         monkeypatch.setattr(os, "fsync", full)
@@ -308,7 +313,7 @@ def test_without_a_writable_log_nothing_is_delivered(scripted_strategy, scripted
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 @pytest.mark.parametrize("delay_s", [0.005, 0.05, 0.12, 0.2])
-def test_ctrl_c_at_any_time_leaves_an_intact_log(scripted_strategy, scripted_device, log, delay_s):
+def test_ctrl_c_at_any_time_leaves_an_intact_log(scripted_strategy, scripted_device, log, delay_s) -> None:
     device = scripted_device()
     session = Session(device, scripted_strategy(100_000), log=log, limits=Limits(0, 200, 0.0, 100_000))
     timer = threading.Timer(delay_s, os.kill, (os.getpid(), signal.SIGINT))
@@ -335,7 +340,7 @@ def test_ctrl_c_at_any_time_leaves_an_intact_log(scripted_strategy, scripted_dev
 
 def test_a_strategy_that_knows_of_other_trials_is_refused_before_anything_is_delivered(
     scripted_strategy, scripted_device, log, tmp_path
-):
+) -> None:
     strategy, device = scripted_strategy(3), scripted_device()
     Session(scripted_device(), strategy, log=tmp_path / "another.mcap").run()
     with pytest.raises(StrategyError, match=r"not this session's; got '3 trials'; expected 0 .*restarted"):
@@ -346,7 +351,7 @@ def test_a_strategy_that_knows_of_other_trials_is_refused_before_anything_is_del
 
 
 @pytest.mark.parametrize("times", [{"timeout_s": 0.0}, {"timeout_s": math.nan}, {"ask_deadline_s": -1.0}])
-def test_times_that_nobody_can_keep_are_refused(scripted_strategy, scripted_device, log, times):
+def test_times_that_nobody_can_keep_are_refused(scripted_strategy, scripted_device, log, times) -> None:
     with pytest.raises(InvalidValueError, match=r"timeout_s|deadline_s"):
         Session(scripted_device(), scripted_strategy(3), log=log, **times)
 
@@ -354,7 +359,7 @@ def test_times_that_nobody_can_keep_are_refused(scripted_strategy, scripted_devi
 @pytest.mark.parametrize("channels", [{"emg": "microvolt"}, {"event": "mV"}])
 def test_channels_that_cannot_be_judged_or_logged_are_refused_before_anything_is_delivered(
     scripted_strategy, scripted_device, log, channels
-):
+) -> None:
     device = scripted_device()
     info = dataclasses.replace(device.describe(), channels=channels)
     device.describe = lambda: info
@@ -362,7 +367,7 @@ def test_channels_that_cannot_be_judged_or_logged_are_refused_before_anything_is
         Session(device, scripted_strategy(3), log=log)
 
 
-def test_numbers_of_numpy_are_numbers(scripted_device, space, log):
+def test_numbers_of_numpy_are_numbers(scripted_device, space, log) -> None:
     strategy = make_strategy("even", space, np.int64(3), max_trials=np.int64(2), particles=np.int64(64))
     limits = Limits(np.int64(0), np.float32(space.high_ms), np.float32(5), np.int64(2))
     result = Session(scripted_device(), strategy, log=log, limits=limits).run()
@@ -370,8 +375,8 @@ def test_numbers_of_numpy_are_numbers(scripted_device, space, log):
     assert read_session(log).header.strategy.settings["particles"] == 64
 
 
-def test_to_run_a_session_again_that_failed_says_how_to_go_on(scripted_strategy, scripted_device, log):
-    def answer(stimulus):
+def test_to_run_a_session_again_that_failed_says_how_to_go_on(scripted_strategy, scripted_device, log) -> None:
+    def answer(stimulus) -> Never:
         raise DeviceError(f"unplugged at {stimulus}")
 
     session = Session(scripted_device(answer), scripted_strategy(3), log=log)

@@ -39,7 +39,7 @@ def uninterrupted(scripted_strategy, scripted_device, tmp_path):
 
 
 def stop_after(trials):
-    def on_trial(update):
+    def on_trial(update) -> None:
         if update.trial.index + 1 == trials:
             raise KeyboardInterrupt
 
@@ -56,7 +56,7 @@ def interrupted(scripted_strategy, scripted_device, log):
 
 def test_a_resumed_session_asks_what_an_uninterrupted_one_would_have(
     interrupted, scripted_strategy, scripted_device, uninterrupted
-):
+) -> None:
     device = scripted_device()
     result = resume(interrupted, device, scripted_strategy(10)).run()
     assert [stimulus.isi_ms for stimulus in device.delivered] == uninterrupted[4:]
@@ -66,14 +66,14 @@ def test_a_resumed_session_asks_what_an_uninterrupted_one_would_have(
     assert [event.kind for event in record.events] == ["fault", "resume"]
 
 
-def test_resuming_twice_is_no_different(interrupted, scripted_strategy, scripted_device, uninterrupted):
+def test_resuming_twice_is_no_different(interrupted, scripted_strategy, scripted_device, uninterrupted) -> None:
     with pytest.raises(KeyboardInterrupt):
         resume(interrupted, scripted_device(), scripted_strategy(10), on_trial=stop_after(7)).run()
     result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
     assert [trial.commanded_isi_ms for trial in result.trials] == uninterrupted
 
 
-def test_resuming_a_finished_session_delivers_nothing(scripted_strategy, scripted_device, log):
+def test_resuming_a_finished_session_delivers_nothing(scripted_strategy, scripted_device, log) -> None:
     Session(scripted_device(), scripted_strategy(3), log=log).run()
     device = scripted_device()
     result = resume(log, device, scripted_strategy(3)).run()
@@ -82,14 +82,14 @@ def test_resuming_a_finished_session_delivers_nothing(scripted_strategy, scripte
     assert len(read_session(log).table) == 3
 
 
-def kill_during_trial_4(log, isi_ms):
+def kill_during_trial_4(log, isi_ms) -> None:
     with LogWriter.continuing(log, salvage(log), read_session(log).header) as writer:
         writer.append(Intent(trial=4, isi_ms=isi_ms))
 
 
 def test_a_stimulus_without_outcome_becomes_a_mistrial_and_is_asked_again(
     interrupted, scripted_strategy, scripted_device, uninterrupted
-):
+) -> None:
     kill_during_trial_4(interrupted, uninterrupted[4])
     device = scripted_device()
     session = resume(interrupted, device, scripted_strategy(10))
@@ -102,7 +102,7 @@ def test_a_stimulus_without_outcome_becomes_a_mistrial_and_is_asked_again(
     assert len(session.strategy.posterior.told) == 9
 
 
-def test_earlier_stimuli_count_against_the_limits(interrupted, scripted_strategy, scripted_device, space):
+def test_earlier_stimuli_count_against_the_limits(interrupted, scripted_strategy, scripted_device, space) -> None:
     device = scripted_device()
     limits = Limits.of_space(space, max_pulses=6)
     result = resume(interrupted, device, scripted_strategy(10), limits=limits).run()
@@ -112,7 +112,7 @@ def test_earlier_stimuli_count_against_the_limits(interrupted, scripted_strategy
 
 def test_what_a_session_went_on_with_holds_when_it_is_resumed_again(
     interrupted, scripted_strategy, scripted_device, space
-):
+) -> None:
     before, limits, device = read_session(interrupted).header, Limits.of_space(space, max_pulses=6), scripted_device()
     device.info = dataclasses.replace(device.info, version="2.1")
     resume(interrupted, device, scripted_strategy(10), limits=limits, timeout_s=9.0).run()
@@ -124,7 +124,7 @@ def test_what_a_session_went_on_with_holds_when_it_is_resumed_again(
     assert again.delivered == []
 
 
-def test_the_header_of_each_part_stays_in_the_log(interrupted, scripted_strategy, scripted_device, space):
+def test_the_header_of_each_part_stays_in_the_log(interrupted, scripted_strategy, scripted_device, space) -> None:
     headers = [read_session(interrupted).header]
     for pulses in (6, 8):
         resume(
@@ -137,26 +137,30 @@ def test_the_header_of_each_part_stays_in_the_log(interrupted, scripted_strategy
     assert len({header.limits for header in headers}) == 3
 
 
-def test_the_first_stimulus_after_resuming_waits_a_whole_interval(interrupted, scripted_strategy, scripted_device):
+def test_the_first_stimulus_after_resuming_waits_a_whole_interval(
+    interrupted, scripted_strategy, scripted_device
+) -> None:
     resume(interrupted, scripted_device(), scripted_strategy(10)).run()
     assert read_session(interrupted).intents[4].t_s == 5.0
 
 
-def test_another_strategy_is_refused_before_anything_happens(interrupted, scripted_strategy, scripted_device):
+def test_another_strategy_is_refused_before_anything_happens(interrupted, scripted_strategy, scripted_device) -> None:
     before = interrupted.read_bytes()
     with pytest.raises(StrategyError, match="does not ask again what was asked in trial 0"):
         resume(interrupted, scripted_device(), scripted_strategy(10, seed=1))
     assert interrupted.read_bytes() == before
 
 
-def test_without_verification_the_logged_trials_are_told_as_they_are(interrupted, scripted_strategy, scripted_device):
+def test_without_verification_the_logged_trials_are_told_as_they_are(
+    interrupted, scripted_strategy, scripted_device
+) -> None:
     result = resume(interrupted, scripted_device(), scripted_strategy(10, seed=1), verify=False).run()
     assert len(result.trials) == 10
 
 
 def test_an_ask_that_was_answered_by_the_fallback_is_replayed_as_logged(
     scripted_strategy, scripted_device, log, monkeypatch
-):
+) -> None:
     strategy = scripted_strategy(10)
     asked = strategy.ask
     monkeypatch.setattr(strategy, "ask", lambda _=None: 1.0 if len(strategy.posterior.told) == 2 else asked())
@@ -175,7 +179,7 @@ def test_an_ask_that_was_answered_by_the_fallback_is_replayed_as_logged(
 )
 def test_the_times_allowed_are_those_of_the_log_or_of_the_call(
     scripted_strategy, scripted_device, log, monkeypatch, overrides, timeout_s, ask_deadline_s
-):
+) -> None:
     times = {"timeout_s": 7.0, "ask_deadline_s": 40.0}
     with pytest.raises(KeyboardInterrupt):
         Session(scripted_device(), scripted_strategy(4), log=log, on_trial=stop_after(2), **times).run()
@@ -188,12 +192,14 @@ def test_the_times_allowed_are_those_of_the_log_or_of_the_call(
     assert (set(timeouts), set(deadlines)) == ({timeout_s}, {ask_deadline_s})
 
 
-def test_a_strategy_of_own_objects_must_be_handed_over(interrupted, scripted_device):
+def test_a_strategy_of_own_objects_must_be_handed_over(interrupted, scripted_device) -> None:
     with pytest.raises(StrategyError, match="own objects"):
         resume(interrupted, scripted_device())
 
 
-def test_an_exclusion_counts_from_where_it_stands(interrupted, scripted_strategy, scripted_device, uninterrupted):
+def test_an_exclusion_counts_from_where_it_stands(
+    interrupted, scripted_strategy, scripted_device, uninterrupted
+) -> None:
     exclude(interrupted, 1, "sneezed")
     device = scripted_device()
     session = resume(interrupted, device, scripted_strategy(10))
@@ -208,18 +214,18 @@ def test_an_exclusion_counts_from_where_it_stands(interrupted, scripted_strategy
 
 
 @pytest.mark.parametrize("trial", [-1, 4, 99])
-def test_only_a_trial_that_counts_can_be_excluded(interrupted, trial):
+def test_only_a_trial_that_counts_can_be_excluded(interrupted, trial) -> None:
     with pytest.raises(InvalidValueError, match="no such trial"):
         exclude(interrupted, trial, "because")
 
 
-def test_a_trial_is_excluded_once(interrupted):
+def test_a_trial_is_excluded_once(interrupted) -> None:
     exclude(interrupted, 1, "sneezed")
     with pytest.raises(InvalidValueError, match="no such trial"):
         exclude(interrupted, 1, "sneezed")
 
 
-def lose_trial_1(log):
+def lose_trial_1(log) -> None:
     whole = bytearray(log.read_bytes())
     blocks = [at for at in range(len(whole)) if whole.startswith(b"\x04\x00\x00\x00zstd", at)]
     whole[blocks[5] + 40] ^= 0xFF  # header, then intent, trial, estimate of each trial: the trial of number 1
@@ -227,7 +233,7 @@ def lose_trial_1(log):
     assert [intent.trial for intent in read_session(log).unknown] == [1]
 
 
-def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted, scripted_strategy, scripted_device):
+def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted, scripted_strategy, scripted_device) -> None:
     lose_trial_1(interrupted)
     result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
     assert result.trials[1].reason is MistrialReason.OUTCOME_UNKNOWN
@@ -237,7 +243,7 @@ def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted, scripted_strate
     assert again.trials == result.trials
 
 
-def test_a_log_with_a_lost_trial_goes_on_after_an_exclusion(interrupted, scripted_strategy, scripted_device):
+def test_a_log_with_a_lost_trial_goes_on_after_an_exclusion(interrupted, scripted_strategy, scripted_device) -> None:
     lose_trial_1(interrupted)
     with pytest.raises(KeyboardInterrupt):
         resume(interrupted, scripted_device(), scripted_strategy(10), on_trial=stop_after(6)).run()
@@ -251,7 +257,7 @@ def test_a_log_with_a_lost_trial_goes_on_after_an_exclusion(interrupted, scripte
 
 def test_what_was_asked_before_an_exclusion_is_compared_as_it_was_asked(
     interrupted, scripted_strategy, scripted_device, uninterrupted
-):
+) -> None:
     kill_during_trial_4(interrupted, uninterrupted[4])
     exclude(interrupted, 1, "sneezed")
     result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
@@ -260,7 +266,9 @@ def test_what_was_asked_before_an_exclusion_is_compared_as_it_was_asked(
     assert again.trials == result.trials
 
 
-def test_a_stimulus_of_which_nothing_is_left_is_compared_with_nothing(interrupted, scripted_strategy, scripted_device):
+def test_a_stimulus_of_which_nothing_is_left_is_compared_with_nothing(
+    interrupted, scripted_strategy, scripted_device
+) -> None:
     with LogWriter.continuing(interrupted, salvage(interrupted), read_session(interrupted).header) as writer:
         writer.append(Intent(trial=5, isi_ms=77.0))  # intent and trial 4 are lost; what was told of it is not known
     result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
@@ -269,13 +277,15 @@ def test_a_stimulus_of_which_nothing_is_left_is_compared_with_nothing(interrupte
     assert again.trials == result.trials
 
 
-def test_what_was_asked_and_never_answered_is_compared_as_well(interrupted, scripted_strategy, scripted_device):
+def test_what_was_asked_and_never_answered_is_compared_as_well(interrupted, scripted_strategy, scripted_device) -> None:
     kill_during_trial_4(interrupted, 199.0)
     with pytest.raises(StrategyError, match="does not ask again what was asked in trial 4"):
         resume(interrupted, scripted_device(), scripted_strategy(10))
 
 
-def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(scripted_strategy, scripted_device, log):
+def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(
+    scripted_strategy, scripted_device, log
+) -> None:
     real, clock = scripted_device(simulated=False), VirtualClock()
     with pytest.raises(KeyboardInterrupt):
         Session(real, scripted_strategy(10), log=log, clock=clock, on_trial=stop_after(4)).run()
@@ -286,7 +296,7 @@ def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(script
     assert len(resume(log, real, scripted_strategy(10), clock=clock).run().trials) == 10
 
 
-def test_a_simulated_session_does_not_go_on_with_a_real_device(interrupted, scripted_strategy, scripted_device):
+def test_a_simulated_session_does_not_go_on_with_a_real_device(interrupted, scripted_strategy, scripted_device) -> None:
     real, before = scripted_device(simulated=False), interrupted.read_bytes()
     with pytest.raises(DeviceError, match=r"run with a simulated device.*Start a session of its own"):
         resume(interrupted, real, scripted_strategy(10))
@@ -294,7 +304,7 @@ def test_a_simulated_session_does_not_go_on_with_a_real_device(interrupted, scri
     assert real.delivered == []
 
 
-def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted, scripted_strategy, scripted_device):
+def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted, scripted_strategy, scripted_device) -> None:
     first = resume(interrupted, scripted_device(), scripted_strategy(10))
     device = scripted_device()
     second = resume(interrupted, device, scripted_strategy(10))
@@ -305,7 +315,7 @@ def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted, script
     assert len(read_session(interrupted).table) == 10
 
 
-def test_what_is_no_log_cannot_be_resumed(tmp_path, scripted_device):
+def test_what_is_no_log_cannot_be_resumed(tmp_path, scripted_device) -> None:
     with pytest.raises(LogError, match="no such log"):
         resume(tmp_path / "nothing.mcap", scripted_device())
 
@@ -315,7 +325,7 @@ def simulated_person():
     return SimulatedDevice(SimulatedPerson(lambda isi_ms: person.respond(isi_ms, "valve"), "valve"))
 
 
-def test_a_default_session_with_a_drifting_person_goes_on_as_if_never_interrupted(tmp_path):
+def test_a_default_session_with_a_drifting_person_goes_on_as_if_never_interrupted(tmp_path) -> None:
     def strategy():
         return make_strategy("default", space=VALVE_SPACE, seed=2, max_trials=7)
 
@@ -365,7 +375,7 @@ Session(device, strategy, log={log!r}, clock=clock, on_trial=on_trial).run()
 )
 def test_a_killed_session_loses_nothing_and_asks_the_same_again(
     log, scripted_strategy, scripted_device, uninterrupted, point, open_intents
-):
+) -> None:
     script = VICTIM.format(tests=str(Path(__file__).parents[1]), point=point, log=str(log))
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as victim:  # noqa: S603
         assert victim.stdout.readline() == "hanging\n"
@@ -383,7 +393,7 @@ def test_a_killed_session_loses_nothing_and_asks_the_same_again(
     assert not log.with_name("s.mcap.part").exists()
 
 
-def test_a_measured_zero_and_its_uncertainty_are_replayed(scripted_strategy, scripted_device, log):
+def test_a_measured_zero_and_its_uncertainty_are_replayed(scripted_strategy, scripted_device, log) -> None:
     def answer(stimulus):
         return Measurement(0.0, stimulus.isi_ms + 0.25, isi_sd_ms=2.0)
 

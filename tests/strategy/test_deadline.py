@@ -8,6 +8,7 @@ import isiw
 from isiw.errors import InvalidValueError
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
+from typing import Never
 
 
 @dataclass(frozen=True)
@@ -38,13 +39,13 @@ def held_up(scripted_strategy, go) -> Strategy:
     return Strategy(usual.space, usual.model, HeldUp(go), Budget(2))
 
 
-def test_past_the_deadline_an_isi_of_the_grid_is_asked_with_the_reason(held_up):
+def test_past_the_deadline_an_isi_of_the_grid_is_asked_with_the_reason(held_up) -> None:
     isi_ms = held_up.ask(deadline_s=0.01)
     assert isi_ms in held_up.space.grid_ms
     assert "0.01 s" in held_up.fallback_reason
 
 
-def test_the_fallback_stays_until_the_next_tell_and_no_longer(held_up, go):
+def test_the_fallback_stays_until_the_next_tell_and_no_longer(held_up, go) -> None:
     first = held_up.ask(deadline_s=0.01)
     go.set()
     assert held_up.ask() == first
@@ -55,7 +56,7 @@ def test_the_fallback_stays_until_the_next_tell_and_no_longer(held_up, go):
     assert held_up.fallback_reason is None
 
 
-def test_fallbacks_differ_from_trial_to_trial(held_up):
+def test_fallbacks_differ_from_trial_to_trial(held_up) -> None:
     asked = []
     for _ in range(4):
         asked.append(held_up.ask(deadline_s=0.0))
@@ -63,29 +64,29 @@ def test_fallbacks_differ_from_trial_to_trial(held_up):
     assert len(set(asked)) == 4
 
 
-def test_within_the_deadline_the_choice_is_the_usual_one(held_up, go):
+def test_within_the_deadline_the_choice_is_the_usual_one(held_up, go) -> None:
     go.set()
     assert held_up.ask(deadline_s=30.0) == 40.0
     assert held_up.fallback_reason is None
 
 
 @pytest.mark.parametrize("deadline_s", [float("inf"), 1e300])
-def test_a_deadline_that_never_comes_is_none(held_up, go, deadline_s):
+def test_a_deadline_that_never_comes_is_none(held_up, go, deadline_s) -> None:
     go.set()
     assert held_up.ask(deadline_s=deadline_s) == 40.0
     assert held_up.fallback_reason is None
 
 
-def test_a_session_may_be_given_all_the_time_there_is(scripted_strategy, scripted_device, tmp_path):
+def test_a_session_may_be_given_all_the_time_there_is(scripted_strategy, scripted_device, tmp_path) -> None:
     log = tmp_path / "session.mcap"
     isiw.Session(scripted_device(), scripted_strategy(2), log=log, ask_deadline_s=float("inf")).run()
     assert isiw.read_session(log).header.ask_deadline_s is None
 
 
-def test_a_choice_that_fails_within_the_deadline_is_an_error_not_a_fallback(scripted_strategy):
+def test_a_choice_that_fails_within_the_deadline_is_an_error_not_a_fallback(scripted_strategy) -> None:
     usual = scripted_strategy()
 
-    def broken(posterior, isi_ms):
+    def broken(posterior, isi_ms) -> Never:
         raise ArithmeticError(f"no scores for {posterior.told} at {len(isi_ms)} ISIs")
 
     broken.needs = ()
@@ -94,12 +95,12 @@ def test_a_choice_that_fails_within_the_deadline_is_an_error_not_a_fallback(scri
 
 
 @pytest.mark.parametrize("deadline_s", [-1.0, float("nan")])
-def test_a_deadline_that_cannot_be_is_refused(held_up, deadline_s):
+def test_a_deadline_that_cannot_be_is_refused(held_up, deadline_s) -> None:
     with pytest.raises(InvalidValueError, match="deadline_s"):
         held_up.ask(deadline_s=deadline_s)
 
 
-def test_a_session_logs_every_fallback_on_its_trial(held_up, scripted_device, tmp_path):
+def test_a_session_logs_every_fallback_on_its_trial(held_up, scripted_device, tmp_path) -> None:
     log = tmp_path / "session.mcap"
     isiw.Session(scripted_device(), held_up, log=log, ask_deadline_s=0.01).run()
     record = isiw.read_session(log)

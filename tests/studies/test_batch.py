@@ -33,7 +33,7 @@ def one_at_a_time(batch):
 
 
 @pytest.mark.parametrize("strategy", EVERY)
-def test_a_batch_of_one_is_that_session(strategy):
+def test_a_batch_of_one_is_that_session(strategy) -> None:
     batch = sessions(strategy, 1, first=2, trials=9)
     pd.testing.assert_frame_equal(timeless(simulate_batch(batch)), timeless(one_at_a_time(batch)))
 
@@ -43,7 +43,7 @@ def test_a_batch_of_one_is_that_session(strategy):
     # NR draws to choose what to ask after its six initial ISIs; PF when a generation is complete.
     [("incremental", 30), ("nr", 6)],
 )
-def test_where_nothing_is_drawn_a_batch_is_its_sessions(strategy, trials):
+def test_where_nothing_is_drawn_a_batch_is_its_sessions(strategy, trials) -> None:
     batch = sessions(strategy, 4, trials=trials, cohort="jitter")
     together, apart = (timeless(rows) for rows in (simulate_batch(batch), one_at_a_time(batch)))
     assert (together["mistrials"] == apart["mistrials"]).all()
@@ -52,7 +52,7 @@ def test_where_nothing_is_drawn_a_batch_is_its_sessions(strategy, trials):
     )
 
 
-def test_each_person_is_asked_by_a_draw_of_its_own_where_the_acquisition_function_draws(monkeypatch):
+def test_each_person_is_asked_by_a_draw_of_its_own_where_the_acquisition_function_draws(monkeypatch) -> None:
     asked, usual = {}, Responder.respond
 
     def respond(responder, isi_ms, reference):
@@ -68,13 +68,13 @@ def test_each_person_is_asked_by_a_draw_of_its_own_where_the_acquisition_functio
     assert len(set(map(tuple, together))) == 3
 
 
-def test_a_batch_is_the_same_again_and_other_people_change_it():
+def test_a_batch_is_the_same_again_and_other_people_change_it() -> None:
     rows = [timeless(simulate_batch(sessions("default", people))) for people in (3, 3, 2)]
     pd.testing.assert_frame_equal(rows[0], rows[1])
     assert not rows[0][rows[0]["person"] < 2].equals(rows[2])
 
 
-def test_a_session_that_ends_keeps_its_last_estimate():
+def test_a_session_that_ends_keeps_its_last_estimate() -> None:
     batch = sessions("incremental", 2, trials=40, stopping="ends", max_trials=25)
     rows = simulate_batch([replace(session, marks=(10, 30, 40)) for session in batch])
     assert rows["delivered"].tolist() == [10, 25, 25] * 2
@@ -83,7 +83,7 @@ def test_a_session_that_ends_keeps_its_last_estimate():
     assert rows["stop_reason"].iloc[-1] == "The budget of 25 stimuli is used up."
 
 
-def test_each_person_stops_by_its_own_rule():
+def test_each_person_stops_by_its_own_rule() -> None:
     batch = sessions("nr", 4, trials=30, stopping="ends", cohort="gaussian", stop_variance_ms2=400.0)
     rows = simulate_batch(batch)
     last = rows[rows["trial"] == 30]
@@ -106,7 +106,7 @@ class NaNForOne:
         return scores
 
 
-def test_a_person_without_a_finite_score_falls_back_alone(monkeypatch):
+def test_a_person_without_a_finite_score_falls_back_alone(monkeypatch) -> None:
     def player(session):
         usual = make_strategy("nr", session.space, session.seed)
         return Strategy(session.space, usual.model, NaNForOne(), EdgeVariance(), seed=session.seed)
@@ -116,21 +116,21 @@ def test_a_person_without_a_finite_score_falls_back_alone(monkeypatch):
     assert rows[rows["trial"] == 5]["fallbacks"].tolist() == [0, 5, 0]
 
 
-def test_a_device_reaches_the_models_that_have_one_and_no_others():
+def test_a_device_reaches_the_models_that_have_one_and_no_others() -> None:
     with pytest.raises((RuntimeError, AssertionError, NotImplementedError)):
         simulate_batch(sessions("default", 2), device="xla")
     assert len(simulate_batch(sessions("nr", 2, trials=2), device="xla")) == 2 * 2
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU")
-def test_a_batch_on_a_gpu_finds_windows_as_well():
+def test_a_batch_on_a_gpu_finds_windows_as_well() -> None:
     rows = simulate_batch(sessions("default", 8, trials=20, cohort="gaussian", particles=500), device="cuda")
     assert rows[rows["trial"] == 20]["f1"].mean() > 0.7
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("strategy", "trials"), [("default", 15), ("nr", 20), ("pf", 40)])
-def test_the_mean_f1_of_a_batch_is_that_of_one_at_a_time(strategy, trials):
+def test_the_mean_f1_of_a_batch_is_that_of_one_at_a_time(strategy, trials) -> None:
     # The same people with the same noise, other draws of the model: paired, so that people do not blur the difference.
     batch = sessions(strategy, 40, trials=trials, cohort="gaussian", stopping="ignored")
     together, apart = (

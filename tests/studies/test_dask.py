@@ -25,19 +25,19 @@ def client(cluster):
         yield client
 
 
-def test_a_study_has_identical_rows_on_a_cluster(tmp_path, cluster):
+def test_a_study_has_identical_rows_on_a_cluster(tmp_path, cluster) -> None:
     here = conduct(tiny(), tmp_path / "here")
     there = conduct(tiny(), tmp_path / "there", DaskCluster(cluster.scheduler_address))
     pd.testing.assert_frame_equal(timeless(there.rows()), timeless(here.rows()))
 
 
-def test_what_raises_on_a_cluster_is_a_failure_among_the_results(client):
+def test_what_raises_on_a_cluster_is_a_failure_among_the_results(client) -> None:
     results = dict(DaskCluster(client).results(double, range(5)))
     assert results.pop(3).error == "ValueError: three is too many"
     assert results == {0: 0, 1: 2, 2: 4, 4: 8}
 
 
-def test_what_takes_workers_of_a_cluster_down_is_given_up_and_the_others_finish(client):
+def test_what_takes_workers_of_a_cluster_down_is_given_up_and_the_others_finish(client) -> None:
     results = dict(DaskCluster(client).results(double_or_die, range(5)))
     failure = results.pop(3)
     assert isinstance(failure, Failure)
@@ -45,20 +45,20 @@ def test_what_takes_workers_of_a_cluster_down_is_given_up_and_the_others_finish(
     assert results == {0: 0, 1: 2, 2: 4, 4: 8}
 
 
-def test_stopping_early_leaves_the_cluster_free_for_others(client):
+def test_stopping_early_leaves_the_cluster_free_for_others(client) -> None:
     results = DaskCluster(client).results(double, range(20))
     next(results)
     results.close()
     assert client.submit(double, 21).result(timeout=10) == 42
 
 
-def test_a_scheduler_that_is_not_there_is_told(monkeypatch):
+def test_a_scheduler_that_is_not_there_is_told(monkeypatch) -> None:
     monkeypatch.setattr("distributed.Client", lambda address: (_ for _ in ()).throw(OSError(f"timed out: {address}")))
     with pytest.raises(StudyError, match=r"cannot be reached; got 'tcp://127.0.0.1:1'"):
         list(DaskCluster("tcp://127.0.0.1:1").results(double, [1]))
 
 
-def test_the_loss_of_the_scheduler_ends_the_study_with_the_way_out():
+def test_the_loss_of_the_scheduler_ends_the_study_with_the_way_out() -> None:
     with LocalCluster(n_workers=1, processes=False, dashboard_address=":0") as lost, Client(lost) as client:
         results = DaskCluster(client).results(double, [1] * 50)
         next(results)

@@ -15,14 +15,14 @@ def blocks(language):
     return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
 
 
-def test_the_study_is_valid():
+def test_the_study_is_valid() -> None:
     (block,) = blocks("toml")
     study = study_from(tomllib.loads(block), "docs")
     assert len(study.units()) == 3 * 2 * 100
     assert study.units()[1].key == "nr.recruitment.00000"
 
 
-def test_the_example_in_python_runs(tmp_path, monkeypatch, capsys):
+def test_the_example_in_python_runs(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     exec(compile(blocks("python")[0], "studies.md", "exec"), {"__name__": "docs"})  # noqa: S102 - the point of the test
     printed = capsys.readouterr().out
@@ -30,7 +30,7 @@ def test_the_example_in_python_runs(tmp_path, monkeypatch, capsys):
     assert len(list((tmp_path / "small.study" / "parts").iterdir())) == 8
 
 
-def test_every_column_of_a_row_is_explained(tmp_path, monkeypatch):
+def test_every_column_of_a_row_is_explained(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     names = {"__name__": "docs"}
     exec(compile(blocks("python")[0], "studies.md", "exec"), names)  # noqa: S102 - as above

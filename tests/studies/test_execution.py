@@ -11,12 +11,13 @@ import pytest
 from isiw.errors import InvalidValueError, StudyError
 from isiw.studies.execution import DaskCluster, Failure, Processes, _attempt_alone
 from studies.tiny import double, double_or_die, double_or_die_once, process_id
+from typing import Never
 
 posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_what_raises_is_a_failure_among_the_results(workers):
+def test_what_raises_is_a_failure_among_the_results(workers) -> None:
     results = dict(Processes(workers).results(double, range(6)))
     failure = results.pop(3)
     assert results == {0: 0, 1: 2, 2: 4, 4: 8, 5: 10}
@@ -25,7 +26,7 @@ def test_what_raises_is_a_failure_among_the_results(workers):
 
 
 @posix
-def test_what_takes_its_worker_down_again_and_again_is_given_up_and_the_others_finish():
+def test_what_takes_its_worker_down_again_and_again_is_given_up_and_the_others_finish() -> None:
     results = dict(Processes(2, attempts=2).results(double_or_die, range(6)))
     failure = results.pop(3)
     assert results == {0: 0, 1: 2, 2: 4, 4: 8, 5: 10}
@@ -34,14 +35,14 @@ def test_what_takes_its_worker_down_again_and_again_is_given_up_and_the_others_f
 
 
 @posix
-def test_what_runs_while_a_worker_dies_is_run_again(tmp_path):
+def test_what_runs_while_a_worker_dies_is_run_again(tmp_path) -> None:
     items = [(number, tmp_path / "witness") for number in range(6)]
     results = [(item[0], result) for item, result in Processes(2).results(double_or_die_once, items)]
     assert sorted(results) == [(number, 2 * number) for number in range(6)]
 
 
 @posix
-def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for():
+def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for() -> None:
     results = Processes(2).results(process_id, range(20))
     _, first = next(results)
     os.kill(first, signal.SIGINT)
@@ -50,7 +51,7 @@ def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for():
     assert first in rest
 
 
-def test_stopping_early_leaves_the_rest_undone():
+def test_stopping_early_leaves_the_rest_undone() -> None:
     results = Processes(2).results(double, range(100))
     next(results)
     results.close()
@@ -58,15 +59,15 @@ def test_stopping_early_leaves_the_rest_undone():
 
 
 @pytest.mark.parametrize("wrong", [{"workers": 0}, {"attempts": 0}])
-def test_no_worker_or_attempt_is_refused(wrong):
+def test_no_worker_or_attempt_is_refused(wrong) -> None:
     with pytest.raises(InvalidValueError, match="at least 1"):
         Processes(**wrong)
 
 
-def test_a_worker_of_many_threads_runs_one_session_at_a_time():
+def test_a_worker_of_many_threads_runs_one_session_at_a_time() -> None:
     inside, most = [], []
 
-    def run(item):
+    def run(item) -> None:
         inside.append(item)
         most.append(len(inside))
         threading.Event().wait(0.01)
@@ -80,8 +81,8 @@ def test_a_worker_of_many_threads_runs_one_session_at_a_time():
     assert most == [1] * 5
 
 
-def test_without_dask_the_message_says_how_to_get_it(monkeypatch):
-    def missing(name):
+def test_without_dask_the_message_says_how_to_get_it(monkeypatch) -> None:
+    def missing(name) -> Never:
         raise ModuleNotFoundError(name)
 
     monkeypatch.setattr("isiw.studies.execution.importlib.import_module", missing)

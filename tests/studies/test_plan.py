@@ -18,27 +18,27 @@ def people_by_strategy(study):
     return [(session.label, session.cohort, session.person) for unit in study.units() for session in unit.sessions]
 
 
-def test_every_strategy_meets_the_same_people_with_the_same_seed():
+def test_every_strategy_meets_the_same_people_with_the_same_seed() -> None:
     sessions = [session for unit in tiny().units() for session in unit.sessions]
     met = {(s.label, s.cohort, s.person, s.seed) for s in sessions}
     assert len(sessions) == len(met) == 2 * 2 * 3
     assert {m[1:] for m in met if m[0] == "even"} == {m[1:] for m in met if m[0] == "incremental"}
 
 
-def test_batches_hold_the_same_sessions_as_units_of_their_own():
+def test_batches_hold_the_same_sessions_as_units_of_their_own() -> None:
     single, batched = tiny(), tiny(engine="batched", batch=2)
     assert sorted(people_by_strategy(single)) == sorted(people_by_strategy(batched))
     assert [len(unit.sessions) for unit in batched.units()] == [2] * 4 + [1] * 4
     assert batched.units()[0].key == "even.gaussian.00000-00001"
 
 
-def test_more_people_leave_the_keys_of_the_others_alone():
+def test_more_people_leave_the_keys_of_the_others_alone() -> None:
     few, many = ({unit.key: unit for unit in tiny(people=n).units()} for n in (3, 5))
     assert few.items() <= many.items()
     assert len(many) == 2 * 2 * 5
 
 
-def test_a_study_from_toml_has_defaults_and_short_forms(tmp_path):
+def test_a_study_from_toml_has_defaults_and_short_forms(tmp_path) -> None:
     (tmp_path / "study.toml").write_text(TOML + 'space = "impact"\n')
     study = load_study(tmp_path / "study.toml")
     assert study.strategies == (StudyStrategy("even", {"particles": 40}), StudyStrategy("incremental"))
@@ -47,12 +47,12 @@ def test_a_study_from_toml_has_defaults_and_short_forms(tmp_path):
     assert study_from({"strategies": ["even"], "cohorts": ["wide"]}, "here").space == VALVE_SPACE
 
 
-def test_marks_are_each_fifth_trial_and_the_last_by_default():
+def test_marks_are_each_fifth_trial_and_the_last_by_default() -> None:
     assert tiny(trials=12, marks=()).marks == (5, 10, 12)
     assert tiny(trials=3, marks=()).marks == (3,)
 
 
-def test_toml_values_make_the_same_study_again():
+def test_toml_values_make_the_same_study_again() -> None:
     study = tiny(strategies=(StudyStrategy("pf", {"stop_sd_ms": 30, "floor": "zeroed"}, "mine"),), space=IMPACT_SPACE)
     assert study_from(tomllib.loads(tomli_w.dumps(study_values(study))), "again") == study
 
@@ -81,18 +81,18 @@ def test_toml_values_make_the_same_study_again():
         (TOML.replace('name = "even"', 'label = "a/b", name = "even"'), r"a label is part of a file's name; got 'a/b'"),
     ],
 )
-def test_what_is_wrong_with_a_file_is_told_with_the_way_out(tmp_path, text, message):
+def test_what_is_wrong_with_a_file_is_told_with_the_way_out(tmp_path, text, message) -> None:
     (tmp_path / "study.toml").write_text(text)
     with pytest.raises(ConfigError, match=message):
         load_study(tmp_path / "study.toml")
 
 
-def test_an_unknown_strategy_is_told_with_the_known_ones(tmp_path):
+def test_an_unknown_strategy_is_told_with_the_known_ones(tmp_path) -> None:
     (tmp_path / "study.toml").write_text(TOML.replace("incremental", "incrementel"))
     with pytest.raises(ConfigError, match=r"study.toml: .*unknown strategy; got 'incrementel'; expected default"):
         load_study(tmp_path / "study.toml")
 
 
-def test_from_python_what_cannot_be_is_refused_as_well():
+def test_from_python_what_cannot_be_is_refused_as_well() -> None:
     with pytest.raises(InvalidValueError, match="engine is unknown"):
         Study((StudyStrategy("even"),), ("wide",), engine="fast")

@@ -42,7 +42,7 @@ def crash(monkeypatch):
     return monkeypatch
 
 
-def test_a_study_has_one_row_a_mark_of_every_person_and_says_whose(tmp_path):
+def test_a_study_has_one_row_a_mark_of_every_person_and_says_whose(tmp_path) -> None:
     rows = conduct(tiny(), tmp_path / "s").rows()
     assert len(rows) == 2 * 2 * 3 * 2
     assert rows["unit"].iloc[0] == "even.gaussian.00000"
@@ -50,12 +50,12 @@ def test_a_study_has_one_row_a_mark_of_every_person_and_says_whose(tmp_path):
     assert open_store(tmp_path / "s").rows().equals(rows)
 
 
-def test_a_finished_study_has_nothing_left_to_run(tmp_path):
+def test_a_finished_study_has_nothing_left_to_run(tmp_path) -> None:
     assert len(keys_run(tiny(), tmp_path)) == 12
     assert keys_run(tiny(), tmp_path) == []
 
 
-def test_a_study_goes_on_with_what_is_missing_and_writes_over_what_was_cut_off(tmp_path):
+def test_a_study_goes_on_with_what_is_missing_and_writes_over_what_was_cut_off(tmp_path) -> None:
     whole = timeless(conduct(tiny(), tmp_path / "whole").rows())
     conduct(tiny(), tmp_path / "cut")
     lost = tmp_path / "cut" / "parts" / "even.gaussian.00001.parquet"
@@ -66,13 +66,13 @@ def test_a_study_goes_on_with_what_is_missing_and_writes_over_what_was_cut_off(t
     assert not list((tmp_path / "cut").rglob("*.part"))
 
 
-def test_a_folder_of_another_study_is_refused_with_what_differs(tmp_path):
+def test_a_folder_of_another_study_is_refused_with_what_differs(tmp_path) -> None:
     begin_store(tiny(), tmp_path)
     with pytest.raises(StudyError, match=r"people was 3, now 4. Choose another folder, or .*isiw study run"):
         begin_store(tiny(people=4), tmp_path)
 
 
-def test_a_folder_of_another_version_is_refused(tmp_path):
+def test_a_folder_of_another_version_is_refused(tmp_path) -> None:
     begin_store(tiny(), tmp_path)
     path = tmp_path / "study.toml"
     path.write_text(path.read_text().replace('isiw = "', 'isiw = "9.'))
@@ -80,12 +80,12 @@ def test_a_folder_of_another_version_is_refused(tmp_path):
         begin_store(tiny(), tmp_path)
 
 
-def test_a_folder_without_a_study_is_an_error(tmp_path):
+def test_a_folder_without_a_study_is_an_error(tmp_path) -> None:
     with pytest.raises(ConfigError, match="cannot be read"):
         open_store(tmp_path)
 
 
-def test_a_strategy_that_crashes_is_reported_and_the_study_finishes(tmp_path, crash):
+def test_a_strategy_that_crashes_is_reported_and_the_study_finishes(tmp_path, crash) -> None:
     store = conduct(tiny(), tmp_path)
     errors = store.errors()
     assert errors["person"].tolist() == [0, 1, 2]
@@ -101,7 +101,7 @@ def test_a_strategy_that_crashes_is_reported_and_the_study_finishes(tmp_path, cr
 
 
 @pytest.mark.parametrize("engine", ["single", "batched"])
-def test_a_replay_gives_identical_rows(tmp_path, engine):
+def test_a_replay_gives_identical_rows(tmp_path, engine) -> None:
     store = conduct(tiny(engine=engine, batch=2), tmp_path)
     for unit in store.study.units()[::3]:
         again = replay(store, unit.key)
@@ -109,7 +109,7 @@ def test_a_replay_gives_identical_rows(tmp_path, engine):
         assert len(again.kept) == len(again.again) == 2 * len(unit.sessions)
 
 
-def test_a_replay_of_one_person_of_a_batch_compares_that_person(tmp_path):
+def test_a_replay_of_one_person_of_a_batch_compares_that_person(tmp_path) -> None:
     store = conduct(tiny(engine="batched", batch=2), tmp_path)
     key, person = unit_of_row(store, 3)
     assert (key, person) == ("even.gaussian.00000-00001", 1)
@@ -118,7 +118,7 @@ def test_a_replay_of_one_person_of_a_batch_compares_that_person(tmp_path):
         replay(store, key, 2)
 
 
-def test_a_replay_says_which_columns_differ(tmp_path):
+def test_a_replay_says_which_columns_differ(tmp_path) -> None:
     store = conduct(tiny(), tmp_path)
     path = tmp_path / "parts" / "even.gaussian.00001.parquet"
     rows = pd.read_parquet(path)
@@ -127,7 +127,7 @@ def test_a_replay_says_which_columns_differ(tmp_path):
 
 
 @pytest.mark.usefixtures("crash")
-def test_what_cannot_be_replayed_is_told(tmp_path):
+def test_what_cannot_be_replayed_is_told(tmp_path) -> None:
     store = conduct(tiny(), tmp_path)
     with pytest.raises(StudyError, match="no such unit; got 'odd'"):
         replay(store, "odd")
@@ -143,10 +143,10 @@ def workers_of(process: psutil.Process) -> list[psutil.Process]:
 
 
 @posix
-def test_the_death_of_a_worker_in_mid_study_loses_no_row(tmp_path):
+def test_the_death_of_a_worker_in_mid_study_loses_no_row(tmp_path) -> None:
     study, killed, keys = tiny(people=6), [], []
 
-    def on_done(unit, _result):
+    def on_done(unit, _result) -> None:
         keys.append(unit.key)
         if len(keys) == 4:
             victim = workers_of(psutil.Process())[0]
@@ -195,7 +195,7 @@ def finished_to_the_end(folder: Path) -> pd.DataFrame:
 
 
 @posix
-def test_the_death_of_the_main_process_in_mid_study_loses_no_row(tmp_path, started):
+def test_the_death_of_the_main_process_in_mid_study_loses_no_row(tmp_path, started) -> None:
     started.kill()
     started.wait(timeout=10)
     rows = finished_to_the_end(tmp_path / "tiny.study")
@@ -204,7 +204,7 @@ def test_the_death_of_the_main_process_in_mid_study_loses_no_row(tmp_path, start
 
 
 @posix
-def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path, started):
+def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path, started) -> None:
     os.killpg(started.pid, signal.SIGINT)  # a terminal tells the workers, too
     _, errors = started.communicate(timeout=30)
     assert started.returncode == 130, errors
@@ -214,7 +214,7 @@ def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path, started):
 
 
 @pytest.mark.parametrize("damage", [lambda whole: whole[:-20], lambda whole: whole[:100] + bytes(800) + whole[900:]])
-def test_a_damaged_part_is_named_with_the_way_out(tmp_path, damage):
+def test_a_damaged_part_is_named_with_the_way_out(tmp_path, damage) -> None:
     conduct(tiny(people=1), tmp_path)
     part = next((tmp_path / "parts").glob("*.parquet"))
     part.write_bytes(damage(part.read_bytes()))

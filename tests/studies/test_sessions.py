@@ -35,7 +35,7 @@ class Perfect:
         return self.window
 
 
-def test_each_mark_is_a_row_and_the_perfect_player_scores_one():
+def test_each_mark_is_a_row_and_the_perfect_player_scores_one() -> None:
     session = small()
     rows = play(session, Perfect(session))
     assert rows["trial"].tolist() == [2, 4]
@@ -44,7 +44,7 @@ def test_each_mark_is_a_row_and_the_perfect_player_scores_one():
     assert rows["reported_window"].all()
 
 
-def test_every_player_meets_the_same_person_with_the_same_noise():
+def test_every_player_meets_the_same_person_with_the_same_noise() -> None:
     session = small()
     players = [Perfect(session), Perfect(session)]
     for player in players:
@@ -52,13 +52,13 @@ def test_every_player_meets_the_same_person_with_the_same_noise():
     assert players[0].told == players[1].told
 
 
-def test_a_person_without_a_window_is_one_in_the_table():
+def test_a_person_without_a_window_is_one_in_the_table() -> None:
     rows = simulate(small(cohort="nonresponder"))
     assert not rows["true_window"].any()
     assert (rows["f1"] == (~rows["reported_window"]).astype(float)).all()
 
 
-def test_amplitudes_are_scaled_and_the_window_stays():
+def test_amplitudes_are_scaled_and_the_window_stays() -> None:
     usual, scaled = small(), replace(small(), amplitude=10.0)
     players = [Perfect(usual), Perfect(scaled)]
     rows = [play(session, player) for session, player in zip((usual, scaled), players, strict=True)]
@@ -66,7 +66,7 @@ def test_amplitudes_are_scaled_and_the_window_stays():
     assert rows[0]["f1"].tolist() == rows[1]["f1"].tolist() == [1.0, 1.0]
 
 
-def test_the_moment_of_stopping_is_kept_with_its_f1_and_coverage():
+def test_the_moment_of_stopping_is_kept_with_its_f1_and_coverage() -> None:
     settings = (*SMALL, ("max_trials", 2))
     session = replace(small(), trials=6, marks=(2, 6), stopping="noted", settings=settings)
     early, late = simulate(session).to_dict("records")
@@ -76,7 +76,7 @@ def test_the_moment_of_stopping_is_kept_with_its_f1_and_coverage():
     assert early["stop_start_covered"] == late["stop_start_covered"] == early["start_covered"]
 
 
-def test_a_study_is_the_same_in_one_process_and_in_two():
+def test_a_study_is_the_same_in_one_process_and_in_two() -> None:
     sessions = [small(strategy, person=person) for strategy in ("even", "random") for person in (0, 1)]
     done: list[SimulatedSession] = []
     here = run_study(sessions, on_done=done.append)
@@ -86,29 +86,29 @@ def test_a_study_is_the_same_in_one_process_and_in_two():
     assert (here[TIMES] > 0).all(axis=None)
 
 
-def test_a_study_in_the_other_space_counts_from_the_impact():
+def test_a_study_in_the_other_space_counts_from_the_impact() -> None:
     session = SimulatedSession("even", "gaussian", 0, 5, 3, (3,), IMPACT_SPACE, SMALL)
     assert np.isfinite(simulate(session)["f1"]).all()
 
 
-def test_paired_sessions_cross_strategies_cohorts_and_people():
+def test_paired_sessions_cross_strategies_cohorts_and_people() -> None:
     sessions = paired_sessions(["even", "random"], ["gaussian", "wide"], 3, seed=7, trials=5, marks=(5,))
     assert len({(s.strategy, s.cohort, s.person) for s in sessions}) == 12
 
 
 @pytest.mark.parametrize("wrong", [{"trials": 0}, {"person": -1}])
-def test_a_session_that_cannot_be_is_refused(wrong):
+def test_a_session_that_cannot_be_is_refused(wrong) -> None:
     values = {"strategy": "even", "cohort": "gaussian", "person": 0, "seed": 0, "trials": 3, "marks": (3,)}
     with pytest.raises(InvalidValueError):
         SimulatedSession(**(values | wrong))
 
 
-def test_a_study_without_workers_is_refused():
+def test_a_study_without_workers_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="worker"):
         run_study([small()], workers=0)
 
 
-def test_what_a_session_would_reject_is_delivered_again_and_not_told():
+def test_what_a_session_would_reject_is_delivered_again_and_not_told() -> None:
     strict = replace(IMPACT_SPACE, tolerance_ms=2.0)
     session = replace(small(), trials=40, marks=(40,), space=strict)
     player = Perfect(session)
@@ -119,7 +119,7 @@ def test_what_a_session_would_reject_is_delivered_again_and_not_told():
     assert row["delivered"] == 40 + row["mistrials"]
 
 
-def test_a_space_that_no_realised_isi_keeps_is_refused():
+def test_a_space_that_no_realised_isi_keeps_is_refused() -> None:
     session = replace(small(), space=replace(IMPACT_SPACE, tolerance_ms=0.0))
     with pytest.raises(StudyError, match="wider tolerance_ms"):
         play(session, Perfect(session))

@@ -30,7 +30,7 @@ def rows(strategy, cohort, f1s, **columns):
 NOBODY = pd.DataFrame()
 
 
-def test_each_column_is_the_mean_over_people_that_it_says():
+def test_each_column_is_the_mean_over_people_that_it_says() -> None:
     (row,) = summarise(rows("nr", "wide", [0.9, 0.6, 0.0]), NOBODY).to_dict("records")
     assert row["people"] == 3
     assert row["f1"] == pytest.approx(0.5)
@@ -43,7 +43,7 @@ def test_each_column_is_the_mean_over_people_that_it_says():
     assert row["failed"] == 0
 
 
-def test_who_failed_is_counted_and_a_strategy_that_failed_for_all_is_not_left_out():
+def test_who_failed_is_counted_and_a_strategy_that_failed_for_all_is_not_left_out() -> None:
     table = summarise(
         pd.concat([rows("nr", "wide", [0.9, 0.6]), rows("nr", "narrow", [0.5])]),
         pd.DataFrame({"strategy": ["nr", "pf", "pf"], "cohort": ["wide", "wide", "wide"], "person": [2, 0, 1]}),
@@ -52,5 +52,5 @@ def test_who_failed_is_counted_and_a_strategy_that_failed_for_all_is_not_left_ou
     assert counts == [["narrow", "nr", 10, 1, 0], ["wide", "nr", 10, 2, 1], ["wide", "pf", 0, 0, 2]]
 
 
-def test_a_study_of_which_nothing_is_finished_has_an_empty_table():
+def test_a_study_of_which_nothing_is_finished_has_an_empty_table() -> None:
     assert len(summarise(NOBODY, NOBODY)) == 0

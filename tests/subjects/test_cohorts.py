@@ -454,6 +454,6 @@ def test_input_noise_has_its_full_spread_from_the_first_trial_on() -> None:
 
 
 @pytest.mark.parametrize("stimulus", [(100.0, "hit"), (100.0, "Valve"), (float("nan"), "valve")])
-def test_a_stimulus_that_means_nothing_is_refused(stimulus):
+def test_a_stimulus_that_means_nothing_is_refused(stimulus) -> None:
     with pytest.raises(InvalidValueError):
         cohort("gaussian", 1, 0)[0].begin(0).respond(*stimulus)

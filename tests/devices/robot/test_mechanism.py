@@ -22,7 +22,7 @@ from isiw.errors import InvalidValueError
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_taps_vary_as_the_geometry_says(name):
+def test_taps_vary_as_the_geometry_says(name) -> None:
     geometry = replace(preset(name), faults=Faults())
     taps = draw_taps(geometry, 4000, np.random.default_rng(0))
     assert taps.hit_ms.mean() == pytest.approx(geometry.hit.mean_ms, abs=0.3)
@@ -31,7 +31,7 @@ def test_taps_vary_as_the_geometry_says(name):
     assert taps.descent_ms.std() == pytest.approx(geometry.descent.sd_ms, rel=0.06)
 
 
-def test_a_late_descent_makes_a_late_hit_but_not_by_as_much():
+def test_a_late_descent_makes_a_late_hit_but_not_by_as_much() -> None:
     geometry = preset("subject1")
     taps = draw_taps(geometry, 4000, np.random.default_rng(1))
     slope = np.cov(taps.descent_ms, taps.hit_ms)[0, 1] / taps.descent_ms.var()
@@ -39,7 +39,7 @@ def test_a_late_descent_makes_a_late_hit_but_not_by_as_much():
     assert 0.1 < slope < 0.9
 
 
-def test_the_hammer_is_driven_from_the_descent_to_the_travel_of_its_geometry():
+def test_the_hammer_is_driven_from_the_descent_to_the_travel_of_its_geometry() -> None:
     geometry = preset("subject2")
     time_ms = np.arange(geometry.descent.mean_ms, geometry.hit.mean_ms, 0.001)
     speed = np.cumsum(drive(time_ms, geometry.kinetic_share)) * 1e-6
@@ -47,13 +47,13 @@ def test_the_hammer_is_driven_from_the_descent_to_the_travel_of_its_geometry():
     assert speed.sum() * 1e-3 == pytest.approx(geometry.travel_mm, rel=1e-3)
 
 
-def test_the_pressure_rises_from_the_line_delay_to_the_supply():
+def test_the_pressure_rises_from_the_line_delay_to_the_supply() -> None:
     assert pressure_kpa([0.0, 22.0]).tolist() == [0.0, 0.0]
     assert (np.diff(pressure_kpa(np.arange(23.0, 500.0))) > 0).all()
     assert pressure_kpa(1500.0) == pytest.approx(SUPPLY_KPA, rel=1e-4)
 
 
-def test_the_rebound_pushes_only_and_leaves_with_the_speed_of_restitution():
+def test_the_rebound_pushes_only_and_leaves_with_the_speed_of_restitution() -> None:
     phase = np.linspace(0, SEPARATION_RAD, 200_001)
     force = rebound(phase)
     assert (force <= 1e-9).all()
@@ -61,7 +61,7 @@ def test_the_rebound_pushes_only_and_leaves_with_the_speed_of_restitution():
     assert 1.0 + np.trapezoid(force, phase) == pytest.approx(-restitution(), abs=1e-4)
 
 
-def test_the_contact_lasts_as_long_as_the_geometry_says():
+def test_the_contact_lasts_as_long_as_the_geometry_says() -> None:
     geometry = preset("subject3")
     pull = float(drive(geometry.hit.mean_ms, geometry.kinetic_share))
     time_ms = np.arange(0, 40, 0.001)
@@ -69,7 +69,7 @@ def test_the_contact_lasts_as_long_as_the_geometry_says():
     assert (push > pull).sum() * 0.001 == pytest.approx(geometry.contact.mean_ms, abs=0.05)
 
 
-def test_faults_come_as_often_as_their_probability():
+def test_faults_come_as_often_as_their_probability() -> None:
     faulty = replace(preset("cushion"), faults=Faults(0.1, 0.2, (13.0, 22.0)))
     taps = draw_taps(faulty, 5000, np.random.default_rng(2))
     assert np.isnan(taps.hit_ms).mean() == pytest.approx(0.1, abs=0.02)
@@ -88,18 +88,18 @@ def test_faults_come_as_often_as_their_probability():
         {"hit": (183.0, 0.1)},
     ],
 )
-def test_an_impossible_geometry_is_an_error(wrong):
+def test_an_impossible_geometry_is_an_error(wrong) -> None:
     events = {"descent": (131.0, 5.0), "hit": (183.0, 4.0), "contact": (15.0, 1.0)} | wrong
     with pytest.raises(InvalidValueError):
         Geometry(**{name: Event(*times) for name, times in events.items()})
 
 
 @pytest.mark.parametrize("wrong", [{"stuck_probability": 1.5}, {"late_probability": 0.1, "late_ms": (20.0, 10.0)}])
-def test_impossible_faults_are_an_error(wrong):
+def test_impossible_faults_are_an_error(wrong) -> None:
     with pytest.raises(InvalidValueError):
         Faults(**wrong)
 
 
-def test_an_unknown_preset_names_the_known_ones():
+def test_an_unknown_preset_names_the_known_ones() -> None:
     with pytest.raises(InvalidValueError, match="subject4"):
         preset("subject9")

@@ -37,7 +37,7 @@ def deliver(device, isi_ms, n=1):
     return [device.deliver(Stimulus(trial, isi_ms), 1.0) for trial in range(n)]
 
 
-def test_it_is_a_device_with_a_memory():
+def test_it_is_a_device_with_a_memory() -> None:
     device = tapper()
     assert isinstance(device, Device)
     assert isinstance(device, HasMemory)
@@ -45,7 +45,7 @@ def test_it_is_a_device_with_a_memory():
 
 
 @pytest.mark.parametrize(("trigger", "accelerometer"), [("open-loop", True), ("open-loop", False), ("impact", True)])
-def test_it_keeps_what_every_device_promises(trigger, accelerometer):
+def test_it_keeps_what_every_device_promises(trigger, accelerometer) -> None:
     def made(reference):
         subject = cohort("recruitment", 1, 0)[0].begin(1)
         settings = TapperSettings(reference=reference, trigger=trigger, accelerometer=accelerometer)
@@ -55,14 +55,14 @@ def test_it_keeps_what_every_device_promises(trigger, accelerometer):
     check_device(lambda: made("valve"), DesignSpace(200, 500, reference="valve"))
 
 
-def test_it_delivers_nothing_unless_staged():
+def test_it_delivers_nothing_unless_staged() -> None:
     device = tapper()
     device.stop()
     with pytest.raises(DeviceError, match="not staged"):
         deliver(device, 50.0)
 
 
-def test_its_sweep_has_the_channels_and_units_that_it_describes():
+def test_its_sweep_has_the_channels_and_units_that_it_describes() -> None:
     for geometry, accelerometer in itertools.product(("bench", "subject1"), (True, False)):
         device = tapper(geometry, accelerometer=accelerometer)
         sweep = deliver(device, 50.0)[0]
@@ -70,14 +70,14 @@ def test_its_sweep_has_the_channels_and_units_that_it_describes():
         assert all(channel.values.size == 5000 for channel in sweep.channels.values())
 
 
-def test_a_late_pulse_makes_the_sweep_longer():
+def test_a_late_pulse_makes_the_sweep_longer() -> None:
     sweep = deliver(tapper(reference="valve"), 500.0)[0]
     assert judge(sweep, Stimulus(0, 500.0), VALVE).reason is None
 
 
 @pytest.mark.parametrize("trigger", ["open-loop", "impact"])
 @pytest.mark.parametrize("reference", ["impact", "valve"])
-def test_the_person_answers_the_isi_that_truly_came_about(reference, trigger):
+def test_the_person_answers_the_isi_that_truly_came_about(reference, trigger) -> None:
     asked = []
     device = tapper(reference=reference, trigger=trigger, respond=lambda isi: asked.append(isi) or Answer())
     sweeps = deliver(device, 60.0 if reference == "impact" else 240.0, n=10)
@@ -85,7 +85,7 @@ def test_the_person_answers_the_isi_that_truly_came_about(reference, trigger):
     np.testing.assert_allclose(asked, realised, atol=0.2)
 
 
-def test_open_loop_the_isi_varies_with_the_hit_and_triggered_it_does_not():
+def test_open_loop_the_isi_varies_with_the_hit_and_triggered_it_does_not() -> None:
     def errors(trigger):
         sweeps = deliver(tapper("subject1", trigger=trigger), 60.0, n=60)
         return [s.t_tms_ms - impact_time(s.channels["acceleration"].values, 5000.0) - 60.0 for s in sweeps]
@@ -94,7 +94,7 @@ def test_open_loop_the_isi_varies_with_the_hit_and_triggered_it_does_not():
     assert np.max(np.abs(errors("impact"))) <= 0.2
 
 
-def test_the_command_is_corrected_by_the_measured_hits():
+def test_the_command_is_corrected_by_the_measured_hits() -> None:
     device = tapper("subject2", expected_hit_ms=190.0)
     deliver(device, 60.0, n=30)
     assert device.simulation.hit_delay.mean_ms == pytest.approx(172.0, abs=1.0)
@@ -103,14 +103,14 @@ def test_the_command_is_corrected_by_the_measured_hits():
     assert np.mean(error) == pytest.approx(0.0, abs=0.8)
 
 
-def test_a_few_late_valves_do_not_move_the_expected_hit_delay():
+def test_a_few_late_valves_do_not_move_the_expected_hit_delay() -> None:
     delay = HitDelay(180.0)
     for hit in (175.0, 176.0, 195.0, 174.0, 176.0, 193.0, 175.0):
         delay.measured(hit)
     assert delay.mean_ms == 176.0
 
 
-def test_an_isi_shorter_than_the_detection_is_refused_before_anything_happens():
+def test_an_isi_shorter_than_the_detection_is_refused_before_anything_happens() -> None:
     asked = []
     device = tapper(trigger="impact", respond=lambda isi: asked.append(isi) or Answer())
     with pytest.raises(DeviceError, match="so soon"):
@@ -122,7 +122,7 @@ def test_an_isi_shorter_than_the_detection_is_refused_before_anything_happens():
         deliver(from_valve, 150.0)
 
 
-def test_without_an_accelerometer_the_uncertainty_of_the_isi_is_stated():
+def test_without_an_accelerometer_the_uncertainty_of_the_isi_is_stated() -> None:
     blind = deliver(tapper(accelerometer=False), 60.0)[0]
     judged = judge(blind, Stimulus(0, 60.0), IMPACT)
     assert judged.isi_ms == pytest.approx(60.0)
@@ -131,7 +131,7 @@ def test_without_an_accelerometer_the_uncertainty_of_the_isi_is_stated():
     assert judge(from_valve, Stimulus(0, 240.0), VALVE).isi_sd_ms == pytest.approx(2.5)
 
 
-def test_the_stated_uncertainty_covers_the_people_of_the_dissertation():
+def test_the_stated_uncertainty_covers_the_people_of_the_dissertation() -> None:
     asked = []
     for name in ("subject1", "subject2", "subject3", "subject4"):
         deliver(tapper(name, accelerometer=False, respond=lambda isi: asked.append(isi) or Answer()), 60.0, n=50)
@@ -139,7 +139,7 @@ def test_the_stated_uncertainty_covers_the_people_of_the_dissertation():
     assert np.mean(np.abs(z) <= 2) >= 0.95
 
 
-def test_a_hammer_that_sticks_gives_no_impact_open_loop_and_no_pulse_triggered():
+def test_a_hammer_that_sticks_gives_no_impact_open_loop_and_no_pulse_triggered() -> None:
     stuck = replace(preset("subject1"), faults=Faults(stuck_probability=1.0))
     asked = []
     open_loop = deliver(tapper(stuck, respond=lambda isi: asked.append(isi) or Answer()), 60.0)[0]
@@ -150,7 +150,7 @@ def test_a_hammer_that_sticks_gives_no_impact_open_loop_and_no_pulse_triggered()
 
 
 @pytest.mark.parametrize("reference", ["impact", "valve"])
-def test_tms_alone_taps_nobody(reference):
+def test_tms_alone_taps_nobody(reference) -> None:
     asked = []
     device = tapper(reference=reference, respond=lambda isi: asked.append(isi) or Answer(0.05))
     sweep = deliver(device, None)[0]
@@ -162,7 +162,7 @@ def test_tms_alone_taps_nobody(reference):
 
 
 @pytest.mark.parametrize("mep_mv", [0.0, 0.02, 0.1, 1.0])
-def test_the_judged_amplitude_is_the_one_that_the_person_gave(mep_mv):
+def test_the_judged_amplitude_is_the_one_that_the_person_gave(mep_mv) -> None:
     device = tapper("subject2", respond=lambda _: Answer(mep_mv))
     judged = [judge(sweep, Stimulus(0, 80.0), IMPACT) for sweep in deliver(device, 80.0, n=40)]
     measured = [each.mep_mv for each in judged if each.mep_mv is not None]
@@ -175,7 +175,7 @@ def test_the_judged_amplitude_is_the_one_that_the_person_gave(mep_mv):
 
 @pytest.mark.parametrize("trigger", ["open-loop", "impact"])
 @pytest.mark.parametrize("reference", ["impact", "valve"])
-def test_the_emg_floor_of_a_person_counts_once(reference, trigger):
+def test_the_emg_floor_of_a_person_counts_once(reference, trigger) -> None:
     person, answers = cohort("nonresponder", 2, 0)[1].begin(1), []
     device = tapper(
         reference=reference,
@@ -189,14 +189,14 @@ def test_the_emg_floor_of_a_person_counts_once(reference, trigger):
     np.testing.assert_allclose(np.log(told / given).mean(), 0.0, atol=0.01)
 
 
-def test_a_trial_depends_on_the_seed_and_its_own_number():
+def test_a_trial_depends_on_the_seed_and_its_own_number() -> None:
     first, again, other = (deliver(tapper(seed=seed), 60.0)[0] for seed in (1, 1, 2))
     emg = [sweep.channels["emg"].values for sweep in (first, again, other)]
     assert (emg[0] == emg[1]).all()
     assert (emg[0] != emg[2]).any()
 
 
-def test_it_comes_into_the_state_after_stimuli_of_an_earlier_run():
+def test_it_comes_into_the_state_after_stimuli_of_an_earlier_run() -> None:
     stimuli = [Stimulus(trial, 40.0 + trial) for trial in range(8)]
     through, resumed = tapper(seed=4), tapper(seed=4)
     for stimulus in stimuli:
@@ -215,6 +215,6 @@ def test_it_comes_into_the_state_after_stimuli_of_an_earlier_run():
         {"trigger": "impact", "accelerometer": False},
     ],
 )
-def test_settings_that_cannot_be_are_errors(wrong):
+def test_settings_that_cannot_be_are_errors(wrong) -> None:
     with pytest.raises(InvalidValueError):
         TapperSettings(**wrong)
