@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Never
 
 import pytest
 
@@ -8,7 +9,6 @@ from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError
 from isiw.trials import Stimulus
-from typing import Never
 
 LIMITS = Limits(low_ms=0, high_ms=200, min_iti_s=5.0, max_pulses=3)
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import errno
 import os
 from pathlib import Path
+from typing import Never
 
 import numpy as np
 import pytest
@@ -14,7 +15,6 @@ from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel
-from typing import Never
 
 
 def test_a_log_is_a_part_until_it_is_closed(tmp_path, header) -> None:

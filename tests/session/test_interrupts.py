@@ -3,11 +3,11 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from typing import Never
 
 import pytest
 
 from isiw.session.interrupts import DeferredInterrupts
-from typing import Never
 
 if os.name == "nt":
     pytest.skip("POSIX signals", allow_module_level=True)

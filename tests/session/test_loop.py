@@ -5,6 +5,7 @@ import math
 import os
 import signal
 import threading
+from typing import Never
 
 import numpy as np
 import pytest
@@ -19,7 +20,6 @@ from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Recipe
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Sweep, Trial
-from typing import Never
 
 
 @pytest.fixture

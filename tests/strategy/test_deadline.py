@@ -1,5 +1,6 @@
 import threading
 from dataclasses import dataclass, field
+from typing import Never
 
 import pytest
 import torch
@@ -8,7 +9,6 @@ import isiw
 from isiw.errors import InvalidValueError
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
-from typing import Never
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from typing import Never
 
 import pytest
 
 from isiw.errors import InvalidValueError, StudyError
 from isiw.studies.execution import DaskCluster, Failure, Processes, _attempt_alone
 from studies.tiny import double, double_or_die, double_or_die_once, process_id
-from typing import Never
 
 posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 
