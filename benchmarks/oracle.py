@@ -81,7 +81,7 @@ SPANS: Final[Mapping[str, Spans]] = {
     "very-wide": _VERY_WIDE,
     "odd": _either((5 / 7, _USUAL), (1 / 7, _LATE), (1 / 7, _VERY_WIDE)),
 }
-"""What `cohorts` says of start and width, of the cohorts whose profile's family the oracle knows: one symmetric peak."""
+"""What `cohorts` says of start and width, of the cohorts whose profiles the oracle knows: one symmetric peak."""
 
 
 def spans_of(cohort: str) -> Spans:
