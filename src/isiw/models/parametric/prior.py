@@ -16,7 +16,7 @@ from isiw.checks import check_numbers
 from isiw.design import DesignSpace
 from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale, check_scales
-from isiw.models.shared.start import StartPrior
+from isiw.models.shared.start import Span, StartPrior
 
 __all__ = ["OUTPUT_CV", "Likelihood", "Unknowns", "WindowPrior", "latent_names"]
 
@@ -130,7 +130,7 @@ class WindowPrior:
     """
 
     p_window: float = 0.75
-    start: StartPrior = field(default_factory=lambda: StartPrior((0.0, 125.0), (180.0, 7.0), 0.2))
+    start: StartPrior = field(default_factory=lambda: StartPrior((Span(1.0, 0.0, 125.0),), p_anywhere=0.2))
     width_ms: Scale = Scale(100.0, 0.45)
     floor: FloorPrior = field(default_factory=FloorPrior)
     amplitude: Scale = Scale(7.0, 0.8)
@@ -154,7 +154,10 @@ class WindowPrior:
         z = dict(zip(latent_names(likelihood), latents.unbind(-1), strict=True))
         floor_mv = self.floor.mean_mv.log_normal(z["floor"])
         evoked = self._saturating(z, floor_mv) if likelihood == "input-noise" else self._proportional(z, floor_mv)
-        start_ms, width_ms = self.start.start_ms(z["start"], space), self.width_ms.log_normal(z["width"])
+        start_ms, width_ms = (
+            self.start.start_ms(torch.special.ndtr(z["start"]), space),
+            self.width_ms.log_normal(z["width"]),
+        )
         floor_cv, p_outlier = self.floor.cv.log_normal(z["floor_cv"]), self.outliers.probability(z["outliers"])
         return Unknowns(start_ms, width_ms, floor_mv, floor_cv, *evoked, p_outlier)
 

@@ -91,7 +91,7 @@ class ParticleModel:
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
         """The posterior before the first trial."""
-        latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0))
+        latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0), space)
         size, device = latents.present.shape, latents.present.device
         return ParticlePosterior(
             model=self,
@@ -118,7 +118,7 @@ class ParticleModel:
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
         """Draw one person from the prior, and a MEP at each ISI; see `SimulatesPeople`."""
         generator = step_generator(self.device, seed, SIMULATED)
-        person = self.prior.person(self.prior.sample(1, 1, generator), space)
+        person = self.prior.person(self.prior.sample(1, 1, generator, space))
         isis_ms = torch.as_tensor(isi_ms, dtype=torch.float32, device=self.device).unsqueeze(0)
         gain = log_gain(person.response, torch.arange(isis_ms.shape[-1], dtype=torch.float32, device=self.device))
         log_mep = draw_log_mep(person.response, levels(person, isis_ms), generator, gain)
@@ -190,7 +190,7 @@ class ParticlePosterior:
     @cached_property
     def person(self) -> Person:
         """What the particles mean."""
-        return self.model.prior.person(self.latents, self.space)
+        return self.model.prior.person(self.latents)
 
     @cached_property
     def _thinned(self) -> PersonSample:

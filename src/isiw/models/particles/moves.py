@@ -12,18 +12,22 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.models.particles.likelihood import total_log_likelihood
-from isiw.models.particles.prior import Latents, Prior, block
+from isiw.models.particles.prior import PROFILE_BLOCKS, RESPONSE_BLOCKS, Latents, Prior, latents_of, used_by
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 
 __all__ = ["Mover"]
 
 JUMP_PROBABILITY = 0.3
-BLOCK_PROBABILITY = (0.35, 0.35, 0.30)
+PART_PROBABILITY = (0.35, 0.35, 0.30)
 """How often a difference moves all latents, those of the profile alone, and those of the response alone."""
 
-FORM_JUMPS, NOISE_JUMPS = 0.30, 0.25
-"""Shares of the jumps that draw the profile's kind and form, and the noise's kind; the others draw window or none."""
+JUMPS = {"form": 0.25, "noise": 0.2, "window": 0.35, "place": 0.12, "response": 0.08}
+"""Shares of the jumps. They draw anew: the profile's kind and form; the noise's kind and all that belongs to it; whether
+there is a window, and all of it; where and how wide it is; what belongs to the noise's kind."""
+
+BLUR = 0.02
+"""SD of what is added to a difference, as a share of the usual SD of each latent."""
 
 
 @dataclass(frozen=True)
@@ -61,46 +65,52 @@ class Mover:
         jumps = self._uniform(mine.present) < JUMP_PROBABILITY
         shifted, jumped = self._shift(mine, theirs), self._jump(mine)
         proposal = Latents(*(_choose(jumps, a, b) for a, b in zip(jumped, shifted, strict=True)))
-        prior_ratio = 0.5 * (mine.z.square() - proposal.z.square()).sum(-1)
-        proposed = total_log_likelihood(self.prior.person(proposal, self.space), self.history)
+        # A jump draws from the prior, so that its density cancels.
+        densities = (self.prior.log_density(each.values, self.space) for each in (proposal, mine))
+        prior_ratio = next(densities) - next(densities)
+        proposed = total_log_likelihood(self.prior.person(proposal), self.history)
         log_ratio = proposed - log_likelihood + torch.where(jumps, 0.0, prior_ratio)
         accept = torch.log(self._uniform(mine.present)) < log_ratio
         moved = Latents(*(_choose(accept, a, b) for a, b in zip(proposal, mine, strict=True)))
         return moved, torch.where(accept, proposed, log_likelihood)
 
     def _shift(self, mine: Latents, theirs: Latents) -> Latents:
-        """Add a scaled difference of two of the others, in a block of latents."""
-        people, size, _ = mine.z.shape
+        """Add a scaled difference of two of the others, in those latents that mean anything to the particle."""
+        people, size, _ = mine.values.shape
         first, second = (
-            torch.gather(theirs.z, 1, self._pick(people, size, theirs.z.shape[1]).unsqueeze(-1).expand_as(mine.z))
+            torch.gather(
+                theirs.values, 1, self._pick(people, size, theirs.values.shape[1]).unsqueeze(-1).expand_as(mine.values)
+            )
             for _ in range(2)
         )
-        part = torch.bucketize(
-            self._uniform(mine.present), torch.tensor(BLOCK_PROBABILITY, device=mine.z.device).cumsum(0)[:-1]
-        ).unsqueeze(-1)
-        of_profile = block("place", "form", device=mine.z.device)
+        part = _drawn(PART_PROBABILITY, self._uniform(mine.present)).unsqueeze(-1)
+        of_profile = latents_of(*PROFILE_BLOCKS, device=mine.values.device)
         moves = (part == 0) | ((part == 1) & of_profile) | ((part == 2) & ~of_profile)
+        moves = moves & used_by(mine.noise, mine.present)
         scale = torch.where(self._uniform(mine.present) < 0.1, 1.0, 0.15 + 0.7 * self._uniform(mine.present))
-        blur = 0.02 * self._normal(mine.z)
-        return mine._replace(z=mine.z + moves * (scale.unsqueeze(-1) * (first - second) + blur))
+        blur = BLUR * self.prior.spreads.to(mine.values) * self._normal(mine.values)
+        return mine._replace(values=mine.values + moves * (scale.unsqueeze(-1) * (first - second) + blur))
 
     def _jump(self, mine: Latents) -> Latents:
-        """Draw a kind, and the latents that it gives a meaning to, anew from the prior."""
-        shape, noise, present = self.prior.sample_kinds(tuple(mine.present.shape), self.generator)
-        fresh = self._normal(mine.z)
-        which = self._uniform(mine.present)
-        new_form, new_window = which < FORM_JUMPS, which >= FORM_JUMPS + NOISE_JUMPS
-        new_noise = ~(new_form | new_window)
-        redraw = (
-            (new_form.unsqueeze(-1) & block("form", device=mine.z.device))
-            | (new_noise.unsqueeze(-1) & block("noise", device=mine.z.device))
-            | (new_window.unsqueeze(-1) & block("place", "form", device=mine.z.device))
-        )
+        """Draw some kinds, and the latents that go with them, anew from the prior."""
+        people, size = mine.present.shape
+        fresh = self.prior.sample(people, size, self.generator, self.space)
+        jump = _drawn(tuple(JUMPS.values()), self._uniform(mine.present))
+        form, noise, window, place, response = (jump == number for number in range(len(JUMPS)))
+        drawn = {
+            ("form",): form,
+            RESPONSE_BLOCKS: noise | response,
+            PROFILE_BLOCKS: window,
+            ("start", "width"): place,
+        }
+        redraw = torch.zeros_like(mine.values, dtype=torch.bool)
+        for blocks, who in drawn.items():
+            redraw |= who.unsqueeze(-1) & latents_of(*blocks, device=mine.values.device)
         return Latents(
-            z=torch.where(redraw, fresh, mine.z),
-            shape=torch.where(new_form | new_window, shape, mine.shape),
-            noise=torch.where(new_noise, noise, mine.noise),
-            present=torch.where(new_window, present, mine.present),
+            values=torch.where(redraw, fresh.values, mine.values),
+            shape=torch.where(form | window, fresh.shape, mine.shape),
+            noise=torch.where(noise, fresh.noise, mine.noise),
+            present=torch.where(window, fresh.present, mine.present),
         )
 
     def _uniform(self, like: Tensor) -> Tensor:
@@ -111,6 +121,12 @@ class Mover:
 
     def _pick(self, people: int, size: int, of: int) -> Tensor:
         return torch.randint(of, (people, size), generator=self.generator, device=self.generator.device)
+
+
+def _drawn(probabilities: tuple[float, ...], uniform: Tensor) -> Tensor:
+    """Which of some alternatives is drawn at each quantile, same shape."""
+    ends = torch.tensor(probabilities, device=uniform.device).cumsum(0)[:-1]
+    return torch.bucketize(uniform, ends)
 
 
 def _choose(condition: Tensor, yes: Tensor, no: Tensor) -> Tensor:

@@ -56,13 +56,12 @@ PERSISTENCE = 0.97
 
 
 class NoiseKind(IntEnum):
-    """Where the noise enters; a recruitment curve is a forearm's muscle's or a hand's."""
+    """Where the noise enters."""
 
     CONSTANT_CV = 0
     MISSING = 1
-    FOREARM = 2
+    RECRUITMENT = 2
     ALL_OR_NONE = 3
-    HAND = 4
 
 
 class Response(NamedTuple):
@@ -173,7 +172,7 @@ def _is(response: Response, kind: NoiseKind) -> Tensor:
 
 def _recruits(response: Response) -> Tensor:
     """Which particles have a recruitment curve, shape (..., p, 1)."""
-    return _is(response, NoiseKind.FOREARM) | _is(response, NoiseKind.HAND)
+    return _is(response, NoiseKind.RECRUITMENT)
 
 
 def _size(response: Response, level: Tensor) -> Tensor:

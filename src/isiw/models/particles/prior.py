@@ -1,14 +1,15 @@
 """What is believed about a person before the first trial, and where each belief comes from.
 
-A particle is a vector of standard normal latents and three discrete kinds. This module maps them to the parameters of
-`shapes` and `noise`, so that the prior is the same simple thing whatever the parameters' ranges are, and moves can be
-made between kinds.
+A particle is a vector of latents, each of one meaning, and the kinds of its profile and noise. Latents come in blocks;
+what is believed of a block is a mixture of what is usual and of what else may be, so that particles are where unusual
+people are from the first trial on, and moves need no Jacobians.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import torch
@@ -16,6 +17,7 @@ import torch
 from isiw.checks import check_numbers, check_probabilities
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.models.particles.mixture import Mixture
 from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
@@ -25,9 +27,10 @@ from isiw.models.shared.start import StartPrior
 __all__ = [
     "BLOCKS",
     "LATENTS",
-    "AllOrNonePrior",
-    "FloorPrior",
-    "GainPrior",
+    "PROFILE_BLOCKS",
+    "RESPONSE_BLOCKS",
+    "Floor",
+    "Gain",
     "Latents",
     "Muscle",
     "NoiseShares",
@@ -36,39 +39,72 @@ __all__ = [
     "ProfilePrior",
     "SessionPrior",
     "ShapeShares",
-    "block",
+    "SwitchPrior",
+    "Width",
+    "latents_of",
+    "used_by",
 ]
 
 BLOCKS: Final = {
-    "place": ("start", "width"),
+    "start": ("start_ms",),
+    "width": ("log_width_ms",),
     "form": ("form",),
-    "floor": ("log_floor", "floor_log_sd"),
+    "floor": ("log_floor_mv", "log_floor_sd"),
     "session": ("drift", "startup"),
-    "noise": ("log_ratio", "spread", "output", "boost", "rest"),
+    "gain": ("log_gain", "log_cv"),
+    "reliability": ("reliability",),
+    "switch": ("switched_on", "switched_off"),
+    "recruitment": ("log_ceiling", "log_slope", "log_input_sd", "log_sigma_y", "log_boost", "rest"),
 }
-"""The latents by what they are about; those of the noise mean what its kind makes of them."""
+"""The latents by what they are about."""
 
 LATENTS: Final = tuple(name for names in BLOCKS.values() for name in names)
 """Names of the latents, in order."""
 
+PROFILE_BLOCKS: Final = ("start", "width", "form")
+RESPONSE_BLOCKS: Final = ("gain", "reliability", "switch", "recruitment")
 
-def block(*names: str, device: torch.device) -> Tensor:
-    """Which latents belong to some of `BLOCKS`, shape (d,)."""
-    chosen = {latent for name in names for latent in BLOCKS[name]}
+_COMMON: Final = ("floor", "session")
+_USED: Final = {
+    NoiseKind.CONSTANT_CV: ("gain",),
+    NoiseKind.MISSING: ("gain", "reliability"),
+    NoiseKind.RECRUITMENT: ("recruitment",),
+    NoiseKind.ALL_OR_NONE: ("gain", "switch"),
+}
+
+
+def latents_of(*blocks: str, device: torch.device) -> Tensor:
+    """Which latents belong to some blocks, shape (d,)."""
+    chosen = {latent for block in blocks for latent in BLOCKS[block]}
     return torch.tensor([latent in chosen for latent in LATENTS], device=device)
+
+
+def used_by(noise: Tensor, present: Tensor) -> Tensor:
+    """Which latents mean anything to particles of some kinds; all others are as the prior draws them.
+
+    Args:
+        noise: one of `NoiseKind`, shape (b, p).
+        present: whether there is any facilitation, shape (b, p).
+
+    Returns:
+        Shape (b, p, d).
+    """
+    device = noise.device
+    by_kind = torch.stack([latents_of(*_COMMON, *_USED[kind], device=device) for kind in NoiseKind])
+    return by_kind[noise] | (present.unsqueeze(-1) & latents_of(*PROFILE_BLOCKS, device=device))
 
 
 class Latents(NamedTuple):
     """Particles of b people.
 
     Args:
-        z: standard normal latents in the order of `LATENTS`, shape (b, p, d).
+        values: of the latents, in the order of `LATENTS`, shape (b, p, d).
         shape: one of `ShapeKind`, shape (b, p).
         noise: one of `NoiseKind`, shape (b, p).
         present: whether there is any facilitation, shape (b, p).
     """
 
-    z: Tensor
+    values: Tensor
     shape: Tensor
     noise: Tensor
     present: Tensor
@@ -122,9 +158,8 @@ class NoiseShares:
     Args:
         constant_cv: of noise of a constant CV.
         missing: of the same with missing responses.
-        forearm: of the recruitment curve of a forearm's muscle.
+        recruitment: of a recruitment curve with noise on its input.
         all_or_none: of responses that are all or none: those of a very steep curve.
-        hand: of the recruitment curve of a hand's muscle, or of another of which as little is known.
 
     Raises:
         InvalidValueError: probabilities that do not sum to 1.
@@ -132,12 +167,31 @@ class NoiseShares:
 
     constant_cv: float = 0.37
     missing: float = 0.11
-    forearm: float = 0.352
+    recruitment: float = 0.44
     all_or_none: float = 0.08
-    hand: float = 0.088
 
     def __post_init__(self) -> None:
         _check_shares(self)
+
+
+@dataclass(frozen=True)
+class Width:
+    """A law of the window's width.
+
+    Args:
+        share: its probability.
+        width_ms: the width.
+
+    Raises:
+        InvalidValueError: an invalid share or scale.
+    """
+
+    share: float
+    width_ms: Scale
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "share")
+        check_scales(self, "width_ms")
 
 
 @dataclass(frozen=True)
@@ -148,125 +202,147 @@ class ProfilePrior:
         p_window: probability that there is any facilitation.
         shapes: probabilities of the families.
         start: where windows start.
-        width_ms: their width; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
+        widths: how wide they are; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
 
     Raises:
-        InvalidValueError: an invalid probability or scale.
+        InvalidValueError: an invalid probability.
     """
 
     p_window: float = 0.72
     shapes: ShapeShares = field(default_factory=ShapeShares)
     start: StartPrior = field(default_factory=StartPrior)
-    width_ms: Scale = Scale(100.0, 0.42, 0.02)
+    widths: tuple[Width, ...] = (Width(0.8, Scale(100.0, 0.42)), Width(0.2, Scale(150.0, 0.6)))
 
     def __post_init__(self) -> None:
         check_probabilities(self, "p_window")
-        check_scales(self, "width_ms")
 
 
 @dataclass(frozen=True)
 class Muscle:
-    """Of a recruitment curve; its input is in logits.
+    """A law of recruitment curves: `s = A / (1 + exp(-k (x + sigma_x z1 - x50))) exp(sigma_y z2)` (Goetz et al.).
 
     Args:
-        ratio: the largest MEP over the floor.
-        input_sd: SD of the noise on the input, k sigma_x.
-        output_sd: SD of the noise on the output, natural log.
-        boost: shift of the input at the best ISI, k times the boost.
-        rest: the input without a tap, k (intensity − x50).
+        share: its probability.
+        ratio: the largest MEP over the floor, A.
+        slope_per_pct: k [1 / % RMT].
+        input_sd: SD of the noise on the input, k sigma_x: about the same in steep curves and flat ones.
+        sigma_y: SD of the noise on the output, natural log.
+        boost_pct: shift of the input at the best ISI [% RMT].
+        rest_pct: the input without a tap, intensity − x50 [% RMT].
 
     Raises:
-        InvalidValueError: an invalid scale.
+        InvalidValueError: an invalid share or scale.
     """
 
+    share: float
     ratio: Scale
+    slope_per_pct: Scale
     input_sd: Scale
-    output_sd: Scale
-    boost: Scale
-    rest: Scale
+    sigma_y: Scale
+    boost_pct: Scale
+    rest_pct: Scale
 
     def __post_init__(self) -> None:
-        check_scales(self, "ratio", "input_sd", "output_sd", "boost")
-        check_scales(self, "rest", positive=False)
+        check_probabilities(self, "share")
+        check_scales(self, "ratio", "slope_per_pct", "input_sd", "sigma_y", "boost_pct")
+        check_scales(self, "rest_pct", positive=False)
 
 
 FOREARM: Final = Muscle(
-    ratio=Scale(16.0, 0.42, 0.04),  # 0.1–0.25 mV over the floor
-    input_sd=Scale(2.1, 0.18, 0.015),  # 0.3 × 5–9 % RMT
-    output_sd=Scale(0.39, 0.18, 0.02),
-    boost=Scale(3.4, 0.33, 0.02),  # 0.3 × 5–18 % RMT
-    rest=Scale(-4.5, 0.38, 0.05),  # −4 to −5 at 90 % RMT
+    share=0.60,
+    ratio=Scale(16.0, 0.45),  # 0.1–0.25 mV over the floor
+    slope_per_pct=Scale(0.30, 0.06),
+    input_sd=Scale(2.1, 0.20),  # 5–9 % RMT
+    sigma_y=Scale(0.39, 0.19),  # 0.3–0.5
+    boost_pct=Scale(11.3, 0.36),  # 5–18 % RMT
+    rest_pct=Scale(-15.0, 1.5),  # 90 % RMT, half of the largest MEP at RMT + 4 %
 )
 
 HAND: Final = Muscle(
-    ratio=Scale(90.0, 0.9),  # 0.2–3 mV over the floor
-    input_sd=Scale(1.8, 0.3),  # 0.23 × 5–9 % RMT
-    output_sd=Scale(0.39, 0.18, 0.02),
-    boost=Scale(3.6, 0.5),  # 0.23 × 16 % RMT in the middle; nobody has measured it
-    rest=Scale(-4.7, 1.0),  # −6 at 90 % RMT, −4 at 100 %
+    share=0.18,
+    ratio=Scale(90.0, 0.85),  # 0.2–3 mV over the floor
+    slope_per_pct=Scale(0.23, 0.1),
+    input_sd=Scale(1.65, 0.25),
+    sigma_y=Scale(0.39, 0.19),
+    boost_pct=Scale(15.0, 0.5),  # nobody has measured it
+    rest_pct=Scale(-19.0, 6.0),  # 90–110 % RMT, half of the largest MEP at RMT + 17 %
+)
+
+OTHER_MUSCLE: Final = Muscle(
+    share=0.22,
+    ratio=Scale(20.0, 0.9),
+    slope_per_pct=Scale(0.30, 0.5),
+    input_sd=Scale(2.0, 0.35),
+    sigma_y=Scale(0.39, 0.35),
+    boost_pct=Scale(9.0, 0.55),
+    rest_pct=Scale(-15.0, 6.0),
 )
 
 
 @dataclass(frozen=True)
-class GainPrior:
-    """Of responses in proportion to the facilitation, with noise of a constant CV.
+class Gain:
+    """A law of responses in proportion to the facilitation, with noise of a constant CV.
 
     Args:
+        share: its probability.
         ratio: the best expected MEP over the floor; MEPs peak at 0.03–0.3 mV (dissertation, 4.2).
         cv: the CV.
-        max_probability: logit of the response probability at the best ISI, where responses may be missing; often about
-            one half (dissertation, Fig. 6.5).
 
     Raises:
-        InvalidValueError: an invalid scale.
+        InvalidValueError: an invalid share or scale.
     """
 
-    ratio: Scale = Scale(7.3, 0.6, 0.04)
-    cv: Scale = Scale(0.62, 0.25, 0.02)
-    max_probability: Scale = Scale(0.2, 0.7)
+    share: float
+    ratio: Scale
+    cv: Scale
 
     def __post_init__(self) -> None:
+        check_probabilities(self, "share")
         check_scales(self, "ratio", "cv")
-        check_scales(self, "max_probability", positive=False)
 
 
 @dataclass(frozen=True)
-class AllOrNonePrior:
-    """Of responses that are all or none; their size is that of `GainPrior`.
+class SwitchPrior:
+    """Of the probabilities with which responses come, where they may be missing or are all or none; in logits.
 
     Args:
-        max_probability: logit of the response probability at the best ISI.
-        rest_probability: logit of that without a tap; 0.05–0.25 of the trials at 90 % RMT are above 50 µV in the hand,
+        reliability: of a response at the best ISI where responses may be missing; often about one half (dissertation,
+            Fig. 6.5).
+        switched_on: of a response at the best ISI where responses are all or none.
+        switched_off: of such a response without a tap; 0.05–0.25 of the trials at 90 % RMT are above 50 µV in the hand,
             next to none in the forearm.
 
     Raises:
         InvalidValueError: an invalid scale.
     """
 
-    max_probability: Scale = Scale(1.2, 0.9)
-    rest_probability: Scale = Scale(-3.3, 1.0)
+    reliability: Scale = Scale(0.2, 0.7)
+    switched_on: Scale = Scale(1.2, 0.9)
+    switched_off: Scale = Scale(-3.3, 1.0)
 
     def __post_init__(self) -> None:
-        check_scales(self, "max_probability", "rest_probability", positive=False)
+        check_scales(self, "reliability", "switched_on", "switched_off", positive=False)
 
 
 @dataclass(frozen=True)
-class FloorPrior:
-    """Of the EMG floor.
+class Floor:
+    """A law of the EMG floor.
 
     Args:
-        median_mv: its median [mV]; 6–20 µV measured. The tail reaches a factor of ten at 2.4 SDs, for rigs with another
-            gain.
+        share: its probability.
+        median_mv: its median [mV]; 6–20 µV measured.
         log_sd: its SD from trial to trial, natural log; 0.12–0.35.
 
     Raises:
-        InvalidValueError: an invalid scale.
+        InvalidValueError: an invalid share or scale.
     """
 
-    median_mv: Scale = Scale(0.009, 0.35, 0.12)
-    log_sd: Scale = Scale(0.22, 0.38, 0.02)
+    share: float
+    median_mv: Scale
+    log_sd: Scale
 
     def __post_init__(self) -> None:
+        check_probabilities(self, "share")
         check_scales(self, "median_mv", "log_sd")
 
 
@@ -276,19 +352,18 @@ class SessionPrior:
 
     Args:
         drift_sd: SD of what the log of evoked MEPs drifts by in the long run; about 0.26 over a session measured.
-        startup: how strongly the first trials startle, 1 being as much as in blocks of plain TMS; mean and SD.
+        startup: how strongly the first trials startle, 1 being as much as in blocks of plain TMS.
 
     Raises:
-        InvalidValueError: a negative SD.
+        InvalidValueError: an SD that is not positive, or an invalid scale.
     """
 
     drift_sd: float = 0.3
-    startup: tuple[float, float] = (0.5, 0.5)
+    startup: Scale = Scale(0.5, 0.5)
 
     def __post_init__(self) -> None:
-        check_numbers(self, "drift_sd", least=0)
-        if not all(math.isfinite(value) and value >= 0 for value in self.startup):
-            raise InvalidValueError("SessionPrior.startup must not be negative", got=self.startup)
+        check_numbers(self, "drift_sd", above=0)
+        check_scales(self, "startup", positive=False)
 
 
 @dataclass(frozen=True)
@@ -298,74 +373,118 @@ class Prior:
     Args:
         profile: of the facilitation by ISI.
         noise: probabilities of the kinds of noise.
-        gain: of responses with noise of a constant CV.
-        all_or_none: of responses that are all or none.
-        forearm: of the recruitment curve of a forearm's muscle.
-        hand: of that of a hand's muscle.
-        floor: of the EMG floor.
+        gains: of responses with noise of a constant CV.
+        switch: of how often responses come.
+        muscles: of recruitment curves.
+        floors: of the EMG floor.
         session: of what changes within a session.
     """
 
     profile: ProfilePrior = field(default_factory=ProfilePrior)
     noise: NoiseShares = field(default_factory=NoiseShares)
-    gain: GainPrior = field(default_factory=GainPrior)
-    all_or_none: AllOrNonePrior = field(default_factory=AllOrNonePrior)
-    forearm: Muscle = FOREARM
-    hand: Muscle = HAND
-    floor: FloorPrior = field(default_factory=FloorPrior)
+    gains: tuple[Gain, ...] = (
+        Gain(0.85, Scale(7.3, 0.62), Scale(0.62, 0.26)),
+        Gain(0.15, Scale(9.0, 1.2), Scale(0.62, 0.45)),
+    )
+    switch: SwitchPrior = field(default_factory=SwitchPrior)
+    muscles: tuple[Muscle, ...] = (FOREARM, HAND, OTHER_MUSCLE)
+    floors: tuple[Floor, ...] = (
+        Floor(0.85, Scale(0.009, 0.38), Scale(0.22, 0.4)),
+        Floor(0.15, Scale(0.009, 1.2), Scale(0.22, 0.5)),
+    )
     session: SessionPrior = field(default_factory=SessionPrior)
 
-    def sample_kinds(self, size: tuple[int, ...], generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
-        """Shape, noise and presence of new particles, each of `size`."""
-        uniform = torch.rand((3, *size), generator=generator, device=generator.device)
-        shape, noise = _kinds(self.profile.shapes, uniform[0]), _kinds(self.noise, uniform[1])
-        return shape, noise, uniform[2] < self.profile.p_window
+    @cached_property
+    def mixtures(self) -> dict[str, Mixture]:
+        """What is believed of each block but the start."""
+        switch, session = self.switch, self.session
+        return {
+            "width": _mixture([(w.share, [_log(w.width_ms)]) for w in self.profile.widths]),
+            "form": _mixture([(1.0, [(0.0, 1.0)])]),
+            "floor": _mixture([(f.share, [_log(f.median_mv), _log(f.log_sd)]) for f in self.floors]),
+            "session": _mixture([(1.0, [(0.0, session.drift_sd), _plain(session.startup)])]),
+            "gain": _mixture([(g.share, [_log(g.ratio), _log(g.cv)]) for g in self.gains]),
+            "reliability": _mixture([(1.0, [_plain(switch.reliability)])]),
+            "switch": _mixture([(1.0, [_plain(switch.switched_on), _plain(switch.switched_off)])]),
+            "recruitment": _mixture([(m.share, _of_muscle(m)) for m in self.muscles]),
+        }
 
-    def sample(self, people: int, particles: int, generator: torch.Generator) -> Latents:
+    @cached_property
+    def spreads(self) -> Tensor:
+        """Usual SD of each latent, shape (d,)."""
+        first = self.profile.start.spans[0]
+        parts = [torch.tensor([first.high_ms - first.low_ms]) / math.sqrt(12.0)]
+        return torch.cat(parts + [self.mixtures[name].sds[0] for name in BLOCKS if name != "start"])
+
+    def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> Latents:
         """Particles of the prior.
 
         Args:
             people: how many people.
             particles: how many particles of each.
             generator: source of randomness.
+            space: the design space that the window is in.
         """
-        z = torch.randn((people, particles, len(LATENTS)), generator=generator, device=generator.device)
-        return Latents(z, *self.sample_kinds((people, particles), generator))
+        size = (people, particles)
+        uniform = torch.rand((4, *size), generator=generator, device=generator.device)
+        start_ms = self.profile.start.start_ms(uniform[3], space).unsqueeze(-1)
+        values = [start_ms, *(self.mixtures[name].sample(size, generator) for name in BLOCKS if name != "start")]
+        shape, noise = _kinds(self.profile.shapes, uniform[0]), _kinds(self.noise, uniform[1])
+        return Latents(torch.cat(values, dim=-1), shape, noise, uniform[2] < self.profile.p_window)
 
-    def person(self, latents: Latents, space: DesignSpace) -> Person:
-        """What particles mean in a design space."""
-        z = dict(zip(LATENTS, latents.z.unbind(-1), strict=True))
-        start_ms = self.profile.start.start_ms(z["start"], space)
-        shape = Shape(latents.shape, start_ms, self.profile.width_ms.log_normal(z["width"]), _even(z["form"]))
+    def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
+        """Log density of latents but for a constant, shape (b, p).
+
+        Args:
+            values: latents, shape (b, p, d).
+            space: the design space that the window is in.
+        """
+        parts = dict(zip(BLOCKS, values.split([len(names) for names in BLOCKS.values()], dim=-1), strict=True))
+        density = self.profile.start.log_density(parts["start"].squeeze(-1), space)
+        for name, mixture in self.mixtures.items():
+            density = density + mixture.log_density(parts[name])
+        return density
+
+    def person(self, latents: Latents) -> Person:
+        """What particles mean."""
+        z = dict(zip(LATENTS, latents.values.unbind(-1), strict=True))
+        shape = Shape(latents.shape, z["start_ms"], z["log_width_ms"].exp(), _even(z["form"]))
         return Person(shape, self._response(z, latents.noise), latents.present)
 
     def _response(self, z: dict[str, Tensor], noise: Tensor) -> Response:
-        hand, switches = noise == NoiseKind.HAND, noise == NoiseKind.ALL_OR_NONE
-        recruits = hand | (noise == NoiseKind.FOREARM)
-
-        def of_muscle(latent: str, name: str) -> Tensor:
-            forearms, hands = getattr(self.forearm, name), getattr(self.hand, name)
-            return torch.where(hand, hands.log_normal(z[latent]), forearms.log_normal(z[latent]))
-
-        largest, input_sd = of_muscle("log_ratio", "ratio"), of_muscle("spread", "input_sd")
+        recruits, switches = noise == NoiseKind.RECRUITMENT, noise == NoiseKind.ALL_OR_NONE
+        slope = z["log_slope"].exp()
         return Response(
             kind=noise,
-            log_floor=self.floor.median_mv.log_normal(z["log_floor"]).log(),
-            floor_log_sd=self.floor.log_sd.log_normal(z["floor_log_sd"]),
-            log_ratio=torch.where(recruits, largest, self.gain.ratio.log_normal(z["log_ratio"])).log(),
-            spread=torch.where(recruits, input_sd, self.gain.cv.log_normal(z["spread"])),
-            output_log_sd=of_muscle("output", "output_sd"),
-            boost=of_muscle("boost", "boost"),
-            rest=torch.where(hand, self.hand.rest.normal(z["rest"]), self.forearm.rest.normal(z["rest"])),
-            max_probability=torch.where(
-                switches,
-                self.all_or_none.max_probability.probability(z["output"]),
-                self.gain.max_probability.probability(z["output"]),
-            ),
-            rest_probability=self.all_or_none.rest_probability.probability(z["rest"]),
-            drift=self.session.drift_sd * z["drift"],
-            startup=self.session.startup[0] + self.session.startup[1] * z["startup"],
+            log_floor=z["log_floor_mv"],
+            floor_log_sd=z["log_floor_sd"].exp(),
+            log_ratio=torch.where(recruits, z["log_ceiling"], z["log_gain"]),
+            spread=torch.where(recruits, slope * z["log_input_sd"].exp(), z["log_cv"].exp()),
+            output_log_sd=z["log_sigma_y"].exp(),
+            boost=slope * z["log_boost"].exp(),
+            rest=slope * z["rest"],
+            max_probability=torch.sigmoid(torch.where(switches, z["switched_on"], z["reliability"])),
+            rest_probability=torch.sigmoid(z["switched_off"]),
+            drift=z["drift"],
+            startup=z["startup"],
         )
+
+
+def _plain(scale: Scale) -> tuple[float, float]:
+    return scale.median, scale.sd
+
+
+def _log(scale: Scale) -> tuple[float, float]:
+    return math.log(scale.median), scale.sd
+
+
+def _of_muscle(muscle: Muscle) -> list[tuple[float, float]]:
+    scales = (muscle.ratio, muscle.slope_per_pct, muscle.input_sd, muscle.sigma_y, muscle.boost_pct)
+    return [*map(_log, scales), _plain(muscle.rest_pct)]
+
+
+def _mixture(components: list[tuple[float, list[tuple[float, float]]]]) -> Mixture:
+    return Mixture.of(components, "cpu")
 
 
 def _kinds(shares: ShapeShares | NoiseShares, uniform: Tensor) -> Tensor:

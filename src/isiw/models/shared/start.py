@@ -1,24 +1,69 @@
-"""Where windows start in a design space: what is known of people, of the rig, and the chance that neither holds."""
+"""Where windows start in a design space: what is known of people and of the rig, and the chance that neither holds."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Final, NamedTuple
 
 import torch
 
-from isiw.checks import ascending, check_probabilities, number
+from isiw.checks import ascending, check_numbers, check_probabilities, number
 from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
 from isiw.models.protocol import Tensor
 
-__all__ = ["StartPrior"]
+__all__ = ["Span", "StartPrior"]
 
-BEFORE_MS = 50.0
+BEFORE_MS: Final = 100.0
 """How far before the range a window may start."""
 
-KNOTS = 512
-LEAST_MASS = 1e-6
+KNOT_MS: Final = 1.0
+MAX_KNOTS: Final = 4000
+LEAST_MASS: Final = 1e-6
+
+ROBOT_HIT_DELAY_MS: Final = (180.0, 6.2)
+"""Mean and SD over people of the tapping robot's hit delay [ms]; 172–188 ms were measured (dissertation, 4.2)."""
+
+OTHER_HIT_DELAY_MS: Final = (20.0, 300.0)
+"""Between these lies the hit delay of any other rig [ms]."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """Starts that are uniform between two ISIs, with normal blur.
+
+    Args:
+        share: probability of this span among all.
+        low_ms: earliest start [ms].
+        high_ms: latest start [ms].
+        sd_ms: SD of the blur [ms].
+
+    Raises:
+        InvalidValueError: an empty span, an invalid share, or a blur that is not positive.
+    """
+
+    share: float
+    low_ms: float
+    high_ms: float
+    sd_ms: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "share")
+        ascending("Span.low_ms and Span.high_ms", (self.low_ms, self.high_ms))
+        check_numbers(self, "low_ms", "high_ms")
+        check_numbers(self, "sd_ms", above=0)
+
+    def density(self, start_ms: Tensor) -> Tensor:
+        """Density at some starts [1/ms], same shape."""
+        below = [torch.special.ndtr((start_ms - edge) / self.sd_ms) for edge in (self.low_ms, self.high_ms)]
+        return (below[0] - below[1]) / (self.high_ms - self.low_ms)
+
+    def later(self, mean_ms: float, sd_ms: float, share: float = 1.0) -> Span:
+        """The same counted from an event that is so much earlier, give or take an SD, and a share of its share."""
+        blur_ms = math.hypot(self.sd_ms, sd_ms)
+        return Span(share * self.share, self.low_ms + mean_ms, self.high_ms + mean_ms, blur_ms)
 
 
 @dataclass(frozen=True)
@@ -26,51 +71,82 @@ class StartPrior:
     """Where windows start.
 
     Args:
-        after_impact_ms: the start is uniform between these, counted from the impact [ms].
-        hit_delay_ms: mean and SD of the impact on the clock of the valve, of a person unknown [ms]; 172–188 ms were
-            measured (dissertation, 4.2).
-        p_anywhere: probability that the start lies anywhere in the range instead, or up to 50 ms before it, for
-            stimulators unlike that one; more in a range that only a part of the usual starts lies in.
+        spans: starts counted from the impact; the first is the usual one.
+        hit_delay_ms: mean and SD of the impact on the clock of the valve, of a person unknown [ms], as the rig states
+            it; None where it does not: then it is the tapping robot's with a probability of `p_robot`, else anything
+            from 20 to 300 ms.
+        p_robot: how probable it is that a rig that does not state its hit delay is the tapping robot.
+        p_anywhere: probability that the start lies anywhere in the range instead, or up to 100 ms before it; more in a
+            range that only a part of the usual starts lies in.
 
     Raises:
-        InvalidValueError: an empty range, a hit delay that is not positive, or an invalid probability.
+        InvalidValueError: shares that do not sum to 1, a hit delay that is not positive, or an invalid probability.
     """
 
-    after_impact_ms: tuple[float, float] = (0.0, 115.0)
-    hit_delay_ms: tuple[float, float] = (180.0, 6.2)
-    p_anywhere: float = 0.08
+    spans: tuple[Span, ...] = (Span(0.8, 0.0, 115.0), Span(0.2, -30.0, 260.0, 20.0))
+    hit_delay_ms: tuple[float, float] | None = None
+    p_robot: float = 0.5
+    p_anywhere: float = 0.04
 
     def __post_init__(self) -> None:
-        low, high = ascending("StartPrior.after_impact_ms", self.after_impact_ms)
-        mean, sd = (number("StartPrior.hit_delay_ms", value, above=0) for value in self.hit_delay_ms)
-        object.__setattr__(self, "after_impact_ms", (low, high))
-        object.__setattr__(self, "hit_delay_ms", (mean, sd))
-        check_probabilities(self, "p_anywhere")
+        check_probabilities(self, "p_anywhere", "p_robot")
+        total = math.fsum(span.share for span in self.spans)
+        if not math.isclose(total, 1.0, abs_tol=1e-6):
+            raise InvalidValueError("the shares of StartPrior.spans must sum to 1", got=total)
+        if self.hit_delay_ms is not None:
+            mean, sd = (number("StartPrior.hit_delay_ms", value, above=0) for value in self.hit_delay_ms)
+            object.__setattr__(self, "hit_delay_ms", (mean, sd))
 
-    def start_ms(self, z: Tensor, space: DesignSpace) -> Tensor:
-        """Starts in a space [ms] at standard normal latents of any shape: the prior's quantiles, of the same shape.
+    def start_ms(self, quantile: Tensor, space: DesignSpace) -> Tensor:
+        """Starts in a space [ms] at some quantiles of the prior in 0–1, same shape."""
+        law = _law(space, self)
+        return _interpolate(quantile, law.below.to(quantile), law.knots_ms.to(quantile))
 
-        Args:
-            z: the latents.
-            space: the design space; before it is known that the window starts there.
-        """
-        cdf, knots = _start_cdf(space, self)
-        return _interpolate(torch.special.ndtr(z), cdf.to(z), knots.to(z))
+    def log_density(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
+        """Log density at some starts in a space [ms], same shape; -inf where no start can be."""
+        law = _law(space, self)
+        inside = (start_ms >= law.knots_ms[0]) & (start_ms <= law.knots_ms[-1])
+        density = _interpolate(start_ms, law.knots_ms.to(start_ms), law.density.to(start_ms))
+        return torch.where(inside, density.clamp_min(1e-30).log(), -torch.inf)
+
+    def in_space(self, space: DesignSpace) -> tuple[Span, ...]:
+        """The spans on the clock of a space."""
+        if space.reference == "impact":
+            return self.spans
+        if self.hit_delay_ms is not None:
+            return tuple(span.later(*self.hit_delay_ms) for span in self.spans)
+        robot = [span.later(*ROBOT_HIT_DELAY_MS, share=self.p_robot) for span in self.spans]
+        return (*robot, *(_with_any_hit_delay(span, 1.0 - self.p_robot) for span in self.spans))
 
 
-@lru_cache(maxsize=16)
-def _start_cdf(space: DesignSpace, prior: StartPrior) -> tuple[Tensor, Tensor]:
-    """Probability that a window starts before each of some knots, and the knots [ms]."""
-    shift, blur = prior.hit_delay_ms if space.reference == "valve" else (0.0, 1.0)
-    low, high = (edge + shift for edge in prior.after_impact_ms)
-    knots = torch.linspace(space.low_ms - BEFORE_MS, space.high_ms, KNOTS, dtype=torch.float64)
-    edges = [torch.special.ndtr((knots - edge) / blur) * (knots - edge) for edge in (low, high)]
-    bumps = [torch.exp(-0.5 * ((knots - edge) / blur) ** 2) * blur / math.sqrt(2 * math.pi) for edge in (low, high)]
-    informed = (edges[0] + bumps[0] - edges[1] - bumps[1]) / (high - low)
-    anywhere = (knots - knots[0]) / (knots[-1] - knots[0])
-    mixed = (1 - prior.p_anywhere) * (informed - informed[0]) + prior.p_anywhere * anywhere
+def _with_any_hit_delay(span: Span, share: float) -> Span:
+    """Starts in a span after any other rig's impact: the wider of the two laws, blurred by the narrower."""
+    low_ms, high_ms = OTHER_HIT_DELAY_MS
+    middle_ms, sd_ms = 0.5 * (span.low_ms + span.high_ms), (span.high_ms - span.low_ms) / math.sqrt(12.0)
+    return Span(share * span.share, low_ms + middle_ms, high_ms + middle_ms, math.hypot(span.sd_ms, sd_ms))
+
+
+class _Law(NamedTuple):
+    """Density and distribution function of the start at some knots [ms], each of shape (k,)."""
+
+    knots_ms: Tensor
+    density: Tensor
+    below: Tensor
+
+
+@lru_cache(maxsize=64)
+def _law(space: DesignSpace, prior: StartPrior) -> _Law:
+    low_ms, high_ms = space.low_ms - BEFORE_MS, space.high_ms
+    knots_ms = torch.linspace(low_ms, high_ms, min(MAX_KNOTS, math.ceil((high_ms - low_ms) / KNOT_MS) + 1)).double()
+    expected = torch.stack([span.share * span.density(knots_ms) for span in prior.in_space(space)]).sum(0)
+    even = torch.full_like(knots_ms, 1.0 / (high_ms - low_ms))
+    mixed = (1.0 - prior.p_anywhere) * expected + prior.p_anywhere * even
+    below = torch.cumulative_trapezoid(mixed, knots_ms)
+    if float(below[-1]) < LEAST_MASS:
+        mixed, below = even, torch.cumulative_trapezoid(even, knots_ms)
     # Given that it lies in the range: the further that is from where starts usually are, the more "anywhere" counts.
-    return (mixed / mixed[-1] if mixed[-1] > LEAST_MASS else anywhere), knots
+    total = below[-1]
+    return _Law(knots_ms, mixed / total, torch.nn.functional.pad(below / total, (1, 0)))
 
 
 def _interpolate(x: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
