@@ -23,8 +23,8 @@ PART_PROBABILITY = (0.35, 0.35, 0.30)
 """How often a difference moves all latents, those of the profile alone, and those of the response alone."""
 
 JUMPS = {"form": 0.25, "noise": 0.2, "window": 0.35, "place": 0.12, "response": 0.08}
-"""Shares of the jumps. They draw anew: the profile's kind and form; the noise's kind and all that belongs to it; whether
-there is a window, and all of it; where and how wide it is; what belongs to the noise's kind."""
+"""Shares of the jumps. They draw anew: the profile's kind and form; the noise's kind and all that belongs to it;
+whether there is a window, and all of it; where and how wide it is; what belongs to the noise's kind."""
 
 BLUR = 0.02
 """SD of what is added to a difference, as a share of the usual SD of each latent."""

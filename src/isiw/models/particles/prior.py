@@ -439,7 +439,8 @@ class Prior:
             values: latents, shape (b, p, d).
             space: the design space that the window is in.
         """
-        parts = dict(zip(BLOCKS, values.split([len(names) for names in BLOCKS.values()], dim=-1), strict=True))
+        sizes = [len(names) for names in BLOCKS.values()]
+        parts = dict(zip(BLOCKS, torch.split(values, sizes, dim=-1), strict=True))
         density = self.profile.start.log_density(parts["start"].squeeze(-1), space)
         for name, mixture in self.mixtures.items():
             density = density + mixture.log_density(parts[name])
@@ -459,7 +460,7 @@ class Prior:
             log_floor=z["log_floor_mv"],
             floor_log_sd=z["log_floor_sd"].exp(),
             log_ratio=torch.where(recruits, z["log_ceiling"], z["log_gain"]),
-            spread=torch.where(recruits, slope * z["log_input_sd"].exp(), z["log_cv"].exp()),
+            spread=torch.where(recruits, z["log_input_sd"], z["log_cv"]).exp(),
             output_log_sd=z["log_sigma_y"].exp(),
             boost=slope * z["log_boost"].exp(),
             rest=slope * z["rest"],

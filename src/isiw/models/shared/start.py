@@ -57,8 +57,9 @@ class Span:
 
     def density(self, start_ms: Tensor) -> Tensor:
         """Density at some starts [1/ms], same shape."""
-        below = [torch.special.ndtr((start_ms - edge) / self.sd_ms) for edge in (self.low_ms, self.high_ms)]
-        return (below[0] - below[1]) / (self.high_ms - self.low_ms)
+        low, high = (torch.special.ndtr((start_ms - edge) / self.sd_ms) for edge in (self.low_ms, self.high_ms))
+        density: Tensor = (low - high) / (self.high_ms - self.low_ms)
+        return density
 
     def later(self, mean_ms: float, sd_ms: float, share: float = 1.0) -> Span:
         """The same counted from an event that is so much earlier, give or take an SD, and a share of its share."""
