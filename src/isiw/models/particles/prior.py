@@ -259,7 +259,7 @@ class Muscle:
 
 FOREARM: Final = Muscle(
     name="forearm",
-    share=0.60,
+    share=0.54,
     ratio=Scale(16.0, 0.45),  # 0.1–0.25 mV over the floor
     slope_per_pct=Scale(0.30, 0.06),
     input_sd=Scale(2.1, 0.20),  # 5–9 % RMT
@@ -270,7 +270,7 @@ FOREARM: Final = Muscle(
 
 HAND: Final = Muscle(
     name="hand",
-    share=0.18,
+    share=0.16,
     ratio=Scale(90.0, 0.85),  # 0.2–3 mV over the floor
     slope_per_pct=Scale(0.23, 0.1),
     input_sd=Scale(1.65, 0.25),
@@ -281,13 +281,13 @@ HAND: Final = Muscle(
 
 OTHER_MUSCLE: Final = Muscle(
     name="other muscle",
-    share=0.22,
-    ratio=Scale(20.0, 0.9),
-    slope_per_pct=Scale(0.30, 0.5),
-    input_sd=Scale(2.0, 0.35),
-    sigma_y=Scale(0.39, 0.35),
-    boost_pct=Scale(9.0, 0.55),
-    rest_pct=Scale(-15.0, 6.0),
+    share=0.30,
+    ratio=Scale(18.0, 0.7),
+    slope_per_pct=Scale(0.36, 0.5),
+    input_sd=Scale(2.0, 0.3),
+    sigma_y=Scale(0.39, 0.3),
+    boost_pct=Scale(10.5, 0.45),
+    rest_pct=Scale(-14.5, 5.0),
 )
 
 
