@@ -17,7 +17,7 @@ import torch
 from isiw.checks import check_numbers, check_probabilities, choice
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.particles.mixture import Mixture
+from isiw.models.particles.mixture import JointMixture, Mixture
 from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
@@ -431,6 +431,10 @@ class Prior:
         }
 
     @cached_property
+    def _joint(self) -> JointMixture:
+        return JointMixture(list(self.mixtures.values()))
+
+    @cached_property
     def spreads(self) -> Tensor:
         """Usual SD of each latent, shape (d,)."""
         first = self.profile.start.spans[0]
@@ -449,7 +453,7 @@ class Prior:
         size = (people, particles)
         uniform = torch.rand((4, *size), generator=generator, device=generator.device)
         start_ms = self.profile.start.start_ms(uniform[3], space).unsqueeze(-1)
-        values = [start_ms, *(self.mixtures[name].sample(size, generator) for name in BLOCKS if name != "start")]
+        values = [start_ms, self._joint.sample(size, generator)]
         shape, noise = _kinds(self.profile.shapes, uniform[0]), _kinds(self.noise, uniform[1])
         return Latents(torch.cat(values, dim=-1), shape, noise, uniform[2] < self.profile.p_window)
 
@@ -460,12 +464,7 @@ class Prior:
             values: latents, shape (b, p, d).
             space: the design space that the window is in.
         """
-        sizes = [len(names) for names in BLOCKS.values()]
-        parts = dict(zip(BLOCKS, torch.split(values, sizes, dim=-1), strict=True))
-        density = self.profile.start.log_density(parts["start"].squeeze(-1), space)
-        for name, mixture in self.mixtures.items():
-            density = density + mixture.log_density(parts[name])
-        return density
+        return self.profile.start.log_density(values[..., 0], space) + self._joint.log_density(values[..., 1:])
 
     @property
     def possible_muscles(self) -> tuple[Muscle, ...]:
