@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 EDGE_LEVEL = 0.135
-"""The share of the largest excess that a window's edge has: two SDs down a Gaussian (dissertation, 4.3)."""
+"""The share of the largest excess that a window's edge has: two SDs down a Gaussian [Kim2020, 4.3]."""
 
 MIN_EXCESS_MV = 0.002
 MIN_EXCESS_OF_BASELINE = 0.10

@@ -1,6 +1,6 @@
 """Acquisition functions from information: what the next MEP is expected to say.
 
-With all unknowns of the model (Houlsby et al., arXiv:1112.5745, BALD), or about the window alone: its place, or each
+With all unknowns of the model [BALD: Houlsby2011], or about the window alone: its place, or each
 ISI's membership in it (stepwise uncertainty reduction for excursion sets: Bect et al., Stat. Comput. 22, 2012;
 Chevalier et al., Technometrics 56, 2014).
 """

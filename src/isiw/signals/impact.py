@@ -20,7 +20,7 @@ from isiw.types import ArrayLike, FloatArray, IntArray
 __all__ = ["DETECTION_LATENCY_MS", "HYSTERESIS_SD", "VALVE_MS", "impact_time", "impact_times"]
 
 VALVE_MS = 500.0
-"""The valve command in a trial of 1 s (dissertation, 4.2)."""
+"""The valve command in a trial of 1 s [Kim2020, 4.2]."""
 
 HYSTERESIS_SD = 6.0
 """Half-width of the hysteresis band, in SDs of the noise at rest."""

@@ -1,6 +1,6 @@
 """The MEP in an EMG sweep: amplitude, onset latency, presence; and the EMG before the pulse.
 
-Amplitude: the largest minus the smallest value in a window after the pulse (dissertation, 5.2.3), whatever the offset.
+Amplitude: the largest minus the smallest value in a window after the pulse [Kim2020, 5.2.3], whatever the offset.
 Onset: from the first sample that is surely part of the MEP, back to where the deviation from rest last rose out of the
 noise. Both thresholds are relative to the sweep's own amplitude and noise.
 """

@@ -1,7 +1,7 @@
 """ISI–MEP response profiles: how strongly a tap facilitates, as a share of its best ISI.
 
 A profile is a value that maps ISIs counted from the impact to facilitation in 0–1. The families are those that have
-been seen or argued for: a Gaussian (dissertation, 4.2), skewed and flat-topped ones (8.1, appendix B), and two peaks
+been seen or argued for: a Gaussian [Kim2020, 4.2], skewed and flat-topped ones (8.1, appendix B), and two peaks
 (electrical conditioning has two facilitation windows).
 """
 

@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 SUPPLY_KPA = 413.7
-"""60 psi (dissertation, 3.2.2, where it is printed as 416.7 kPa)."""
+"""60 psi [Kim2020, 3.2.2, where it is printed as 416.7 kPa]."""
 
 LINE_DELAY_MS = 23.0  # t_fill of every preset; sound needs 22 ms for the 7.5 m line
 FILL_MS = 100.0  # time constant of the chamber

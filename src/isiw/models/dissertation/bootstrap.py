@@ -1,4 +1,4 @@
-"""The bootstrap particle filter: the dissertation's PF (4.3.2), after Gordon et al., IEE Proc. F 140, 1993.
+"""The bootstrap particle filter: the dissertation's PF (4.3.2), after [Gordon1993].
 
 Particles are ISIs that search for the best one. Each generation is diffused, measured with one MEP a particle, weighted
 by these MEPs, and resampled. Nothing is learnt before all particles of a generation have been measured.

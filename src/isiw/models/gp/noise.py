@@ -71,7 +71,7 @@ def _covariance(one: Tensor, other: Tensor) -> Tensor:
 def leave_one_out(covariance: Tensor, residuals: Tensor) -> Tensor:
     """How far each value is from what all others predict, in SDs of that prediction, shape (n,).
 
-    Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), equations 5.10–5.12.
+    [Rasmussen2006, equations 5.10–5.12]
 
     Args:
         covariance: of the values, noise included, shape (n, n).

@@ -93,7 +93,7 @@ def _log_density(parts: _Components, log_mep: Tensor, likelihood: Likelihood) ->
 def _below(parts: _Components, log_mep: Tensor, likelihood: Likelihood) -> Tensor:
     """Probability of a smaller MEP on each node, shape (m, n, q)."""
     if likelihood == "gamma":
-        # Wilson and Hilferty (PNAS 17, 1931): the cube root of a gamma variable is nearly normal.
+        # The Wilson–Hilferty approximation [Wilson1931]: the cube root of a gamma variable is nearly normal.
         root = torch.exp((log_mep - torch.log(parts.mean_mv)) / 3.0)
         z = (root - 1.0 + parts.cv2 / 9.0) * 3.0 / torch.sqrt(parts.cv2)
     else:
