@@ -21,7 +21,7 @@ PICTURE = ROOT / "docs" / "images" / "rooms.svg"
 
 def floors() -> list[list[str]]:
     """The rooms of each floor, from the top, as `lint-imports` checks them."""
-    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]["contracts"]
     (layers,) = (contract["layers"] for contract in contracts if contract["type"] == "layers")
     return [[room.strip() for room in layer.split("|")] for layer in layers]
 

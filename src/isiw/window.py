@@ -1,4 +1,4 @@
-"""The window: the ISIs that enhance the MEP, what is believed about it, and the 0.135 rule that defines it."""
+"""The window: the ISIs that enhance the MEP, what is believed about it, and the least-excess rule that defines it."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ class WindowEstimate:
             return
         check_probabilities(self, "probability")
         if self.window is not None and self.probability < 0.5:
-            raise InvalidValueError("a window is reported although none is more probable", got=self.probability)
+            raise InvalidValueError("a window is reported although 'no window' is more probable", got=self.probability)
 
     def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:
         """Credible intervals of start and end, given that there is a window [ms].
@@ -213,7 +213,7 @@ class WindowEstimate:
 
         Args:
             level: the credible level, in 0–1.
-            min_share: the least probability of a hypothesis that must be reckoned with, given that there is a window.
+            min_share: the least probability of a hypothesis that is taken into account, given that there is a window.
 
         Returns:
             As `interval` does; the same where the method has no hypotheses.

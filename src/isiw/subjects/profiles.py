@@ -37,7 +37,7 @@ class PeakProfile:
         exponent: 2 is Gaussian (SD = width/4 if symmetric), more is flatter on top with steeper flanks.
 
     Raises:
-        InvalidValueError: a span, peak or exponent that cannot be.
+        InvalidValueError: an invalid span, peak or exponent.
     """
 
     start_ms: float
@@ -69,7 +69,7 @@ class TwoPeakProfile:
         second: height of the second peak; the higher of the two has 1.
 
     Raises:
-        InvalidValueError: a span or heights that cannot be.
+        InvalidValueError: an invalid span or height.
     """
 
     start_ms: float
