@@ -92,9 +92,7 @@ def test_without_a_trial_there_is_nothing_to_say(record) -> None:
 
 
 def test_the_truth_is_compared_by_f1(record) -> None:
-    assert truth_sentence(record, Window(33, 93)).endswith(
-        "has the window 33–93 ms; the result has an F1 of 1.00."
-    )
+    assert truth_sentence(record, Window(33, 93)).endswith("has the window 33–93 ms; the result has an F1 of 1.00.")
     assert truth_sentence(record, None).endswith("has no window; the result has an F1 of 0.00.")
 
 
