@@ -25,14 +25,14 @@ from rich.progress import Progress
 
 import isiw
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
-from isiw.metrics import trials_to_lasting
+from isiw.metrics import trials_to_criterion
 from isiw.plots.study import save_study_plot
 from isiw.studies import Processes, Study, StudyStrategy, conduct, paired_sessions, run_study, summarise
 from isiw.subjects.cohorts import COHORTS
 from oracle import SPANS, simulate_oracle
 
 MARKS = (5, 10, 12, 15, 20, 25, 30, 40, 60, 80)
-LASTING = (0.8, 0.9, 0.95)
+CRITERIA = (0.8, 0.9, 0.95)
 SPACES = {"valve": VALVE_SPACE, "impact": IMPACT_SPACE}
 KEYS = ["cohort", "strategy", "trial"]
 MEANS = (
@@ -53,7 +53,7 @@ MEANS = (
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
     """One row a cohort, strategy and trial: that of the study, and how much mean F1 is below the oracle's, paired.
 
-    Of all people, and of those only whom a window is reported for: the oracle never has to say that there is none.
+    Of all people, and of those only whom a window is reported for: the oracle is told that there is a window.
     """
     oracle = rows[rows["strategy"] == "oracle"].set_index(["cohort", "person", "trial"])["f1"]
     behind = oracle.reindex(pd.MultiIndex.from_frame(rows[["cohort", "person", "trial"]])).to_numpy() - rows["f1"]
@@ -74,8 +74,8 @@ def decisions(rows: pd.DataFrame) -> pd.DataFrame:
     """One row a cohort, strategy and trial: share of the people without a window given one, and of those with, none."""
     keys = [*KEYS, "noise"]
     table = rows[rows["strategy"] != "oracle"].copy()
-    # Of the silent people every second has recruitment noise.
-    kinds = np.where(table["person"] % 2 == 0, "kind", "recruitment")
+    # Every second non-responder has recruitment noise.
+    kinds = np.where(table["person"] % 2 == 0, "constant CV", "recruitment")
     table["noise"] = np.where(table["cohort"] == "nonresponder", kinds, "")
     table["false_window"] = table["reported_window"].where(~table["true_window"]).astype(float)
     table["false_none"] = (~table["reported_window"]).where(table["true_window"]).astype(float)
@@ -92,16 +92,16 @@ def at_stopping(rows: pd.DataFrame) -> pd.DataFrame:
     return table.assign(stopped=groups.size().reindex(sessions.index, fill_value=0) / sessions).reset_index()
 
 
-def lasting(table: pd.DataFrame) -> pd.DataFrame:
-    """One row a cohort and strategy: mean pairs delivered where mean F1 begins to stay above each criterion."""
+def reached(table: pd.DataFrame) -> pd.DataFrame:
+    """One row a cohort and strategy: mean pairs delivered from which on mean F1 stays at or above each criterion."""
 
     def first(group: pd.DataFrame, criterion: float) -> float:
-        mark = trials_to_lasting(group["f1"], criterion)
+        mark = trials_to_criterion(group["f1"], criterion)
         return float("nan") if mark is None else float(group["delivered"].iloc[mark - 1])
 
     groups = table.sort_values(KEYS).groupby(KEYS[:2])
     return (
-        pd.DataFrame({f"F1 {c}": {name: first(group, c) for name, group in groups} for c in LASTING})
+        pd.DataFrame({f"F1 {c}": {name: first(group, c) for name, group in groups} for c in CRITERIA})
         .rename_axis(KEYS[:2])
         .reset_index()
     )
@@ -120,7 +120,7 @@ def write(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
     table = summary(rows)
     tables = {
         "F1 by trial": table,
-        "Pairs delivered up to a lasting F1 (among the marked trials)": lasting(table),
+        "Pairs delivered from which on mean F1 is kept (among the marked trials)": reached(table),
         "False decisions": decisions(rows),
         "At the stopping rule": at_stopping(rows),
     }

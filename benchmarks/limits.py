@@ -56,13 +56,13 @@ TOLD: dict[str, dict[str, Any]] = {
 
 
 def studies(plan: dict[str, Any]) -> dict[str, Study]:
-    """The default as it is, told a cohort's laws, and told besides that there is a window; and among silent people."""
+    """The default as it is, told a cohort's laws, and told besides that there is a window; and on non-responders."""
     planned = {}
     for cohort, laws in TOLD.items():
         told = StudyStrategy("default", {"prior": laws}, label=f"told-{cohort}")
         certain = StudyStrategy("default", {"prior": laws | {"p_window": 1.0}}, label=f"told-{cohort}-and-window")
         planned[cohort] = Study((StudyStrategy("default"), told, certain), (cohort,), **plan)
-        planned[f"{cohort}-silent"] = Study((told,), ("nonresponder",), **plan)
+        planned[f"{cohort}-nonresponder"] = Study((told,), ("nonresponder",), **plan)
     return planned
 
 

@@ -2,7 +2,7 @@
 
     python benchmarks/recorded.py --out benchmarks/results/recorded
 
-What facilitation does to recorded amplitudes is put together in five ways, and silent people have theirs as well
+What facilitation does to recorded amplitudes is put together in five ways, and non-responders have theirs as well
 (`recorded_people.py`). What it writes is told as in `benchmarks/acquisition.py`.
 """
 

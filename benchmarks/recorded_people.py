@@ -24,7 +24,7 @@ from isiw.types import ArrayLike, FloatArray
 
 FOLDER = Path(__file__).parents[1] / "tests" / "data" / "uef"
 AT_REST_MV = 0.013
-"""The forearm's recruitment curve has fourteen sweeps without a MEP, below this."""
+"""The forearm's recruitment curve has fourteen sweeps without an MEP, below this."""
 NO_FLOOR = EmgFloor(1e-6, 0.0)
 """A recorded sweep has its floor already."""
 
@@ -47,7 +47,7 @@ def forearm_mv() -> FloatArray:
 
 
 def rest_mv() -> FloatArray:
-    """Forearm sweeps without a MEP [mV]."""
+    """Forearm sweeps without an MEP [mV]."""
     return forearm_mv()[forearm_mv() < AT_REST_MV]
 
 
@@ -56,7 +56,7 @@ class Switched:
     """A trial is one of some recorded sweeps, or one at rest; facilitation says how often.
 
     Args:
-        evoked_mv: the sweeps with a MEP [mV].
+        evoked_mv: the sweeps with an MEP [mV].
         least: how often without facilitation.
         most: how often at the best ISI.
     """
@@ -132,7 +132,7 @@ class Climbed:
         return float(self._sweep_mv(facilitation, noise.input_z) * np.exp(noise.log_gain))
 
 
-def _now_and_then(rng: np.random.Generator) -> Switched:
+def _occasional(rng: np.random.Generator) -> Switched:
     return Switched(hand_mv(), float(rng.uniform(0, 0.1)), float(rng.uniform(0.5, 0.9)))
 
 
@@ -145,7 +145,7 @@ def _climbed(rng: np.random.Generator) -> Climbed:
     return Climbed(float(rng.uniform(0, 0.15)), float(rng.uniform(0.35, 0.8)), float(rng.uniform(0.08, 0.2)))
 
 
-def _silent(rng: np.random.Generator) -> Switched:
+def _nonresponder(rng: np.random.Generator) -> Switched:
     share = float(rng.uniform(0, 0.2))
     return Switched(float(rng.uniform(0.05, 1.0)) * hand_mv(), share, share)
 
@@ -153,10 +153,10 @@ def _silent(rng: np.random.Generator) -> Switched:
 PEOPLE: dict[str, Callable[[np.random.Generator], ResponseCurve]] = {
     "switched-hand": lambda _rng: Switched(hand_mv()),
     "switched-forearm": lambda _rng: Switched(forearm_mv()[18:45]),
-    "now-and-then": _now_and_then,
+    "occasional": _occasional,
     "scaled": _scaled,
     "climbed": _climbed,
-    "silent": _silent,
+    "nonresponder": _nonresponder,
 }
 
 

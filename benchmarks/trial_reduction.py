@@ -83,7 +83,7 @@ def compared(rows: Rows) -> dict[str, pd.DataFrame]:
     """The comparisons in which orderings are judged, by name."""
     main, read = rows[comparison], rows[reading_table]
     best = reading_table.distances(read).loc[0, "reading"]
-    names = dict.fromkeys(("people: kind noise", "observation: mean of ten", best))
+    names = dict.fromkeys(("people: constant-CV noise", "observation: mean of ten", best))
     cohorts = {f"{name}, base": main[main["cohort"] == name] for name in ("kim11", "recruitment")}
     readings = {str(name): reading_table.rows_of(name, read) for name in names}
     return {name: comparison.summary(group) for name, group in (cohorts | readings).items()}

@@ -1,4 +1,4 @@
-"""F1, edge errors, coverage, and trials to a lasting criterion."""
+"""F1, edge errors, coverage, and the trial from which a criterion is met."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from isiw.design import DesignSpace
-from isiw.metrics import covers, edge_error_ms, edge_ranks, f1, f1_of_masks, trials_to_lasting, true_edges_ms
+from isiw.metrics import covers, edge_error_ms, edge_ranks, f1, f1_of_masks, trials_to_criterion, true_edges_ms
 from isiw.window import Window, WindowEstimate
 
 SPACE = DesignSpace(0, 40, step_ms=1)
@@ -120,7 +120,7 @@ def test_intervals_of_a_calibrated_posterior_cover_at_their_level() -> None:
     ],
 )
 def test_a_criterion_lasts_from_the_trial_after_the_last_miss(mean_f1: list[float], expected: int | None) -> None:
-    assert trials_to_lasting(mean_f1, 0.9) == expected
+    assert trials_to_criterion(mean_f1, 0.9) == expected
 
 
 def test_the_ranks_of_edges_drawn_from_the_posterior_itself_are_uniform() -> None:

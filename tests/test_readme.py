@@ -6,6 +6,8 @@ import re
 import tomllib
 from pathlib import Path
 
+from benchmarks.readme_results import table
+
 from isiw.config.run import load_config
 
 ROOT = Path(__file__).parents[1]
@@ -30,9 +32,24 @@ def test_a_copied_device_waits_between_its_trials() -> None:
     assert "simulated=" not in "".join(blocks("python"))
 
 
-def test_the_examples_are_as_short_as_promised() -> None:
-    for block in blocks("python")[:1]:
-        assert len([line for line in block.splitlines() if line.strip()]) <= 20
+def test_a_labs_own_loop_takes_ten_lines() -> None:
+    assert len([line for line in blocks("python")[0].splitlines() if line.strip()]) <= 10
+
+
+def test_the_examples_log_to_different_files() -> None:
+    logs = re.findall(r"(?:--log |log=\")([\w.]+)", TEXT)
+    assert len(logs) == len(set(logs)) == 2
+
+
+def test_the_first_screen_says_what_and_how() -> None:
+    screen = TEXT[: TEXT.index("## ")]
+    for part in ("**window**", "**F1**", "pip install -e .", "whl/cpu", "strategy.tell("):
+        assert part in screen
+
+
+def test_the_results_are_those_of_the_files() -> None:
+    (shown,) = re.findall(r"<!-- results: begin.*?-->\n(.*?)\n<!-- results: end -->", TEXT, flags=re.DOTALL)
+    assert shown == table()
 
 
 def test_the_configuration_is_valid(tmp_path) -> None:
@@ -42,11 +59,7 @@ def test_the_configuration_is_valid(tmp_path) -> None:
     assert config.strategy.settings["max_trials"] == tomllib.loads(block)["strategy"]["settings"]["max_trials"]
 
 
-def test_there_are_exactly_two_commands_to_set_up() -> None:
+def test_one_command_sets_up_one_spares_the_gpu_libraries_and_one_tests() -> None:
     commands = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("pip")]
-    assert commands == ["pip install -e . && isiw run", 'pip install -e ".[test]" && pytest']
-
-
-def test_every_linked_file_exists() -> None:
-    for target in re.findall(r"\]\((?!http)([^)]+)\)", TEXT):
-        assert (ROOT / target).is_file(), target
+    torch = "pip install torch --index-url https://download.pytorch.org/whl/cpu"
+    assert commands == ["pip install -e . && isiw run", torch, 'pip install -e ".[test]" && pytest']

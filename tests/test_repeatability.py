@@ -106,10 +106,10 @@ def test_an_isi_of_which_every_trial_is_lost_leaves_the_pooled_sd_as_it_is(lost)
 
 
 def test_recorded_sweeps_are_studied_like_a_preset() -> None:
-    class Silent:
+    class NoResponse:
         mep_mv = 0.0
 
-    device = SimulatedDevice(Tapper(lambda _: Silent(), "subject4", TapperSettings(trigger="impact")))
+    device = SimulatedDevice(Tapper(lambda _: NoResponse(), "subject4", TapperSettings(trigger="impact")))
     device.stage()
     sweeps = [device.deliver(Stimulus(trial, 50.0), 1.0) for trial in range(30)]
     study = study_sweeps("thirty taps", sweeps, [50.0] * 30)
@@ -126,11 +126,11 @@ def on_the_pulses_clock(sweep):
 
 
 def test_a_sweep_clock_that_begins_elsewhere_changes_nothing() -> None:
-    class Silent:
+    class NoResponse:
         mep_mv = 0.0
 
     isi_ms = [20.0, 150.0] * 5
-    robot = Tapper(lambda _: Silent(), "subject4", TapperSettings(trigger="impact"))
+    robot = Tapper(lambda _: NoResponse(), "subject4", TapperSettings(trigger="impact"))
     sweeps = [robot.answer(Stimulus(trial, isi)) for trial, isi in enumerate(isi_ms)]
     usual = study_sweeps("ten taps", sweeps, isi_ms)
     other = study_sweeps("ten taps", [on_the_pulses_clock(sweep) for sweep in sweeps], isi_ms)
@@ -141,11 +141,11 @@ def test_a_sweep_clock_that_begins_elsewhere_changes_nothing() -> None:
 
 
 def test_a_logged_session_is_studied_like_a_preset(tmp_path, scripted_strategy) -> None:
-    class Silent:
+    class NoResponse:
         mep_mv = 0.0
 
     space = DesignSpace(0, 200, reference="impact")
-    device = SimulatedDevice(Tapper(lambda _: Silent(), "subject4"))
+    device = SimulatedDevice(Tapper(lambda _: NoResponse(), "subject4"))
     strategy = scripted_strategy(max_trials=12, space=space)
     result = Session(device, strategy, log=tmp_path / "taps.mcap").run()
     study = study_session(read_session(result.log))
@@ -160,7 +160,7 @@ def test_a_logged_session_is_studied_like_a_preset(tmp_path, scripted_strategy) 
 @pytest.mark.parametrize("fault", [0.0, np.nan])
 @pytest.mark.parametrize("name", ["acceleration", "emg"])
 def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path, scripted_strategy, name, fault) -> None:
-    class Silent:
+    class NoResponse:
         mep_mv = 0.0
 
     class Faulty(Tapper):
@@ -173,7 +173,7 @@ def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path, scripted_st
 
     strategy = scripted_strategy(max_trials=4, space=DesignSpace(20, 200, reference="impact"))
     result = Session(
-        SimulatedDevice(Faulty(lambda _: Silent(), "subject4")), strategy, log=tmp_path / "taps.mcap"
+        SimulatedDevice(Faulty(lambda _: NoResponse(), "subject4")), strategy, log=tmp_path / "taps.mcap"
     ).run()
     study = study_session(read_session(result.log))
     event = "hit" if name == "acceleration" else "memg"

@@ -140,7 +140,7 @@ def test_a_probability_outside_0_to_1_is_refused(probability: float) -> None:
 
 
 def test_a_window_is_not_reported_against_its_probability() -> None:
-    with pytest.raises(InvalidValueError, match="none is more probable"):
+    with pytest.raises(InvalidValueError, match="'no window' is more probable"):
         WindowEstimate(0.49, Window(0, 1))
     assert WindowEstimate(0.5, Window(0, 1)).window == Window(0, 1)
 

@@ -15,7 +15,7 @@ SHARE = 0.3
 
 PROSE = """\
 Each ordering, with our numbers, on different people and under different readings. What fails on `kim11` and holds
-on kind noise fails by the trial noise of the simulated people, not by the method; what fails everywhere is not
+on constant-CV noise fails by the trial noise of the simulated people, not by the method; what fails everywhere is not
 explained by it. Two failures have causes of their own. PF's stand-in profile has the right width wherever its place
 is right, after ten times the trials, and so correlates with the best. NR's floor, where it is subtracted, is the
 median of all MEPs: with accelerometer the window takes so much of the range that the median lies in it (compare the

@@ -23,8 +23,8 @@ PROSE = """\
 Base: an observation is one recorded trial; MEPs outside the measured window as recorded; the floor subtracted (PF:
 raw); both edges, five values; the acquisition function, which the text does not define, is the profile's variance;
 with accelerometer the range ends 500 ms after the valve command. One factor at a time, then combinations. *Zero
-outside*: the text's record holds the windows alone (see the conventional sweep), so that elsewhere a MEP is zero.
-*Kind noise*: people of `gaussian` instead of `kim11`.
+outside*: the text's record holds the windows alone (see the conventional sweep), so that elsewhere an MEP is zero.
+*Constant-CV noise*: people of `gaussian` instead of `kim11`.
 
 Distance: the root mean square deviation from the text's figures over the four methods, with and without
 accelerometer: trials in units of 30 %, F1, correlation and convergence in units of 0.1; 1 is "within those units".

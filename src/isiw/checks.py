@@ -1,8 +1,7 @@
-"""Checks of values that come from outside: a number, a whole number, a choice, each said and done once.
+"""Checks of values that come from outside: a number, a whole number, a choice, each written once.
 
-The plain functions return the value as Python's own type, so that what is compared is what is kept: a subclass of float
-may say anything about itself. The others check fields of a frozen dataclass in its `__post_init__`, and put the plain
-value in their place.
+The plain functions return the value as Python's own type, so that the value that was checked is the one that is kept.
+The others check fields of a frozen dataclass in its `__post_init__`, and put the plain value in their place.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ __all__ = [
 
 
 class Bounds(TypedDict, total=False):
-    """What a number must keep; a bound that is not given is none."""
+    """The bounds of a number; those that are left out do not apply."""
 
     above: float
     least: float
@@ -55,7 +54,7 @@ def number(what: str, value: object, **bounds: Unpack[Bounds]) -> float:
 
 
 def deadline(what: str, value: object) -> float | None:
-    """A time from 0 up [s], or None, as infinity is, where there is no deadline.
+    """A time of at least 0 s; None and infinity mean that there is no deadline.
 
     Args:
         what: its name, for the message.
@@ -93,7 +92,7 @@ def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
         known: the values.
 
     Raises:
-        InvalidValueError: none of them.
+        InvalidValueError: an unknown value.
     """
     values = tuple(known)
     if not any(value == each and type(value) is type(each) for each in values):
@@ -145,7 +144,7 @@ def check_probabilities(owner: object, *names: str, optional: bool = False) -> N
         optional: whether None is allowed.
 
     Raises:
-        InvalidValueError: a field that is no probability.
+        InvalidValueError: a field that is not a probability.
     """
     check_numbers(owner, *names, optional=optional, least=0.0, most=1.0)
 
@@ -177,7 +176,7 @@ def check_choice(owner: object, name: str, known: Iterable[Any]) -> None:
         known: the values.
 
     Raises:
-        InvalidValueError: none of them.
+        InvalidValueError: an unknown value.
     """
     choice(f"{type(owner).__name__}.{name}", getattr(owner, name), known)
 

@@ -96,7 +96,7 @@ class DesignSpace:
 
 
 VALVE_SPACE = DesignSpace(0, 500, reference="valve")
-"""500 ms after the valve command: what can be searched without an accelerometer (dissertation, 4.2)."""
+"""500 ms after the valve command: what can be searched without an accelerometer [Kim2020, 4.2]."""
 
 IMPACT_SPACE = DesignSpace(0, 320, reference="impact")
-"""From the impact on: what can be searched with an accelerometer (dissertation, 4.2)."""
+"""From the impact on: what can be searched with an accelerometer [Kim2020, 4.2]."""

@@ -3,14 +3,14 @@
 Every message says what is wrong, what was got, what was expected, and the way out.
 
     IsiwError
-    ├── InvalidValueError (ValueError)    a value that cannot be: NaN, negative, not finite, wrong shape
+    ├── InvalidValueError (ValueError)    an invalid value: NaN, negative, not finite, wrong shape
     │   └── OutOfSpaceError               an ISI beyond the design space and its tolerance
     ├── ConfigError (ValueError)          a configuration file, key or value that cannot be used
-    ├── StrategyError (ValueError)        a strategy that cannot be built, or not from these parts
+    ├── StrategyError (ValueError)        a strategy that cannot be built from these parts
     ├── DeviceError                       a device that failed, refused, or did not answer
     │   ├── LimitExceededError            a stimulus refused by a limit, before anything was delivered
     │   └── DeviceTimeoutError            no answer within the time allowed
-    ├── StudyError                        a study that cannot go on, or whose folder is another one's
+    ├── StudyError                        a study that cannot be run, continued or read
     └── LogError                          a log that cannot be written or read
         └── DamagedLogError               a log that ends too early or fails its checksums
 """
@@ -42,7 +42,7 @@ class IsiwError(Exception):
 
 
 class InvalidValueError(IsiwError, ValueError):
-    """A value that cannot be: NaN, negative, not finite, of the wrong shape or unit."""
+    """An invalid value: NaN, negative, not finite, of the wrong shape or unit."""
 
 
 class OutOfSpaceError(InvalidValueError):
@@ -54,7 +54,7 @@ class ConfigError(IsiwError, ValueError):
 
 
 class StrategyError(IsiwError, ValueError):
-    """A strategy that cannot be built, or not from these parts."""
+    """A strategy that cannot be built from these parts."""
 
 
 class DeviceError(IsiwError):
@@ -70,11 +70,11 @@ class DeviceTimeoutError(DeviceError):
 
 
 class StudyError(IsiwError):
-    """A study that cannot be run, gone on with or read."""
+    """A study that cannot be run, continued or read."""
 
 
 class OtherVersionsWarning(UserWarning):
-    """A session goes on with other versions than those it was logged with, and may ask something else than it would."""
+    """A session goes on with versions other than those it was logged with, and may ask other ISIs."""
 
 
 class LogError(IsiwError):

@@ -1,4 +1,4 @@
-"""How good an estimate is: F1, edge errors, coverage, and trials to a lasting criterion."""
+"""How good an estimate is: F1, edge errors, coverage, and the trial from which a criterion is met."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from isiw.design import DesignSpace
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Interval, Window, WindowEstimate
 
-__all__ = ["covers", "edge_error_ms", "edge_ranks", "f1", "f1_of_masks", "trials_to_lasting", "true_edges_ms"]
+__all__ = ["covers", "edge_error_ms", "edge_ranks", "f1", "f1_of_masks", "trials_to_criterion", "true_edges_ms"]
 
 
 def f1_of_masks(estimated: ArrayLike, true: ArrayLike) -> FloatArray:
@@ -73,8 +73,8 @@ def edge_ranks(
 ) -> tuple[float, float]:
     """Where the true start and end rank among the samples of the posterior, in 0–1.
 
-    Over people of the model's own prior the ranks of an honest posterior are uniform (simulation-based calibration:
-    Talts et al., arXiv:1804.06788). Samples equal to the truth, as on a grid, are ranked at random.
+    Over people of the model's own prior the ranks of an honest posterior are uniform (simulation-based calibration
+    [Talts2018]). Samples equal to the truth, as on a grid, are ranked at random.
 
     Args:
         estimate: the estimate; without samples of the edges a rank is uniformly random.
@@ -97,7 +97,7 @@ def edge_error_ms(estimate: WindowEstimate | Window | None, truth: Window | None
     return window.start_ms - truth.start_ms, window.end_ms - truth.end_ms
 
 
-def trials_to_lasting(mean_f1: ArrayLike, criterion: float) -> int | None:
+def trials_to_criterion(mean_f1: ArrayLike, criterion: float) -> int | None:
     """The first trial from which a cohort's mean F1 stays at or above a criterion; None where it never does.
 
     Args:

@@ -1,11 +1,11 @@
 """The repeatability study: when a tap's events happen, and how far the realised ISI is from the commanded one.
 
-All figures come from detection on waveforms, simulated or recorded, as in the dissertation (3.3.2, 5.2–5.3).
+All figures come from detection on waveforms, simulated or recorded, as in [Kim2020, 3.3.2, 5.2–5.3].
 
 Its precision study reports an SD of the ISI error of 1.93 ms over 900 trials, and 8 trials in which the pulse came
-before the impact, all of them at an ISI of 10 ms. No one Gaussian does both: an error below −10 ms is more than five of
-those SDs away. So there are two presets of the cushion. `cushion` has Gaussian errors of that SD and no mistrials;
-`timing-fault` has valves that open late now and then, and loses about 8 in 100 trials at 10 ms and none elsewhere.
+before the impact, all of them at an ISI of 10 ms. No single Gaussian does both: an error below −10 ms is more than five
+of those SDs away. So there are two presets of the cushion. `cushion` has Gaussian errors of that SD and no mistrials;
+`timing-fault` has valves that open late occasionally, and loses about 8 in 100 trials at 10 ms and none elsewhere.
 """
 
 from __future__ import annotations
@@ -216,7 +216,7 @@ def study_session(record: SessionRecord) -> TimingStudy:
 
 
 def timing_report(study: TimingStudy) -> str:
-    """A study in words and tables, for people."""
+    """A study in words and tables."""
     events = study.event_table
     lines = [f"{study.name}: {len(study.commanded_ms)} taps", "", "event      mean [ms]    SD   range            n"]
     lines += [

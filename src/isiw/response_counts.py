@@ -1,4 +1,4 @@
-"""The effective window from response counts: the dissertation's earlier, threshold-dependent definition (3.3.4).
+"""The effective window from response counts: an earlier definition, which needs a threshold [Kim2020, 3.3.4].
 
 A trial responds when its MEP exceeds a threshold, and an ISI is effective when more than 40 % of its trials respond.
 Chapter 4 gives this up for amplitudes, because the window depends on the threshold (4.1.1); it is here to compare.

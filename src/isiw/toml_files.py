@@ -34,7 +34,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
             f"the configuration cannot be read: {error.strerror}", got=str(path), remedy="Check the path."
         ) from error
     except ValueError as error:  # not TOML, or not UTF-8
-        raise ConfigError(f"{path} is not valid TOML: {error}", remedy="Mend the line that it names.") from error
+        raise ConfigError(f"{path} is not valid TOML: {error}", remedy="Correct the line that it names.") from error
 
 
 def checked(kind: type[_T], values: Mapping[str, Any], source: str) -> _T:

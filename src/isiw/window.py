@@ -1,4 +1,4 @@
-"""The window: the ISIs that enhance the MEP, what is believed about it, and the 0.135 rule that defines it."""
+"""The window: the ISIs that enhance the MEP, what is believed about it, and the least-excess rule that defines it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 EDGE_LEVEL = 0.135
-"""The share of the largest excess that a window's edge has: two SDs down a Gaussian (dissertation, 4.3)."""
+"""The share of the largest excess that a window's edge has: two SDs down a Gaussian [Kim2020, 4.3]."""
 
 MIN_EXCESS_MV = 0.002
 MIN_EXCESS_OF_BASELINE = 0.10
@@ -213,7 +213,7 @@ class WindowEstimate:
             return
         check_probabilities(self, "probability")
         if self.window is not None and self.probability < 0.5:
-            raise InvalidValueError("a window is reported although none is more probable", got=self.probability)
+            raise InvalidValueError("a window is reported although 'no window' is more probable", got=self.probability)
 
     def _check_hypotheses(self) -> None:
         kinds = self.hypothesis_samples
@@ -262,7 +262,7 @@ class WindowEstimate:
 
         Args:
             level: the credible level, in 0–1.
-            min_share: the least probability of a hypothesis that must be reckoned with, given that there is a window.
+            min_share: the least probability of a hypothesis that is taken into account, given that there is a window.
 
         Returns:
             As `interval` does; the same where the method has no hypotheses.

@@ -45,7 +45,13 @@ def test_run_ends_with_a_statement_a_log_and_a_picture(isiw, short, tmp_path) ->
     assert result.exit_code == 0, result.output
     (log,) = (tmp_path / "isiw-sessions").glob("*.mcap")
     assert log.with_suffix(".png").stat().st_size > 5000
-    for part in ("probability of a window", "3 pairs of stimuli were given", "In truth", log.name, log.stem + ".png"):
+    for part in (
+        "probability of a window",
+        "3 pairs of stimuli were delivered",
+        "in fact",
+        log.name,
+        log.stem + ".png",
+    ):
         assert part in result.output
     assert read_session(log).header.seed == 3
 

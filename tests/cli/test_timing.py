@@ -33,14 +33,18 @@ def test_an_unknown_source_is_a_message_with_the_presets(tmp_path) -> None:
     assert "timing-fault" in result.output
 
 
-class Silent:
+class NoResponse:
     mep_mv = 0.0
 
 
 @pytest.mark.parametrize(("there", "asked"), [("s.mcap.part", "s.mcap"), ("s.mcap", "s.mcap.part")])
 def test_timing_of_a_log_takes_either_of_its_names(tmp_path, scripted_strategy, there, asked) -> None:
     strategy = scripted_strategy(4, space=DesignSpace(20, 200, reference="impact"))
-    log = Session(SimulatedDevice(Tapper(lambda _: Silent(), "subject4")), strategy, log=tmp_path / "s.mcap").run().log
+    log = (
+        Session(SimulatedDevice(Tapper(lambda _: NoResponse(), "subject4")), strategy, log=tmp_path / "s.mcap")
+        .run()
+        .log
+    )
     log.rename(tmp_path / there)
     result = run(tmp_path / asked)
     assert result.exit_code == 0, result.output

@@ -61,7 +61,7 @@ def test_a_file_that_appears_meanwhile_is_not_overwritten_at_the_end(tmp_path, h
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path, header) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(LogError, match="cannot be made"):
+    with pytest.raises(LogError, match="cannot be created"):
         LogWriter.create(tmp_path / "file" / "s.mcap", header)
 
 

@@ -39,7 +39,7 @@ def test_the_statement_has_window_intervals_counts_and_reason(record) -> None:
         "The tap enhances the MEP at ISIs of 33–93 ms after the valve command (probability of a window: 0.90). "
         "With 90 % probability each, it starts between 28 and 38 ms and ends after 150 ms. "
         "Given a window, it ends beyond the range with probability 0.67. "
-        "4 pairs of stimuli were given; 3 count; mistrials: 1 background activity. "
+        "4 pairs of stimuli were delivered; 3 count; mistrials: 1 background activity. "
         "The budget of 4 stimuli is used up."
     )
 
@@ -92,10 +92,8 @@ def test_without_a_trial_there_is_nothing_to_say(record) -> None:
 
 
 def test_the_truth_is_compared_by_f1(record) -> None:
-    assert truth_sentence(record, Window(33, 93)).endswith(
-        "has the window 33–93 ms; the F1 of the reported one is 1.00."
-    )
-    assert truth_sentence(record, None).endswith("has no window; the F1 of the reported one is 0.00.")
+    assert truth_sentence(record, Window(33, 93)).endswith("has the window 33–93 ms; the result has an F1 of 1.00.")
+    assert truth_sentence(record, None).endswith("has no window; the result has an F1 of 0.00.")
 
 
 def test_every_trial_has_a_row(record) -> None:

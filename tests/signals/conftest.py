@@ -59,7 +59,7 @@ def render() -> Callable[..., Rendered]:
 
 @pytest.fixture
 def sweep_of() -> Callable[..., Sweep]:
-    """A clean sweep of 1 s with an impact at 680 ms, a pulse 100 ms later, and a MEP of 0.1 mV."""
+    """A clean sweep of 1 s with an impact at 680 ms, a pulse 100 ms later, and an MEP of 0.1 mV."""
 
     def made(**changes: object) -> Sweep:
         rng = np.random.default_rng(1)

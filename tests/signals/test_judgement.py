@@ -191,7 +191,7 @@ def test_where_tap_and_mep_coincide_at_least_half_of_the_mep_is_told(isi_ms, nam
 
 @pytest.mark.parametrize("name", ["subject1", "subject2"])
 @pytest.mark.parametrize("isi_ms", [0, 3, 6, 9, 12, 15])
-def test_the_tap_of_a_silent_trial_is_never_told_as_a_mep(isi_ms, name) -> None:
+def test_the_tap_of_a_trial_without_a_response_is_never_told_as_a_mep(isi_ms, name) -> None:
     assert told_mv(isi_ms, 0.0, 0.1, name).max() < 0.01
 
 

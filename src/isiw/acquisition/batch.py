@@ -1,4 +1,4 @@
-"""A batch of ISIs to deliver before anything is learnt: greedily, each as if those before it had gone as expected."""
+"""A batch of ISIs to deliver before anything is learnt, chosen greedily: each as if those before went as expected."""
 
 from __future__ import annotations
 
@@ -30,8 +30,7 @@ def greedy_batch(
     """ISIs [ms] for the next n trials of one person.
 
     A method with a plan of its own keeps to it. For all others the posterior is conditioned on the median MEP that it
-    expects at each ISI chosen so far (the kriging believer: Ginsbourger et al., 2010, chapter 6 of Computational
-    Intelligence in Expensive Optimization Problems).
+    expects at each ISI chosen so far (the kriging believer [Ginsbourger2010]).
 
     Args:
         posterior: what is believed before the batch.
@@ -41,7 +40,7 @@ def greedy_batch(
         choose: from a posterior to the next ISI [ms].
 
     Raises:
-        StrategyError: the posterior can imagine no trials, or the method's own plan is shorter.
+        StrategyError: the posterior cannot imagine trials, or the method's own plan has fewer ISIs.
     """
     batch = chosen_ms[:n]
     if len(batch) < n and own_plan(posterior, acquisition):

@@ -63,7 +63,7 @@ class RandomIsi:
 
 @dataclass(frozen=True)
 class SobolIsi:
-    """ISIs from a scrambled Sobol sequence (Owen, J. Complexity 14, 1998): random, and yet evenly spread.
+    """ISIs from a scrambled Sobol sequence [Owen1998]: random, and yet evenly spread.
 
     Args:
         seed: seed of the scrambling.

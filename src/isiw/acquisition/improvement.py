@@ -1,8 +1,7 @@
-"""Acquisition functions for those who seek the best ISI only: where the expected MEP is largest.
+"""Acquisition functions that seek only the best ISI: where the expected MEP is largest.
 
-Expected improvement on the logarithmic scale (Ament et al., arXiv:2310.20708), upper confidence bound (Srinivas et al.,
-arXiv:0912.3995), Thompson sampling (Thompson, Biometrika 25, 1933) and knowledge gradient (Frazier et al., SIAM J.
-Control Optim. 47, 2008).
+Expected improvement on the logarithmic scale [Ament2023], upper confidence bound [Srinivas2010], Thompson sampling
+[Thompson1933] and knowledge gradient [Frazier2008].
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""Acquisition functions from information: what the next MEP is expected to say.
+"""Acquisition functions based on information: what the next MEP is expected to tell.
 
-With all unknowns of the model (Houlsby et al., arXiv:1112.5745, BALD), or about the window alone: its place, or each
-ISI's membership in it (stepwise uncertainty reduction for excursion sets: Bect et al., Stat. Comput. 22, 2012;
-Chevalier et al., Technometrics 56, 2014).
+About all unknowns of the model (BALD [Houlsby2011]), or about the window alone: its place, or each ISI's membership in
+it (stepwise uncertainty reduction for excursion sets [Bect2012; Chevalier2014]).
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ class _WindowPosterior(Posterior, PredictsOutcomes, SamplesWindows, Protocol):
 
 
 def _entropy(mass: Tensor) -> Tensor:
-    # As `torch.special.entr`, several times as fast: what is as good as 0 adds as good as nothing.
+    # `torch.special.entr`, several times as fast: probabilities that are practically 0 add practically nothing.
     entropy: Tensor = -mass.clamp_min(1e-30).log_().mul_(mass).sum(-1)
     return entropy
 
@@ -51,8 +50,8 @@ def mutual_information(posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
 def window_information(posterior: _WindowPosterior, isi_ms: Tensor, cells: int = 5) -> Tensor:
     """Mutual information of the next MEP and the window alone [nat], shape (b, t).
 
-    The window is told as precisely as the samples allow: the quantile cell of its start and of its end, or that there
-    is none. Whatever else differs among the samples of a cell is averaged out.
+    The window is described as precisely as the samples allow: the quantile cell of its start and of its end, or that
+    there is none. Whatever else differs among the samples of a cell is averaged out.
 
     Args:
         posterior: what is believed.
@@ -142,8 +141,8 @@ class WindowGain:
 class Alternating:
     """The window on one trial, all unknowns on the next.
 
-    What is not known of a person's responses costs certainty about the window later on, but never enough on any one
-    trial for `WindowGain` to ask for it; `MutualInformation` asks for little else.
+    What is unknown about a person's responses costs certainty about the window later, but on no single trial enough for
+    `WindowGain` to ask for it; `MutualInformation` asks for little else.
     """
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)

@@ -1,8 +1,8 @@
 """Acquisition functions for level sets: ask where it is least clear on which side of the window's edge an ISI lies.
 
-The level is the 0.135 rule's, and so is uncertain itself: each posterior sample has a margin, by which its expected MEP
-exceeds the share `EDGE_LEVEL` of its own largest excess over its own baseline. Straddle: Bryan et al., NIPS 2005.
-Expected feasibility: Bichon et al., AIAA J. 46, 2008, here integrated over the range and one step ahead.
+The level is that of the least-excess rule, and so is uncertain itself: each posterior sample has a margin, by which its
+expected MEP exceeds the share `EDGE_LEVEL` of its own largest excess over its own baseline. Straddle: [Bryan2005].
+Expected feasibility: [Bichon2008], here integrated over the range and one step ahead.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ def lookahead(mass: Tensor, values: Tensor, weights: Tensor | None = None) -> Lo
     Args:
         mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
         values: the quantities under each sample, shape (b, s, g).
-        weights: of the samples, normalised, shape (b, s); by default all alike.
+        weights: of the samples, normalised, shape (b, s); equal by default.
     """
     people, samples, candidates, outcomes = mass.shape
     share = 1.0 / samples if weights is None else weights.unsqueeze(1)
@@ -47,7 +47,7 @@ def expected_variance_reduction(mass: Tensor, values: Tensor, weights: Tensor | 
     Args:
         mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
         values: the quantities under each sample, shape (b, s, g).
-        weights: of the samples, normalised, shape (b, s); by default all alike.
+        weights: of the samples, normalised, shape (b, s); equal by default.
 
     Returns:
         Shape (b, t).

@@ -22,15 +22,15 @@ class _WindowPosterior(PredictsOutcomes, SamplesWindows, Protocol):
 class TwoStep:
     """Expected reduction of the uncertainty about membership by the next MEP and the best choice after it.
 
-    The `WindowGain` of two trials, the second chosen in the light of the first. To be affordable, only the best
-    candidates by their own gain are looked behind, with their outcomes in a few equally probable groups; of the second
-    trial only some candidates are scored. The first gain is that of the outcome itself, the second one that after its
-    group alone, which is somewhat too large the fewer groups there are.
+    The `WindowGain` of two trials, the second chosen in the light of the first. To be affordable, only the candidates
+    with the largest gain of their own are followed to a second trial, with their outcomes in a few equally probable
+    groups, and of the second trial only some candidates are scored. The first gain is that of the outcome itself, the
+    second one that after its group alone, which is somewhat too large the fewer groups there are.
 
     Args:
-        shortlist: how many candidates are looked behind.
+        shortlist: how many candidates are followed to a second trial.
         groups: into how many groups the first outcome falls.
-        stride: each how-many-th candidate is considered for the second trial.
+        stride: every `stride`-th candidate is considered for the second trial.
 
     Raises:
         InvalidValueError: a number below one.
@@ -58,9 +58,9 @@ def two_step_gain(mass: Tensor, masks: Tensor, shortlist: int, groups: int, stri
     Args:
         mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
         masks: sampled windows as 0 or 1, shape (b, s, t).
-        shortlist: how many candidates are looked behind.
+        shortlist: how many candidates are followed to a second trial.
         groups: into how many groups the first outcome falls.
-        stride: each how-many-th candidate is considered for the second trial.
+        stride: every `stride`-th candidate is considered for the second trial.
     """
     gain = expected_variance_reduction(mass, masks)
     second, total = mass[:, :, ::stride], gain.clone()

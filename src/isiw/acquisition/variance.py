@@ -1,4 +1,4 @@
-"""Acquisition functions from variance: of the profile where it is asked, of the whole profile, and of the edges."""
+"""Acquisition functions based on variance: of the profile at one ISI, of the whole profile, and of the edges."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def profile_variance(posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
 def integrated_variance_reduction(posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
     """Expected reduction of the profile's variance, summed over the candidates [mV²], shape (b, t).
 
-    The best ISI is the one of least integrated posterior variance: qNIPV of BoTorch with one point (Seo et al., IJCNN
-    2000), for any posterior.
+    The best ISI is the one of least integrated posterior variance: qNIPV of BoTorch with one point [Seo2000], for any
+    posterior.
 
     Args:
         posterior: what is believed.
@@ -54,7 +54,8 @@ def integrated_variance_reduction(posterior: _ProfilePosterior, isi_ms: Tensor) 
 def edge_variance_reduction(posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
     """Expected reduction of the summed variance of start and end of the window, given that there is one, shape (b, t).
 
-    Edges are counted in candidates, so that the score does not depend on the range; an edge beyond the range is on it.
+    Edges are counted in candidates, so that the score does not depend on the range; an edge beyond the range counts as
+    its last ISI.
 
     Args:
         posterior: what is believed.

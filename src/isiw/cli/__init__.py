@@ -1,4 +1,4 @@
-"""The command line. Everything else is loaded only once a command runs, so that `--help` is there at once."""
+"""The command line. Everything else is loaded when a command runs, so that `--help` answers at once."""
 
 from isiw.cli.main import app
 

@@ -1,4 +1,4 @@
-"""The commands about sessions, and what the command line is made of."""
+"""The commands about sessions, and the command line as a whole."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ def run(
         typer.Option(help="simulated, or recorded: a simulated person's MEPs in recorded EMG.", **NO_DEFAULT),
     ] = None,
     data: Data = None,
-    strategy: Annotated[str | None, typer.Option(help="A strategy of isiw strategies.", **NO_DEFAULT)] = None,
+    strategy: Annotated[str | None, typer.Option(help="A name that isiw strategies lists.", **NO_DEFAULT)] = None,
     seed: Seed = None,
-    log: Annotated[Path | None, typer.Option(help="Where to log; by default a new file in isiw-sessions.")] = None,
+    log: Annotated[Path | None, typer.Option(help="The log's file; by default a new one in isiw-sessions.")] = None,
 ) -> None:
     """Run a session with a simulated person, and say what was found."""
     with errors_reported(_INTERRUPTED):
@@ -58,7 +58,7 @@ def run(
 def resume(
     log: Log,
     data: Data = None,
-    verify: Annotated[bool, typer.Option(help="Check that the strategy asks again what it asked then.")] = True,  # noqa: FBT002 - a flag of the command line
+    verify: Annotated[bool, typer.Option(help="Check that the strategy asks again what the log says it asked.")] = True,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Go on with a session that was interrupted."""
     with errors_reported(_INTERRUPTED):
@@ -83,9 +83,9 @@ def show_log(log: Log) -> None:
 @app.command()
 def plot(
     log: Log,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Where to: .png, .pdf, .svg …")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The picture's file: .png, .pdf, .svg …")],
 ) -> None:
-    """Draw a session: profile, trials, window, and how they came."""
+    """Draw a session: profile, trials, window, and how the edges developed."""
     with errors_reported(_INTERRUPTED):
         record = isiw.read_session(log)
         truth = isiw.config.true_window(record)
@@ -97,9 +97,9 @@ def plot(
 def exclude(
     log: Log,
     trial: Annotated[int, typer.Argument(help="The trial's number, as in isiw show.")],
-    reason: Annotated[str, typer.Option(help="Why, for whoever reads the log.")],
+    reason: Annotated[str, typer.Option(help="The reason, for readers of the log.")],
 ) -> None:
-    """Exclude a trial afterwards; nothing is erased, and resuming learns without it."""
+    """Exclude a trial afterwards. Nothing is erased; a resumed session learns without it."""
     with errors_reported(_INTERRUPTED):
         isiw.exclude(log, trial, reason)
         show(f"Trial {trial} is excluded: {reason}")
@@ -115,11 +115,11 @@ def strategies() -> None:
 @app.command()
 def timing(
     source: Annotated[str, typer.Argument(help="A preset of the tapping robot, or a session's log.", **NO_DEFAULT)],
-    taps: Annotated[int, typer.Option(help="Taps of a preset for each ISI.")] = 100,
+    taps: Annotated[int, typer.Option(help="Taps for each ISI, of a preset.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of a preset's taps.")] = 0,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
 ) -> None:
-    """Say how repeatable the taps are: events, ISI errors, mistrials."""
+    """Report how repeatable the taps are: events, ISI errors, mistrials."""
     with errors_reported(_INTERRUPTED):
         study = (
             isiw.repeatability.study_session(isiw.read_session(source))

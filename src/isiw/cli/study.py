@@ -31,11 +31,11 @@ def run(
     out: Annotated[
         Path | None, typer.Option(help="The folder of its results; by default beside it, as NAME.study.", **NO_DEFAULT)
     ] = None,
-    workers: Annotated[int | None, typer.Option(help="Processes; by default one a core.", **NO_DEFAULT)] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler that gives the work away.", **NO_DEFAULT)
+    workers: Annotated[
+        int | None, typer.Option(help="Number of processes; by default one per core.", **NO_DEFAULT)
     ] = None,
-    retry: Annotated[bool, typer.Option(help="Run what failed once more.")] = False,  # noqa: FBT002 - a flag
+    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on.", **NO_DEFAULT)] = None,
+    retry: Annotated[bool, typer.Option(help="Run what failed again.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Run a study, or what is left of it."""
     with errors_reported():
@@ -55,10 +55,10 @@ def run(
 @app.command()
 def replay(
     folder: Folder,
-    key: Annotated[str, typer.Argument(help="A unit's key, or the number of a row of all.", **NO_DEFAULT)],
-    person: Annotated[int | None, typer.Option(help="Compare this person of a batch only.", **NO_DEFAULT)] = None,
+    key: Annotated[str, typer.Argument(help="A unit's key, or the number of a row of the table.", **NO_DEFAULT)],
+    person: Annotated[int | None, typer.Option(help="Of a batch, compare this person only.", **NO_DEFAULT)] = None,
 ) -> None:
-    """Run a session of a study once more, alone, and say whether it is the same."""
+    """Run one session of a study again, alone, and say whether the result is the same."""
     with errors_reported():
         store = isiw.studies.open_store(folder)
         if key.isdigit():

@@ -49,10 +49,10 @@ __all__ = [
 ]
 
 SESSIONS = Path("isiw-sessions")
-"""Where sessions are logged that were given no path."""
+"""The folder for logs of sessions without a path."""
 
 RUN_KEY = "isiw_run"
-"""What `isiw run` keeps its configuration under in a log; lab software may keep there what it likes."""
+"""The name under which `isiw run` keeps its configuration in a log; other software may keep its own there."""
 
 
 class _Section(BaseModel):
@@ -119,7 +119,7 @@ class LimitsConfig(_Section):
 
 
 class RunConfig(_Section):
-    """Everything that `isiw run` can be told."""
+    """The whole configuration of `isiw run`."""
 
     seed: int = Field(default=0, ge=0)
     log: Path | None = None

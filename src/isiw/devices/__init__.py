@@ -1,4 +1,4 @@
-"""Devices: what delivers a pair of stimuli and reports what came of it.
+"""Devices: they deliver a pair of stimuli and report its outcome.
 
 A device of your own needs the five verbs of `protocol.Device`; `callback.CallbackDevice` makes one from functions.
 Every session wraps its device in `limits.LimitedDevice`.

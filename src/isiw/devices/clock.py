@@ -34,7 +34,7 @@ class MonotonicClock:
 
 
 class VirtualClock:
-    """A clock that moves only when somebody sleeps.
+    """A clock that moves on only by sleeping.
 
     Args:
         now_s: the time it shows at first [s].

@@ -1,4 +1,4 @@
-"""What a device must answer, in the words that instrument people know, and what it says about itself."""
+"""What a device must do, in terms familiar from instrument control, and what it says about itself."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""People whose sweeps are recorded EMG, put together anew: semi-synthetic, for tests of the whole chain.
+"""Simulated people in recorded EMG: semi-synthetic sweeps, for tests of the whole chain.
 
-A simulated person answers the stimulus with an amplitude. The sweep is a really recorded one without a MEP, plus a
-really recorded MEP, scaled so that the sum has the person's amplitude from 15 to 35 ms. Noise, offset, artefact and
-waveform are therefore real; whether a MEP follows, and how large, is simulated. The recordings (University of Eastern
-Finland, BSD-3-Clause) are not part of the package; see the repository NeuromodulationUEF/MEPFeatX.
+A simulated person answers the stimulus with an amplitude. The sweep is a recorded one without an MEP, plus a recorded
+MEP that is scaled so that the sum has the person's amplitude from 15 to 35 ms. Noise, offset, artefact and waveform are
+therefore real; whether an MEP follows, and how large, is simulated. The recordings [UEF2023] are not part of the
+package.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ ONSET_MS = (10.0, 14.0)  # forearm MEPs begin 17.5 ms after the pulse: the templ
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """Recorded sweeps sorted into those without a MEP and MEPs.
+    """Recorded sweeps without an MEP, and recorded MEPs.
 
     Args:
         time_ms: time from the magnetic pulse [ms], shape (w,).
-        quiet_mv: sweeps without a MEP, as recorded [mV], shape (n, w).
+        quiet_mv: sweeps without an MEP, as recorded [mV], shape (n, w).
         mep_mv: MEPs alone, offset taken out and faded in before their onset [mV], shape (m, w).
 
     Raises:
@@ -53,7 +53,7 @@ class Recordings:
     def __post_init__(self) -> None:
         if not len(self.quiet_mv) or not len(self.mep_mv):
             raise InvalidValueError(
-                "the recordings hold no sweep without a MEP, or none with a clear one",
+                "the recordings hold no sweep without an MEP, or none with a clear one",
                 got=(len(self.quiet_mv), len(self.mep_mv)),
             )
 
@@ -113,7 +113,7 @@ def _read_sweeps(file: Path) -> pd.DataFrame:
         frame = pd.read_csv(file, index_col="trial").astype(np.float64)
         return frame.set_axis(frame.columns.astype(np.float64), axis=1)
     except (OSError, EOFError, ValueError, zlib.error) as error:
-        raise DeviceError(f"a recorded file cannot be read: {error}", got=str(file), remedy="Copy it anew.") from error
+        raise DeviceError(f"a recorded file cannot be read: {error}", got=str(file), remedy="Copy it again.") from error
 
 
 def _sorted_recordings(time_ms: FloatArray, sweeps_mv: FloatArray) -> Recordings:
@@ -126,7 +126,7 @@ def _sorted_recordings(time_ms: FloatArray, sweeps_mv: FloatArray) -> Recordings
 
 
 class RecordedPerson:
-    """A simulation of a person whose amplitudes are put into really recorded EMG: semi-synthetic.
+    """A simulation of a person whose amplitudes are put into recorded EMG: semi-synthetic.
 
     Args:
         respond: answers a commanded ISI [ms] with the realised ISI and the MEP.

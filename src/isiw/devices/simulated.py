@@ -15,7 +15,7 @@ __all__ = ["Outcome", "Respond", "SimulatedDevice", "SimulatedPerson", "Simulati
 
 
 class Outcome(Protocol):
-    """What a simulated person answers."""
+    """The outcome of a simulated stimulus."""
 
     @property
     def isi_ms(self) -> float | None:
@@ -42,7 +42,7 @@ class Simulation(Protocol):
         """What the device says about itself; it is simulated."""
 
     def answer(self, stimulus: Stimulus) -> Answer:
-        """What comes of the next stimulus.
+        """The outcome of the next stimulus.
 
         Raises:
             DeviceError: it cannot be delivered.

@@ -73,11 +73,11 @@ def refuse_if_locked(path: Path) -> None:
 
 @contextmanager
 def disk_errors(path: Path, what: str, remedy: str) -> Iterator[None]:
-    """Within, what the operating system refuses is a LogError.
+    """Within, an error of the operating system becomes a LogError.
 
     Args:
         path: the file, for the message.
-        what: what cannot be done.
+        what: what failed, for the message.
         remedy: the way out.
     """
     try:
@@ -100,11 +100,11 @@ class DurableFile:
         path: where it is; must not exist.
 
     Raises:
-        LogError: it exists, or cannot be made.
+        LogError: it exists, or cannot be created.
     """
 
     def __init__(self, path: Path) -> None:
-        with disk_errors(path, "the log cannot be made", "Choose another path."):
+        with disk_errors(path, "the log cannot be created", "Choose another path."):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file: IO[bytes] = path.open("xb")
         self.path = path
@@ -158,10 +158,10 @@ class DurableFile:
 
 @contextmanager
 def begun(path: Path) -> Iterator[DurableFile]:
-    """A new file that is gone again where its beginning fails; once it has taken another file's place, it stays.
+    """A new file that is removed if its first records fail; once it has taken another file's place, it stays.
 
     Raises:
-        LogError: it exists, or cannot be made.
+        LogError: it exists, or cannot be created.
     """
     file = DurableFile(path)
     try:

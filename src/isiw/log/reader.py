@@ -109,7 +109,7 @@ def read_salvaged(salvaged: Salvage) -> SessionRecord:
         try:
             record = decode(message.topic, message.data)
         except ValueError as error:
-            losses.append(f"A record on {message.topic} makes no sense and is left out: {error}")
+            losses.append(f"A record on {message.topic} is not valid and is left out: {error}")
             continue
         if isinstance(record, Header):
             header = record

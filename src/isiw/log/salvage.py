@@ -1,4 +1,4 @@
-"""Salvage: everything that can still be read from a log, finished or torn or damaged, and in words what cannot."""
+"""Salvage: everything that can still be read from a log, be it finished, torn or damaged, and what cannot, in words."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ class _Exact:
 
 
 def _search_swallowed(file: IO[bytes], found: Salvage, chunks: int, size: int) -> None:
-    """Read all chunks again where fewer were met than there are: a damaged length has swallowed some."""
+    """Read all chunks again where fewer were found than there are: a damaged length has skipped some."""
     if chunks < sum(1 for _ in _chunks(file, size)):
         _search_chunks(file, found, size)
 

@@ -1,4 +1,4 @@
-"""What is in a log: one kind of record a topic, as JSON with a JSON schema.
+"""What is in a log: one kind of record per topic, as JSON with a JSON schema.
 
     /header     who, with what, and how: everything needed to make the strategy again; once more on resuming
     /intent     about to be delivered; an intent without a trial was interrupted

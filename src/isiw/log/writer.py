@@ -55,7 +55,7 @@ class LogWriter:
                 the header cannot be written.
         """
         target = Path(path)
-        with disk_errors(target, "the log cannot be made", "Choose another path."):
+        with disk_errors(target, "the log cannot be created", "Choose another path."):
             _require_free(target)
         with begun(part_of(target)) as file:
             log = cls(target, file)
@@ -84,7 +84,7 @@ class LogWriter:
         target = log_of(Path(path))
         refuse_if_locked(salvage.path)
         if current_file(path) != salvage.path or salvage.path.stat().st_size != salvage.size:
-            raise LogError("the log has changed since it was read", got=str(path), remedy="Begin again by reading it.")
+            raise LogError("the log has changed since it was read", got=str(path), remedy="Read it again.")
         copy = target.with_name(f"{target.name}.resuming")
         if copy.exists():  # an earlier attempt was killed before it took over; its source is still whole
             refuse_if_locked(copy)
@@ -106,10 +106,10 @@ class LogWriter:
         return log
 
     def begin(self, header: Header) -> None:
-        """Write what is no message: metadata for whoever lists files, and the header as TOML.
+        """Write what is not a message: metadata for tools that list files, and the header as TOML.
 
         Raises:
-            LogError: something in the header is no TOML value.
+            LogError: something in the header is not a TOML value.
         """
         facts = {
             "isiw_version": header.isiw_version,

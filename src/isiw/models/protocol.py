@@ -1,6 +1,6 @@
 """What a model of one person's responses, and its posterior, must answer.
 
-A model is a frozen settings object with two verbs: `prior` gives the posterior before any trial, `update` gives the
+A model is a frozen settings object with two methods: `begin` gives the posterior before any trial, `update` gives the
 posterior after one more. A posterior never changes; it holds `b` people at once, and one person is b = 1. Acquisition
 functions and strategies see these protocols only.
 
@@ -214,7 +214,7 @@ class SimulatesPeople(Protocol):
     """Capability of a model: people of its own, for whom it must be calibrated."""
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
-        """Draw one person from the prior, and a MEP at each ISI exactly as the likelihood says.
+        """Draw one person from the prior, and an MEP at each ISI exactly as the likelihood says.
 
         Args:
             space: the design space.

@@ -1,4 +1,4 @@
-"""The picture of a session: the profile with its band, the trials, the window with its intervals, and how they came.
+"""The picture of a session: profile with band, trials, window with intervals, and how the edges developed.
 
 Everything is drawn with matplotlib's object interface, so no display is needed and no global state is touched.
 """

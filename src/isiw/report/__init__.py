@@ -1,4 +1,4 @@
-"""A session told to people."""
+"""A session in words, for people."""
 
 from isiw.report.words import (
     PROGRESS_HEADINGS,

@@ -84,7 +84,7 @@ def _counts(record: SessionRecord) -> str:
     if unknown:
         mistrials["outcome unknown"] += unknown
     told, given = len(record.table.told), len(record.table) + unknown
-    parts = [f"{given} pairs of stimuli were given; {told} count"]
+    parts = [f"{given} pairs of stimuli were delivered; {told} count"]
     if mistrials:
         parts.append("mistrials: " + ", ".join(f"{count} {reason}" for reason, count in mistrials.items()))
     if excluded:
@@ -98,7 +98,7 @@ def _excluded_since(record: SessionRecord) -> bool:
 
 
 def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
-    """How near the reported window is to a simulated person's true one.
+    """How close the reported window is to a simulated person's true one.
 
     Args:
         record: the session.
@@ -107,7 +107,7 @@ def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
     found = record.estimates[-1].window if record.estimates else None
     share = f1(found, truth, record.header.space)
     true = "has no window" if truth is None else f"has the window {truth}"
-    return f"In truth this simulated person {true}; the F1 of the reported one is {share:.2f}."
+    return f"This simulated person in fact {true}; the result has an F1 of {share:.2f}."
 
 
 def progress_row(update: SessionUpdate) -> tuple[str, ...]:

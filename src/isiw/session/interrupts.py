@@ -16,7 +16,7 @@ _SIGNALS = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, nam
 
 
 class DeferredInterrupts:
-    """Holds back Ctrl-C, a polite request to terminate, and a terminal's closing, except where they are allowed.
+    """Holds back Ctrl-C, a request to terminate, and the closing of the terminal, except where they are allowed.
 
     Each arrives as a KeyboardInterrupt: at once inside `allowed`, else at the next entry into it or at the very end.
     Outside the main thread, which is where Python delivers signals, nothing is held back; what the process ignores, as
@@ -56,6 +56,6 @@ class DeferredInterrupts:
     def _receive(self, number: int, frame: FrameType | None) -> None:
         del number, frame
         if self._allowed:
-            self._allowed = False  # one is enough; the next must not cut the clearing-up short
+            self._allowed = False  # one is enough; the next must not interrupt the cleanup
             raise KeyboardInterrupt
         self._pending = True

@@ -88,7 +88,7 @@ def learn(strategy: Strategy, trial: Trial) -> None:
 
 
 def _require_matching(info: DeviceInfo, strategy: Strategy) -> None:
-    """Raise where the strategy would take the device's answers for something else."""
+    """Raise where the strategy would misread the device's answers."""
     if info.reference != strategy.space.reference:
         raise DeviceError(
             "the device and the design space count ISIs from different events",
@@ -204,7 +204,7 @@ class Session:
                 "the strategy knows of trials that are not this session's",
                 got=f"{self.strategy.delivered} trials",
                 expected=f"{len(self.trials)} trials",
-                remedy="Make it anew, or give the session strategy.restarted().",
+                remedy="Make a new one, or give the session strategy.restarted().",
             )
         with DeferredInterrupts() as self._interrupts, self._open_log(self._header) as self._log:
             try:

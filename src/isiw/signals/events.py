@@ -1,4 +1,4 @@
-"""The events of a tap in its waveforms, by the dissertation's rules (3.3.1, Table 3.1).
+"""The events of a tap in its waveforms, by the dissertation's rules [Kim2020, 3.3.1, Table 3.1].
 
 Every rule is a hysteresis about the level at rest: a high threshold confirms that something happened, the last crossing
 of a low one says when. Both are multiples of the noise that each sweep has before the valve command.
@@ -71,7 +71,7 @@ def detect_events(
         t_tms_ms: the magnetic pulse of each sweep [ms from the first sample], whose own artefact is passed over.
 
     Raises:
-        InvalidValueError: a waveform that is no recording, or waveforms of different shapes.
+        InvalidValueError: a waveform that is not a recording, or waveforms of different shapes.
     """
     waves = as_waveforms(acceleration, rate_hz, "acceleration")
     hit = impact_times(waves, rate_hz, valve_ms)

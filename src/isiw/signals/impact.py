@@ -1,6 +1,6 @@
 """The impact of the hammer in its acceleration.
 
-The rule is the dissertation's (3.3.1, 5.2.2): the first time that the acceleration, after the hammer has begun to move,
+The rule is that of [Kim2020, 3.3.1, 5.2.2]: the first time that the acceleration, after the hammer has begun to move,
 falls through its level at rest, with a hysteresis band about that level. The band comes from each sweep's own noise.
 Two conditions tell an impact from any other fall, and both follow from momentum: what the hammer gained on its way of
 some 50 ms it loses within a few, so the fall is steep, and the deceleration exceeds the acceleration before it.
@@ -20,7 +20,7 @@ from isiw.types import ArrayLike, FloatArray, IntArray
 __all__ = ["DETECTION_LATENCY_MS", "HYSTERESIS_SD", "VALVE_MS", "impact_time", "impact_times"]
 
 VALVE_MS = 500.0
-"""The valve command in a trial of 1 s (dissertation, 4.2)."""
+"""The valve command in a trial of 1 s [Kim2020, 4.2]."""
 
 HYSTERESIS_SD = 6.0
 """Half-width of the hysteresis band, in SDs of the noise at rest."""
@@ -40,7 +40,7 @@ def impact_time(acceleration: ArrayLike, rate_hz: float, after_ms: float = VALVE
         after_ms: the valve command [ms from the first sample]; the hammer is at rest before it.
 
     Raises:
-        InvalidValueError: a waveform that is no recording, or less than 20 ms of rest.
+        InvalidValueError: a waveform that is not a recording, or less than 20 ms of rest.
     """
     if np.ndim(acceleration) != 1:
         raise InvalidValueError("one sweep is a vector", got=np.shape(acceleration), remedy="Use impact_times.")
@@ -57,7 +57,7 @@ def impact_times(acceleration: ArrayLike, rate_hz: float, after_ms: float = VALV
         after_ms: the valve command [ms from the first sample]; the hammer is at rest before it.
 
     Raises:
-        InvalidValueError: a waveform that is no recording, no finite time, or less than 20 ms of rest.
+        InvalidValueError: a waveform that is not a recording, no finite time, or less than 20 ms of rest.
     """
     waves = as_waveforms(acceleration, rate_hz, "acceleration")
     after_ms = number("after_ms", after_ms)

@@ -1,7 +1,7 @@
 """The judgement of a trial: from its sweep to an amplitude at a realised ISI, or to the reason why there is none.
 
 What goes wrong in one trial is a mistrial, with a reason from the closed list of `MistrialReason`. What is wrong with
-every trial, an unknown unit or a rate that measures nothing, is an error: no repetition would mend it.
+every trial, an unknown unit or a rate that measures nothing, is an error: repeating the trial would not help.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def require_unit(name: str, unit: str, known: Collection[str]) -> None:
 
 @dataclass(frozen=True)
 class SignalLimits:
-    """What a sweep must keep to be accepted.
+    """What a sweep must satisfy to be accepted.
 
     Args:
         mep_window_ms: where the MEP is sought [ms after the pulse]; `MEP_WINDOWS_MS` has one for each muscle group.
@@ -103,7 +103,7 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
         sweep: the recorded waveforms and what the device knows of their timing.
         stimulus: what was commanded.
         space: says which event the ISI counts from, and how far it may be off.
-        limits: what the sweep must keep.
+        limits: what the sweep must satisfy.
 
     Raises:
         InvalidValueError: an unknown unit, or a sampling rate too low to measure anything.
@@ -138,7 +138,7 @@ def judge_measurement(
         measurement: what the device reports.
         stimulus: what was commanded.
         space: says which event the ISI counts from, and how far it may be off.
-        limits: what the measurement must keep.
+        limits: what the measurement must satisfy.
 
     Raises:
         DeviceError: a pair reported where TMS alone was commanded, or the other way round.
@@ -296,7 +296,7 @@ def _mep_mv(emg_mv: FloatArray, emg: Channel, timed: Trial, limits: SignalLimits
     shown = np.array([math.nan])
     if timed.t_hit_ms is not None and timed.t_valve_ms is not None:
         hit, valve = _on_channel(timed.t_hit_ms, emg), _on_channel(timed.t_valve_ms, emg)
-        # A silent trial must not be told the tap's amplitude: where the two coincide, too small is the lesser evil.
+        # A trial without a response must not get the tap's amplitude: where the two coincide, rather too small.
         shown, coinciding = (
             tap_artefact_times(emg_mv, emg.rate_hz, hit, valve_ms=valve, t_tms_ms=pulse, even_as_mep=even_as_mep)
             for even_as_mep in (False, True)

@@ -1,6 +1,6 @@
 """The MEP in an EMG sweep: amplitude, onset latency, presence; and the EMG before the pulse.
 
-Amplitude: the largest minus the smallest value in a window after the pulse (dissertation, 5.2.3), whatever the offset.
+Amplitude: the largest minus the smallest value in a window after the pulse [Kim2020, 5.2.3], whatever the offset.
 Onset: from the first sample that is surely part of the MEP, back to where the deviation from rest last rose out of the
 noise. Both thresholds are relative to the sweep's own amplitude and noise.
 """
@@ -33,12 +33,12 @@ __all__ = [
 ]
 
 MEP_WINDOW_MS = (15.0, 35.0)
-"""Where the dissertation seeks the MEP of the forearm [ms after the pulse] (5.2.3)."""
+"""Where the MEP of the forearm is sought [ms after the pulse] [Kim2020, 5.2.3]."""
 
 MEP_WINDOWS_MS: Mapping[str, tuple[float, float]] = MappingProxyType({"forearm": MEP_WINDOW_MS, "hand": (15.0, 50.0)})
 """Windows by muscle group. In hand muscles the onset is near 23 ms and the second turn may lie beyond 35 ms."""
 
-PRESENT_MV = 0.05  # the field's convention; in a sham window 1.7 % of resting sweeps exceed it
+PRESENT_MV = 0.05  # the field's convention [Rossini2015]; 1.7 % of resting sweeps exceed it
 BACKGROUND_MS = 100.0
 
 MIN_BACKGROUND_MS = 40.0
@@ -70,7 +70,7 @@ def mep_amplitude(
         window_ms: where the MEP is sought [ms after the pulse]; `MEP_WINDOWS_MS` has one for each muscle group.
 
     Raises:
-        InvalidValueError: a waveform that is no recording, or a window that it does not hold.
+        InvalidValueError: a waveform that is not a recording, or a window that it does not hold.
     """
     _require_one(emg_mv)
     return float(mep_amplitudes(emg_mv, rate_hz, t_tms_ms, window_ms)[0])
@@ -95,7 +95,7 @@ def mep_amplitudes(
             tap; NaN for none. What is left of the window counts; nothing left gives NaN.
 
     Raises:
-        InvalidValueError: a waveform that is no recording, or a window that it does not hold.
+        InvalidValueError: a waveform that is not a recording, or a window that it does not hold.
     """
     waves = as_waveforms(emg_mv, rate_hz, "EMG")
     pulse = per_waveform(t_tms_ms, waves)
@@ -121,7 +121,7 @@ def mep_onset(
         window_ms: where the MEP is sought [ms after the pulse].
 
     Raises:
-        InvalidValueError: a waveform that is no recording, too little rest, or a window that it does not hold.
+        InvalidValueError: a waveform that is not a recording, too little rest, or a window that it does not hold.
     """
     _require_one(emg_mv)
     latency = float(mep_onsets(emg_mv, rate_hz, t_tms_ms, window_ms)[0])
@@ -140,7 +140,7 @@ def mep_onsets(
         window_ms: where the MEP is sought [ms after the pulse].
 
     Raises:
-        InvalidValueError: a waveform that is no recording, too little rest, or a window that it does not hold.
+        InvalidValueError: a waveform that is not a recording, too little rest, or a window that it does not hold.
     """
     waves = as_waveforms(emg_mv, rate_hz, "EMG")
     pulse = per_waveform(t_tms_ms, waves)
@@ -165,7 +165,7 @@ def mep_present(
     *,
     least_mv: float = PRESENT_MV,
 ) -> BoolArray:
-    """Whether each of n sweeps holds a MEP: large enough, and standing out of its own noise, shape (n,).
+    """Whether each of n sweeps holds an MEP: large enough, and standing out of its own noise, shape (n,).
 
     Args:
         emg_mv: EMG [mV], shape (n, w).
@@ -192,7 +192,7 @@ def background_rms(
             artefact of the tap and are passed over.
 
     Raises:
-        InvalidValueError: a waveform that is no recording, a pulse after its end, or less than 40 ms of rest.
+        InvalidValueError: a waveform that is not a recording, a pulse after its end, or less than 40 ms of rest.
     """
     waves = as_waveforms(emg_mv, rate_hz, "EMG")
     rest = _quiet(waves, rate_hz, per_waveform(t_tms_ms, waves), per_waveform(t_hit_ms, waves))

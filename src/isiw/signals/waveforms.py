@@ -43,8 +43,8 @@ def as_waveforms(values: ArrayLike, rate_hz: float, name: str = "waveform") -> F
         The samples, shape (n, w); a single waveform becomes one row.
 
     Raises:
-        InvalidValueError: no samples, samples that are not finite, a waveform without any variation, or a rate that
-            cannot be right.
+        InvalidValueError: no samples, samples that are not finite, a waveform without any variation, or an impossible
+            rate.
     """
     waves = np.asarray(values, dtype=np.float64)
     if not math.isfinite(rate_hz) or rate_hz < MIN_RATE_HZ:

@@ -36,15 +36,16 @@ _PARTICLES, _PARAMETRIC, _GP = "particles:ParticleSettings", "parametric:Paramet
 
 _CATALOGUE: Final[dict[str, _Entry]] = {
     "default": _Entry(
-        "Particle posterior with input-side noise; asks for the window and for everything in turn.", _PARTICLES
+        "Particle posterior; asks in turn what tells most about the window and about all unknowns.",
+        _PARTICLES,
     ),
     "particles-window": _Entry(
-        "Particle posterior; asks where the window's membership will be learnt best.",
+        "Particle posterior; asks what tells most about which ISIs are in the window.",
         _PARTICLES,
         {"acquisition": "window-gain"},
     ),
     "particles-mi": _Entry(
-        "Particle posterior; asks for the largest mutual information with all unknowns.",
+        "Particle posterior; asks what tells most about all unknowns.",
         _PARTICLES,
         {"acquisition": "mutual-information"},
     ),
@@ -53,18 +54,18 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
     ),
     "random": _Entry("Particle posterior; random ISIs, whatever the responses.", _PARTICLES, {"acquisition": "random"}),
     "parametric-mi": _Entry(
-        "Gaussian window in Pyro; asks for the largest mutual information with all unknowns.",
+        "Gaussian window in Pyro; asks what tells most about all unknowns.",
         _PARAMETRIC,
         {"acquisition": "mutual-information"},
     ),
     "parametric-window": _Entry(
-        "Gaussian window in Pyro; asks where the window's membership will be learnt best.",
+        "Gaussian window in Pyro; asks what tells most about which ISIs are in the window.",
         _PARAMETRIC,
         {"acquisition": "window-gain"},
     ),
-    "gp-straddle": _Entry("Gaussian process; asks where it is least clear on which side of an edge it is.", _GP),
+    "gp-straddle": _Entry("Gaussian process; asks where it is least clear whether an ISI is in the window.", _GP),
     "gp-variance": _Entry(
-        "Gaussian process; asks for the largest reduction of the profile's variance.",
+        "Gaussian process; asks what tells most about the whole profile.",
         _GP,
         {"acquisition": "integrated-variance"},
     ),
@@ -84,7 +85,7 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
         "dissertation:PFSettings",
     ),
     "incremental": _Entry(
-        "Conventional search: twelve trials each 5 ms, until the window was passed.", "dissertation:SweepSettings"
+        "Conventional search: twelve trials every 5 ms, until the window is passed.", "dissertation:SweepSettings"
     ),
 }
 

@@ -1,7 +1,7 @@
 """How the examination of b people goes on: what is asked of each next, and what a stopping rule looks back on.
 
 A `Course` never changes: telling it a trial gives the next one. One person's `Strategy` and a batch of people wrap the
-same course, so that they follow one law.
+same course, so that both follow the same rules.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The vectorised engine: a batch of people, examined side by side by one strategy.
 
-Models hold b people at once, on a CPU or a GPU. Each person follows the law that one session follows
+Models hold b people at once, on a CPU or a GPU. Each person's session follows the rules of a single one
 (`isiw.strategy.choosing`); only the draws of the models' randomness differ, so that a batch of one is that one session.
 """
 
@@ -72,7 +72,7 @@ class _Batch:
         return self.course.decision(person, self.mistrials[person])
 
     def trouble(self) -> bool | None:
-        """Whose fit it was is not told, except that nobody's failed."""
+        """Whose fit failed is not known; only whether any did."""
         posterior = self.course.posterior
         failed = isinstance(posterior, ReportsTrouble) and posterior.trouble is not None
         return None if failed and self.course.people > 1 else failed

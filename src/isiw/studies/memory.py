@@ -19,7 +19,7 @@ _USUAL_BYTES = 128 * 1024
 
 @contextmanager
 def memory_kept() -> Generator[None, None, None]:
-    """Have this process keep what it frees, and give it back at the end; without effect where glibc is not."""
+    """Have this process keep what it frees, and give it back at the end; does nothing without glibc."""
     _set_thresholds(1 << 30)
     try:
         yield

@@ -55,7 +55,7 @@ _SPACES: Final[Mapping[str, DesignSpace]] = {"valve": VALVE_SPACE, "impact": IMP
 
 @dataclass(frozen=True)
 class StudyStrategy:
-    """A strategy that takes part.
+    """A strategy that is compared with others.
 
     Args:
         name: a named strategy.
@@ -109,10 +109,10 @@ class Study:
     """A study.
 
     Args:
-        strategies: who takes part.
+        strategies: what is compared.
         cohorts: named cohorts.
         people: how many people of each.
-        seed: seed of the people, their trial noise and the strategies; 0–999 are for work.
+        seed: seed of the people, their trial noise and the strategies; 0–999 are for development.
         trials: how many trials a session has at most.
         marks: after which trials the estimate is recorded; by default each fifth and the last.
         space: the design space.
@@ -126,7 +126,7 @@ class Study:
             nothing (`"unstated"`).
 
     Raises:
-        InvalidValueError: an invalid number or word, or a label given twice.
+        InvalidValueError: an invalid number or choice, or a label given twice.
     """
 
     strategies: tuple[StudyStrategy, ...]

@@ -41,7 +41,7 @@ Judgement: TypeAlias = WindowEstimate | Window | None
 
 
 class Player(Protocol):
-    """What proposes ISIs in a simulated session: a strategy, or a benchmark's yardstick."""
+    """What proposes ISIs in a simulated session: a strategy, or what a benchmark compares it with."""
 
     def ask(self) -> float:
         """The next ISI [ms]."""
@@ -98,7 +98,7 @@ class SimulatedSession:
         amplitude: factor on all of the person's amplitudes, as of another rig or muscle.
 
     Raises:
-        InvalidValueError: no trial, a person or an amplitude that cannot be, or another word for stopping.
+        InvalidValueError: no trial, an invalid person or amplitude, or an unknown value of stopping.
     """
 
     strategy: str
@@ -203,7 +203,7 @@ class _Person:
         return self.session.stopping == "ends" and not math.isnan(self.stop["stop_trial"])
 
     def respond(self, choice: Choice) -> Response:
-        """Deliver the pair, again where its ISI makes it a mistrial: a session asks the same once more."""
+        """Deliver the pair, again where its ISI makes it a mistrial: a session asks for the same ISI again."""
         space = self.session.space
         for _ in range(_MOST_DELIVERIES):
             response = self.responder.respond(choice.isi_ms, space.reference)

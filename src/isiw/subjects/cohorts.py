@@ -122,7 +122,7 @@ _OFF_THE_MAP: Final[Mapping[str, _Law]] = MappingProxyType(
         ),
     }
 )
-"""People whom the usual law does not have."""
+"""People whom the usual law does not cover."""
 
 _KINDS_OF_ODD: Final = ("other-rig", "late", "very-wide", ("steep", "flat"), "weak", "rmt-off", "hand")
 
@@ -201,7 +201,7 @@ def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
     Args:
         name: one of `COHORTS`.
         n: how many people. `kim11` has eleven, and cycles: its sessions differ in trial noise only.
-        seed: seed of the people; 0–999 are for work, reported figures use 10,000 and above.
+        seed: seed of the people; 0–999 are for development, reported figures use 10,000 and above.
 
     Raises:
         InvalidValueError: an unknown name, or a negative number.

@@ -1,7 +1,7 @@
 """ISI–MEP response profiles: how strongly a tap facilitates, as a share of its best ISI.
 
 A profile is a value that maps ISIs counted from the impact to facilitation in 0–1. The families are those that have
-been seen or argued for: a Gaussian (dissertation, 4.2), skewed and flat-topped ones (8.1, appendix B), and two peaks
+been seen or argued for: a Gaussian [Kim2020, 4.2], skewed and flat-topped ones (8.1, appendix B), and two peaks
 (electrical conditioning has two facilitation windows).
 """
 
@@ -37,7 +37,7 @@ class PeakProfile:
         exponent: 2 is Gaussian (SD = width/4 if symmetric), more is flatter on top with steeper flanks.
 
     Raises:
-        InvalidValueError: a span, peak or exponent that cannot be.
+        InvalidValueError: an invalid span, peak or exponent.
     """
 
     start_ms: float
@@ -69,7 +69,7 @@ class TwoPeakProfile:
         second: height of the second peak; the higher of the two has 1.
 
     Raises:
-        InvalidValueError: a span or heights that cannot be.
+        InvalidValueError: an invalid span or height.
     """
 
     start_ms: float

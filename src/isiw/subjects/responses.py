@@ -3,7 +3,7 @@
 `GainResponse` multiplies: the MEP grows in proportion to the facilitation, with noise of a constant CV. It is the kind
 of noise that most methods assume. `RecruitmentResponse` is how MEPs near threshold behave: facilitation and noise both
 shift the input of a steep recruitment curve, so responses go missing, are skewed, and vary less as they grow
-(Goetz et al.'s statistical MEP model, with parameters fitted to open single-trial data).
+(the model of [Goetz2014; Goetz2019], with parameters fitted to open single-trial data).
 
 Both add an EMG floor: the peak-to-peak amplitude that a sweep has without any response.
 """

@@ -49,7 +49,7 @@ def check_model(
         AssertionError: a promise is broken; the message says which.
     """
     model = make()
-    require(isinstance(model, ResponseModel), "a model has prior() and update()")
+    require(isinstance(model, ResponseModel), "a model has begin() and update()")
     require(make() == model, "a model is settings: two made alike are equal")
     usual = usual_trials(space)
     _check_learning(model, space, usual)

@@ -67,7 +67,7 @@ def test_the_dissertations_own_figures_have_no_distance_and_thirty_percent_more_
     assert distance(more, "true") == pytest.approx(math.sqrt(8 / 28))
 
 
-def test_a_duel_compares_at_each_sessions_own_trials_and_finds_the_lasting_crossing() -> None:
+def test_a_duel_compares_at_each_sessions_own_trials_and_finds_where_it_stays_ahead() -> None:
     curves = [[0.0, 0.2, 0.6, 0.8], [0.0, 0.6, 0.6, 0.8]]
     rows = pd.DataFrame(
         {

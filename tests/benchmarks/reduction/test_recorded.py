@@ -42,9 +42,9 @@ def test_without_noise_the_measured_window_by_the_share_is_the_true_one() -> Non
 
 def test_who_does_not_respond_shows_no_window() -> None:
     nobody = replace(CLEAR, response=GainResponse(EmgFloor(0.01, 0.3), gain_mv=0.0, cv=0.5))
-    silent = record(nobody, seed=2)
-    assert silent.windows == {"true": None, "measured, .135": None, "measured, baseline": None}
-    assert silent.sweep().terminated == silent.sweep().trials == 1212
+    nonresponder = record(nobody, seed=2)
+    assert nonresponder.windows == {"true": None, "measured, .135": None, "measured, baseline": None}
+    assert nonresponder.sweep().terminated == nonresponder.sweep().trials == 1212
 
 
 def test_a_sweep_ends_when_the_window_was_passed_and_sooner_the_later_it_begins() -> None:

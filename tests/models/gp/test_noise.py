@@ -38,8 +38,8 @@ def test_only_ratios_of_noise_are_learnt() -> None:
 
 
 def test_residuals_that_break_things_give_finite_profiles() -> None:
-    silent = torch.zeros(80, dtype=torch.float64)
-    for values in (silent, silent + 1e6 * (torch.arange(80) == 3)):
+    equal = torch.zeros(80, dtype=torch.float64)
+    for values in (equal, equal + 1e6 * (torch.arange(80) == 3)):
         found = profile_of(values)
         assert torch.isfinite(found).all()
         assert found.abs().max() <= MAX_LOG_VARIANCE

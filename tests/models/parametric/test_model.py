@@ -140,14 +140,14 @@ def test_people_do_not_see_each_other() -> None:
 
 
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
-def test_a_clear_responder_is_found_and_a_silent_person_is_not_given_a_window(likelihood: Likelihood) -> None:
+def test_a_clear_responder_is_found_and_a_non_responder_is_not_given_a_window(likelihood: Likelihood) -> None:
     model = ParametricModel(likelihood=likelihood)
     clear = after(model, evenly("gaussian", 2, 24)).estimate()
-    silent = after(model, evenly("nonresponder", 0, 24)).estimate()
+    nonresponder = after(model, evenly("nonresponder", 0, 24)).estimate()
     assert clear.probability > 0.95
     assert f1(clear, cohort("gaussian", 3, 0)[2].window(VALVE_SPACE), VALVE_SPACE) > 0.85
-    assert silent.probability < 0.5
-    assert silent.window is None
+    assert nonresponder.probability < 0.5
+    assert nonresponder.window is None
 
 
 def test_two_places_that_may_both_be_the_window_are_both_kept() -> None:

@@ -193,13 +193,13 @@ def test_the_order_of_trials_matters_little() -> None:
     assert (gap < 0.5 * spread_ms(forth[0])).all()
 
 
-def test_a_clear_responder_is_found_and_a_silent_person_is_not_given_a_window() -> None:
+def test_a_clear_responder_is_found_and_a_non_responder_is_not_given_a_window() -> None:
     clear = after(ParticleModel(), evenly(cohort("gaussian", 3, 0)[2], 24)).estimate()
-    silent = after(ParticleModel(), evenly(cohort("nonresponder", 1, 0)[0], 24)).estimate()
+    nonresponder = after(ParticleModel(), evenly(cohort("nonresponder", 1, 0)[0], 24)).estimate()
     assert clear.probability > 0.95
     assert clear.window is not None
-    assert silent.probability < 0.5
-    assert silent.window is None
+    assert nonresponder.probability < 0.5
+    assert nonresponder.window is None
 
 
 @pytest.mark.parametrize("factor", [10.0, 1 / 3])

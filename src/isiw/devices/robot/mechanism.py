@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 SUPPLY_KPA = 413.7
-"""60 psi (dissertation, 3.2.2, where it is printed as 416.7 kPa)."""
+"""60 psi [Kim2020, 3.2.2, where it is printed as 416.7 kPa]."""
 
 LINE_DELAY_MS = 23.0  # t_fill of every preset; sound needs 22 ms for the 7.5 m line
 FILL_MS = 100.0  # time constant of the chamber
@@ -95,7 +95,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Faults:
-    """What goes wrong now and then.
+    """Occasional faults.
 
     Args:
         stuck_probability: share of taps in which the hammer does not move.
@@ -121,13 +121,13 @@ class Geometry:
     """One person's wrist under the robot, by its mean event times and how they vary from tap to tap.
 
     Args:
-        descent: begin of the descent [after the valve command]; it varies by the static friction.
+        descent: start of the descent [after the valve command]; it varies by the static friction.
         hit: impact [after the valve command]; it varies by friction and travel together.
         contact: for how long the tendon decelerates the hammer.
         memg: artefact of the impact in the EMG [after the impact].
         artefact_mv: amplitude of that artefact [mV]; 0 where there is no EMG.
         load_cell: whether the hammer taps a load cell.
-        faults: what goes wrong now and then.
+        faults: occasional faults.
         noise: of the sensors.
 
     Raises:
@@ -201,10 +201,10 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False)
 class Taps:
-    """What n taps truly did: the generator's truth, which no detector sees. Times [ms after the valve command].
+    """What n taps did: the generator's truth, which detectors do not see. Times [ms after the valve command].
 
     Args:
-        descent_ms: begin of the descent; NaN where there is none, shape (n,).
+        descent_ms: start of the descent; NaN where there is none, shape (n,).
         hit_ms: contact with the tendon; NaN where there is none, shape (n,).
         rad_ms: natural frequency of each contact [rad/ms], shape (n,).
         speed_m_s: speed at contact [m/s], shape (n,).
@@ -222,7 +222,7 @@ class Taps:
     geometry: Geometry
 
     def none(self) -> Taps:
-        """As many taps that do not happen: neither air nor hammer."""
+        """As many taps that do not happen: no air, no hammer."""
         nowhere = np.full_like(self.hit_ms, math.nan)
         never = np.full_like(self.hit_ms, math.inf)
         return replace(self, descent_ms=nowhere, hit_ms=nowhere, memg_ms=nowhere, late_ms=never)
@@ -274,7 +274,7 @@ def drive(time_ms: ArrayLike, kinetic_share: float) -> FloatArray:
 
 
 def _speed(descent_ms: ArrayLike, time_ms: ArrayLike, kinetic_share: float) -> FloatArray:
-    """Speed of the hammer [m/s]: the drive integrated from the begin of the descent."""
+    """Speed of the hammer [m/s]: the drive integrated from the start of the descent."""
     start, now = (np.asarray(time, dtype=np.float64) - LINE_DELAY_MS for time in (descent_ms, time_ms))
     decay = FILL_MS * (np.exp(-now / FILL_MS) - np.exp(-start / FILL_MS))
     speed: FloatArray = DRIVE_M_S2 * ((1 - kinetic_share) * (now - start) + decay) / 1000
@@ -282,7 +282,7 @@ def _speed(descent_ms: ArrayLike, time_ms: ArrayLike, kinetic_share: float) -> F
 
 
 def _travel(descent_ms: ArrayLike, time_ms: ArrayLike, kinetic_share: float) -> FloatArray:
-    """Distance of the hammer from its initial position [mm]: the speed integrated from the begin of the descent."""
+    """Distance of the hammer from its initial position [mm]: the speed integrated from the start of the descent."""
     start, now = (np.asarray(time, dtype=np.float64) - LINE_DELAY_MS for time in (descent_ms, time_ms))
     gone = now - start
     initial = np.exp(-start / FILL_MS)

@@ -33,7 +33,7 @@ PRESETS: Mapping[str, Geometry] = MappingProxyType(
         ),
     }
 )
-"""The robot on a load cell, on four people (dissertation, Table 3.2), and on the cushion of the precision study."""
+"""The robot on a load cell, on four people [Kim2020, Table 3.2], and on the cushion of the precision study."""
 
 
 def preset(name: str) -> Geometry:

@@ -26,11 +26,11 @@ Trigger: TypeAlias = Literal["open-loop", "impact"]
 
 SWEEP_MS = 1000.0
 AFTER_PULSE_MS = 60.0
-ALONE_MS = 200.0  # TMS alone comes as late after the (silent) valve command as a usual pulse
+ALONE_MS = 200.0  # TMS alone comes as late after the valve command, which then moves nothing, as a usual pulse
 
 
 class Evoked(Protocol):
-    """What a person answers."""
+    """A person's response."""
 
     @property
     def mep_mv(self) -> float:
@@ -47,11 +47,12 @@ class TapperSettings:
         accelerometer: whether the hammer has one; without it the impact is predicted, never measured.
         rate_hz: sampling rate of all channels [Hz].
         expected_hit_ms: what is known of a person's hit delay before the first tap [ms].
-        expected_hit_sd_ms: SD from person to person about it [ms].
-        expected_tap_sd_ms: SD from tap to tap [ms].
+        expected_hit_sd_ms: its SD from person to person [ms].
+        expected_tap_sd_ms: its SD from tap to tap [ms].
 
     Raises:
-        InvalidValueError: an unknown word, a value that is not positive, or an impact trigger without accelerometer.
+        InvalidValueError: an unknown reference or trigger, a value that is not positive, or an impact trigger without
+            accelerometer.
     """
 
     reference: Reference = "impact"
@@ -80,7 +81,7 @@ class HitDelay:
     """The running estimate of the delay from the valve command to the impact.
 
     Args:
-        expected_ms: what it is taken for before the first measured hit [ms].
+        expected_ms: the delay that is assumed before the first measured hit [ms].
     """
 
     LAST = 21
@@ -95,7 +96,7 @@ class HitDelay:
 
     @property
     def mean_ms(self) -> float:
-        """The hit delay to reckon with [ms]: the median of the last hits, which a few late valves do not move."""
+        """The hit delay to expect [ms]: the median of the last hits, which a few late valves do not move."""
         return float(np.median(self._hits_ms)) if self._hits_ms else self._expected_ms
 
 
@@ -103,7 +104,7 @@ class Tapper:
     """A simulation of the tapping robot, its stimulator, and a person who answers.
 
     Args:
-        respond: answers the ISI that truly came about [ms from the impact; None for TMS alone] with a MEP.
+        respond: answers the ISI that truly came about [ms from the impact; None for TMS alone] with an MEP.
         geometry: the person's wrist under the robot, or the name of a preset.
         settings: how the robot is run.
         seed: of the taps and the sensors' noise.
@@ -125,8 +126,8 @@ class Tapper:
     @property
     def info(self) -> DeviceInfo:
         """What the robot says about itself."""
-        silent = {name for name, there in self._has.items() if not there}
-        channels = {name: unit for name, unit in UNITS.items() if name not in silent}
+        absent = {name for name, there in self._has.items() if not there}
+        channels = {name: unit for name, unit in UNITS.items() if name not in absent}
         known = self.settings.expected_hit_ms, self.settings.expected_hit_sd_ms
         return DeviceInfo(
             "simulated tapping robot",
@@ -167,9 +168,9 @@ class Tapper:
             )
 
     def _pulse_alone(self, taps: Taps, rng: np.random.Generator) -> Sweep:
-        silent, times = taps.none(), self._times_ms(ALONE_MS)
-        channels = self._channels(times, silent, rng)
-        channels["emg"] = self._emg(times, silent, ALONE_MS, rng)
+        nothing, times = taps.none(), self._times_ms(ALONE_MS)
+        channels = self._channels(times, nothing, rng)
+        channels["emg"] = self._emg(times, nothing, ALONE_MS, rng)
         return Sweep(channels, t_tms_ms=VALVE_MS + ALONE_MS)
 
     def _pair(self, taps: Taps, isi_ms: float, rng: np.random.Generator) -> Sweep:

@@ -118,7 +118,7 @@ def record_emg(
 
 
 def scale_of_mep(resting_mv: FloatArray, mep_mv: FloatArray, amplitude_mv: float) -> float:
-    """The factor on a MEP with which its sum with EMG at rest has a peak-to-peak amplitude.
+    """The factor on an MEP with which its sum with EMG at rest has a given amplitude.
 
     A person's amplitudes include the EMG floor, which would otherwise count twice. Where the EMG at rest alone has the
     amplitude, there is no MEP.
@@ -164,7 +164,7 @@ def force_n(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
 
 
 def _contacts(taps: Taps) -> list[tuple[FloatArray, FloatArray]]:
-    """Begin [ms after the valve command] and speed [m/s] of each contact, then of the rest, shape (n,) each."""
+    """Start [ms after the valve command] and speed [m/s] of each contact, then of the rest, shape (n,) each."""
     start, speed = taps.hit_ms, taps.speed_m_s
     contacts = [(start, speed)]
     for _ in range(CONTACTS):

@@ -1,1 +1,1 @@
-"""The dissertation's own methods (4.3): three regressions, a particle filter, and the incremental sweep."""
+"""The dissertation's methods [Kim2020, 4.3]: three regressions, a particle filter, and the incremental sweep."""

@@ -1,4 +1,4 @@
-"""The bootstrap particle filter: the dissertation's PF (4.3.2), after Gordon et al., IEE Proc. F 140, 1993.
+"""The bootstrap particle filter: the dissertation's PF [Kim2020, 4.3.2], after [Gordon1993].
 
 Particles are ISIs that search for the best one. Each generation is diffused, measured with one MEP a particle, weighted
 by these MEPs, and resampled. Nothing is learnt before all particles of a generation have been measured.
@@ -57,10 +57,10 @@ class BootstrapFilter:
         lattice_ms: particles lie on multiples of this from the low end of the range (Fig. 4.20) [ms].
         half_width_ms: the window is the posterior expectation plus and minus this: three SDs of 25 ms in the text
             (4.3.2), two of them, 50 ms, in the caption of Fig. 4.13.
-        floor: what is subtracted from a MEP before it becomes a weight; the text has the MEPs as they are.
+        floor: what is subtracted from an MEP before it becomes a weight; the text has the MEPs as they are.
 
     Raises:
-        InvalidValueError: a number that cannot be.
+        InvalidValueError: an invalid number.
     """
 
     particles: int = 30
@@ -90,7 +90,7 @@ class BootstrapFilter:
             mep_mv=unknown,
             expectation_ms=np.full(people, np.nan),
             spread_ms=particles.std(axis=-1),
-            silent=np.zeros(people, dtype=bool),
+            weightless=np.zeros(people, dtype=bool),
         )
 
     def update(self, posterior: BootstrapPosterior, observation: Observation) -> BootstrapPosterior:
@@ -111,7 +111,7 @@ class BootstrapFilter:
         return self._next_generation(after, complete) if complete.any() else after
 
     def _next_generation(self, posterior: BootstrapPosterior, complete: BoolArray) -> BootstrapPosterior:
-        """What follows from the generation of those people for whom it is complete; nobody else notices."""
+        """The next generation of those people whose present one is complete; the others keep theirs."""
         rng = np.random.default_rng([posterior.seed, 1 + posterior.trials])
         floors_mv = [self.floor.level_mv(posterior.told.person(person)) for person in range(len(complete))]
         weights = self.floor.excess_mv(posterior.mep_mv, np.array(floors_mv)[:, None]).clip(0.0)
@@ -129,7 +129,7 @@ class BootstrapFilter:
             mep_mv=np.where(row, np.nan, posterior.mep_mv),
             expectation_ms=np.where(complete, (share * particles).sum(axis=-1), posterior.expectation_ms),
             spread_ms=np.where(complete, drawn.std(axis=-1), posterior.spread_ms),
-            silent=np.where(complete, ~(weights > 0).any(axis=-1), posterior.silent),
+            weightless=np.where(complete, ~(weights > 0).any(axis=-1), posterior.weightless),
         )
 
     def on_lattice(self, space: DesignSpace, isi_ms: FloatArray) -> FloatArray:
@@ -156,7 +156,7 @@ class BootstrapPosterior:
         mep_mv: their MEPs [mV], shape (b, p).
         expectation_ms: the posterior expectation after the last generation [ms], NaN before, shape (b,).
         spread_ms: SD of the particles after it [ms], shape (b,).
-        silent: whether no MEP of it had any weight, shape (b,).
+        weightless: whether no MEP of it had any weight, shape (b,).
     """
 
     model: BootstrapFilter
@@ -169,7 +169,7 @@ class BootstrapPosterior:
     mep_mv: FloatArray
     expectation_ms: FloatArray
     spread_ms: FloatArray
-    silent: BoolArray
+    weightless: BoolArray
 
     @property
     def trials(self) -> int:
@@ -178,8 +178,8 @@ class BootstrapPosterior:
 
     @property
     def trouble(self) -> str | None:
-        """That a generation told nothing; see `ReportsTrouble`."""
-        if not self.silent.any():
+        """Whether the last generation taught nothing; see `ReportsTrouble`."""
+        if not self.weightless.any():
             return None
         return "No MEP of the last generation was above the floor: all of its particles were given the same weight."
 

@@ -1,4 +1,4 @@
-"""Gaussian process regression of the amplitudes with one noise for all ISIs: the dissertation's GPR (4.3).
+"""Gaussian process regression of the amplitudes with one noise for all ISIs: the dissertation's GPR [Kim2020, 4.3].
 
 `isiw.models.gp` is what one would choose today.
 """
@@ -46,7 +46,7 @@ class GaussianProcessRegression:
         samples: how many curves are drawn.
 
     Raises:
-        InvalidValueError: a number that cannot be.
+        InvalidValueError: an invalid number.
     """
 
     length_ms: float = 40.0

@@ -1,4 +1,4 @@
-"""The incremental sweep: the conventional search, and the dissertation's ground truth (4.2.1)."""
+"""The incremental sweep: the conventional search, and the dissertation's ground truth [Kim2020, 4.2.1]."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class SweepModel:
         floor: what the baseline is; without TMS alone, the median of the means.
 
     Raises:
-        InvalidValueError: a number that cannot be, or another rule.
+        InvalidValueError: an invalid number, or an unknown rule.
     """
 
     step_ms: float = 5.0

@@ -1,4 +1,4 @@
-"""Nonlinear least squares of one Gaussian or two: the dissertation's NR (4.3, 4.4.8, 5.4.2)."""
+"""Nonlinear least squares of one Gaussian or two: the dissertation's NR [Kim2020, 4.3, 4.4.8, 5.4.2]."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class _Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class NonlinearRegression:
-    """Least squares of Gaussians, from start values of prior knowledge.
+    """Least squares of Gaussians, with start values from prior knowledge.
 
     The text starts the mean at mid-range and takes width and amplitude from prior knowledge (5.4.2), whose values it
     does not give; two Gaussians start a quarter of the window's width to either side of it. Amplitudes are not
@@ -87,7 +87,7 @@ class NonlinearRegression:
         samples: how many curves are drawn from the parameters' asymptotic distribution.
 
     Raises:
-        InvalidValueError: a number that cannot be.
+        InvalidValueError: an invalid number.
     """
 
     peaks: int = 1

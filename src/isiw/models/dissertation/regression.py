@@ -1,4 +1,4 @@
-"""Regression of the MEP on the ISI, anew after each trial: what the dissertation's NR, SVMR and GPR share (4.3).
+"""Regression of the MEP on the ISI, anew after each trial: the part that NR, SVMR and GPR share [Kim2020, 4.3].
 
 A method fits a curve to what the MEPs of one person have above the floor; its window is where the curve has at least
 0.135 of its maximum.
@@ -55,7 +55,7 @@ class RegressionModel:
             or the segment that holds the `"peak"`, since a single distribution is expected (4.2.1, 5.4.1).
 
     Raises:
-        InvalidValueError: another word for the segments.
+        InvalidValueError: an unknown value of the segments.
     """
 
     method: RegressionMethod = field(metadata={"spread": True})

@@ -1,4 +1,4 @@
-"""Support vector regression with a Gaussian kernel: the dissertation's SVMR (4.3)."""
+"""Support vector regression with a Gaussian kernel: the dissertation's SVMR [Kim2020, 4.3]."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class SupportVectorRegression:
         committee: how many regressions on bootstrapped trials.
 
     Raises:
-        InvalidValueError: a number that cannot be.
+        InvalidValueError: an invalid number.
     """
 
     c: float = 1.0

@@ -2,9 +2,9 @@
 
 The transformed MEP is a constant, a Gaussian process of the ISI, and Gaussian noise; trials of TMS alone are constant
 and noise. Two hypotheses share that prior: the process has an amplitude, or it has none and the tap changes nothing.
-Their hyperparameters lie on a grid of equal steps in prior SDs, weighted by prior times marginal likelihood (Rasmussen
-and Williams, Gaussian Processes for Machine Learning, 2006, equation 2.30). So the probability that there is a profile
-at all is a ratio of marginal likelihoods, in which a process that could explain anything pays for it.
+Their hyperparameters lie on a grid of equal steps in prior SDs, weighted by prior times marginal likelihood
+[Rasmussen2006, equation 2.30]. So the probability that there is a profile at all is a ratio of marginal likelihoods, in
+which a process that could explain anything pays for it.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ class ProcessSettings:
         max_evaluations: evaluations after which the search for the most likely hyperparameters gives up.
 
     Raises:
-        InvalidValueError: another choice, or fixed hyperparameters with noise that depends on the ISI.
+        InvalidValueError: an unknown choice, or fixed hyperparameters with noise that depends on the ISI.
     """
 
     kernel: KernelName = "matern"
@@ -72,8 +72,8 @@ class ProcessSettings:
 class GaussianProcess:
     """A Gaussian process on the transformed MEP.
 
-    It learns from amplitudes only, takes an ISI for what it was told as whatever its SD, and an amplitude below the
-    detection limit for that limit.
+    It learns from amplitudes only, ignores the SD of an ISI, and takes an amplitude below the detection limit for that
+    limit.
 
     Args:
         process: kernel, noise and hyperparameters.
@@ -84,7 +84,7 @@ class GaussianProcess:
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
 
     Raises:
-        InvalidValueError: another choice, or an invalid number.
+        InvalidValueError: an unknown choice, or an invalid number.
     """
 
     process: ProcessSettings = field(default_factory=ProcessSettings, metadata={"spread": True})

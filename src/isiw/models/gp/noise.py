@@ -1,8 +1,7 @@
 """How the noise of a Gaussian process depends on the ISI: the most likely log variance.
 
-A second Gaussian process describes the log variance (Kersting et al., Most likely heteroscedastic Gaussian process
-regression, ICML 2007). It is fitted to squared leave-one-out residuals by Newton's method on their Gaussian
-likelihood, which is concave in the log variance.
+A second Gaussian process describes the log variance [Kersting2007]. It is fitted to squared leave-one-out residuals by
+Newton's method on their Gaussian likelihood, which is concave in the log variance.
 """
 
 from __future__ import annotations
@@ -23,13 +22,13 @@ LENGTH_MS = 80.0
 """Over which the log variance varies [ms]; longer than profiles do, since variances are harder to learn than means."""
 
 MEAN_SD = 3.0
-"""Prior SD of the mean log variance, which is as good as unknown."""
+"""Prior SD of the mean log variance, which is practically unknown."""
 
 MAX_LOG_VARIANCE = 4.0
-"""The relative log variance stays within this, so that no trial is ignored and none is believed without a doubt."""
+"""The relative log variance stays within this, so that no trial is ignored and none is trusted completely."""
 
 LEAST_SQUARE = 1e-3
-"""Squared residuals below this share of their mean are taken for it."""
+"""Squared residuals are at least this share of their mean."""
 
 NEWTON_STEPS = 12
 MAX_STEP = 2.0
@@ -71,7 +70,7 @@ def _covariance(one: Tensor, other: Tensor) -> Tensor:
 def leave_one_out(covariance: Tensor, residuals: Tensor) -> Tensor:
     """How far each value is from what all others predict, in SDs of that prediction, shape (n,).
 
-    Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), equations 5.10–5.12.
+    [Rasmussen2006, equations 5.10–5.12]
 
     Args:
         covariance: of the values, noise included, shape (n, n).

@@ -1,4 +1,4 @@
-"""Sample paths of the Gaussian process: profiles, windows by the 0.135 rule, and the next MEP."""
+"""Sample paths of the Gaussian process: profiles, windows by the least-excess rule, and the next MEP."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ class ProfileSample:
         isi_ms: ISIs of the paths' grid [ms], evenly spaced, shape (m,); what lies between is interpolated.
         paths: the paths, fields of shape (b, s, ...).
         transform: what amplitudes were transformed by.
-        floor: what the 0.135 rule is applied above.
+        floor: what the least-excess rule is applied above.
     """
 
     isi_ms: Tensor

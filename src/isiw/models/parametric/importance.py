@@ -1,8 +1,8 @@
 """Draws of a posterior with several modes, by adaptive importance sampling.
 
 The prior is a standard normal of the latents. A mixture begins with a Student t at each mode, of the curvature there,
-and with the prior, which stays in it (Hesterberg, Technometrics 37, 1995). Where its draws are worth too little, it is
-fitted to them by their weights (population Monte Carlo: Cappé et al., Stat. Comput. 18, 2008), and draws anew. So the
+and with the prior, which stays in it [Hesterberg1995]. Where its draws are worth too little, it is
+fitted to them by their weights (population Monte Carlo [Cappe2008]), and draws anew. So the
 modes need only be near: what they miss, the weights correct.
 """
 

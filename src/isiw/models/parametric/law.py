@@ -1,7 +1,7 @@
 """How MEPs scatter around their expectation in the parametric window model: densities, intervals, and draws.
 
-A MEP is the EMG floor plus what is evoked. Its mean and variance are the sums of theirs; so the CV falls or rises with
-the level as the one or the other prevails. It is gamma- or log-normally distributed. With noise on the input, what is
+An MEP is the EMG floor plus what is evoked. Its mean and variance are the sums of theirs; so the CV falls or rises with
+the level as the one or the other dominates. It is gamma- or log-normally distributed. With noise on the input, what is
 evoked is a saturating (probit) function of an input that fluctuates from trial to trial, worked out on a few nodes; the
 mixture of the nodes is the model, not an approximation of it. A few trials are outliers, log-normal around a multiple
 of the floor.
@@ -93,7 +93,7 @@ def _log_density(parts: _Components, log_mep: Tensor, likelihood: Likelihood) ->
 def _below(parts: _Components, log_mep: Tensor, likelihood: Likelihood) -> Tensor:
     """Probability of a smaller MEP on each node, shape (m, n, q)."""
     if likelihood == "gamma":
-        # Wilson and Hilferty (PNAS 17, 1931): the cube root of a gamma variable is nearly normal.
+        # The Wilson–Hilferty approximation [Wilson1931]: the cube root of a gamma variable is nearly normal.
         root = torch.exp((log_mep - torch.log(parts.mean_mv)) / 3.0)
         z = (root - 1.0 + parts.cv2 / 9.0) * 3.0 / torch.sqrt(parts.cv2)
     else:

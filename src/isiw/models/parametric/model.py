@@ -2,7 +2,7 @@
 
 Its posterior is sampled anew after every trial, and depends on the seed and on which trials there were, not on their
 order. Whether there is a window is one more unknown: with and without are two models, weighed by their evidence. The
-floor is an unknown too, so the 0.135 rule is always applied to what is above the baseline.
+floor is an unknown too, so the least-excess rule is always applied to what is above the baseline.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class ParametricModel:
         response_threshold_mv: what a told response is known to be above [mV].
 
     Raises:
-        InvalidValueError: an unknown likelihood or method, or a number that cannot be.
+        InvalidValueError: an unknown likelihood or method, or an invalid number.
     """
 
     prior: WindowPrior = field(default_factory=WindowPrior)
@@ -92,7 +92,7 @@ class ParametricModel:
         return observed(observation, *known, order=order).to("cpu", torch.double)
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
-        """Draw one person from the prior, and a MEP at each ISI; see `SimulatesPeople`."""
+        """Draw one person from the prior, and an MEP at each ISI; see `SimulatesPeople`."""
         generator = step_generator("cpu", seed, SIMULATED)
         program = self.program(space)
         latents = torch.randn((1, 1, program.latents), generator=generator, dtype=torch.double)
@@ -130,7 +130,7 @@ class ParametricModel:
 
 
 def _sorted(history: History, person: int) -> History:
-    """The trials of one person in an order of their own, so that the posterior does not depend on that of telling."""
+    """The trials of one person in a fixed order, so that the posterior does not depend on the order of telling."""
     columns = [column[person] for column in history.columns]
     order = torch.from_numpy(np.lexsort([column.numpy() for column in columns[:-1]]))  # whenever they came
     return History(*(column[order].unsqueeze(0) for column in columns))

@@ -118,9 +118,9 @@ class WindowPrior:
     Args:
         p_window: probability that there is a window.
         start: where windows start.
-        width_ms: the width; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
+        width_ms: the width; 60–220 ms, mean 108 measured [Kim2020, Table 4.1].
         floor: of the EMG floor.
-        amplitude: excess at the centre over the floor; MEPs peak at 0.03–0.3 mV (dissertation, 4.2).
+        amplitude: excess at the centre over the floor; MEPs peak at 0.03–0.3 mV [Kim2020, 4.2].
         cv: CV of what is evoked; 0.36 above 2 mV, 1.1 below 0.1 mV measured.
         outliers: logit of an outlier's probability; about 2 to 7 % of a threshold's false positives.
         input_noise: of the likelihood with noise on the input.

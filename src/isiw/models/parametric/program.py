@@ -28,7 +28,7 @@ from isiw.models.shared.tables import ISI_NODES
 __all__ = ["MepLaw", "WindowProgram", "nuts_sample"]
 
 TREE_DEPTH: Final = 6
-"""Latents are of the order of one: 63 leaps reach far enough, and a chain between two modes does not take for ever."""
+"""Latents are of the order of one: 63 leaps reach far enough, and a chain between two modes stays affordable."""
 
 
 class MepLaw(TorchDistribution):
@@ -50,7 +50,7 @@ class MepLaw(TorchDistribution):
     ) -> None:
         self.unknowns, self.isi_ms, self.isi_sd_ms = unknowns, isi_ms, isi_sd_ms
         self.likelihood, self.present = likelihood, present
-        # An interval may reach to infinity, which the support of Pyro's own checks has no word for.
+        # An interval may reach to infinity, which the support of Pyro's checks cannot express.
         super().__init__(torch.Size((*unknowns.start_ms.shape, len(isi_ms))), torch.Size((2,)), validate_args=False)
 
     def log_prob(self, value: Tensor) -> Tensor:

@@ -34,7 +34,7 @@ class Chains:
         warmup: draws for adaptation.
         least: a chain has at least so many draws after them.
         least_share: modes with a smaller share of the evidence get no chain.
-        max_r_hat: chains that disagree by more (Gelman and Rubin, Stat. Sci. 7, 1992) are trouble.
+        max_r_hat: chains that disagree by more [Gelman1992] are trouble.
 
     Raises:
         InvalidValueError: an invalid number.

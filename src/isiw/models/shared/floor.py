@@ -1,4 +1,4 @@
-"""What is done about the EMG floor before a curve is fitted."""
+"""How MEPs are corrected for the EMG floor before a curve is fitted."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ FloorKind: TypeAlias = Literal["subtracted", "zeroed", "raw"]
 
 @dataclass(frozen=True)
 class FloorTreatment:
-    """What an MEP amounts to where the tap does nothing, and what becomes of it before a curve is fitted.
+    """How MEPs are corrected for what they amount to where the tap does nothing, before a curve is fitted.
 
-    The dissertation's plots have amplitudes of zero outside the window; it does not say how they came about (4.3).
+    The dissertation's plots have amplitudes of zero outside the window, and it does not say why [Kim2020, 4.3].
 
     Args:
         floor: `"subtracted"`: the expected MEP of TMS alone is subtracted, or a guess at it where that was not told.
@@ -29,7 +29,7 @@ class FloorTreatment:
         threshold_mv: of `"zeroed"` [mV]; the dissertation's thresholds of a response are 0.015–0.033 mV (4.1.1).
 
     Raises:
-        InvalidValueError: another kind, or a threshold that is not positive.
+        InvalidValueError: an unknown treatment, or a threshold that is not positive.
     """
 
     floor: FloorKind = "subtracted"

@@ -61,11 +61,11 @@ def observed(observation: Observation, detection_limit_mv: float, response_thres
         response_threshold_mv: what a response is known to be above, and no response below [mV].
         order: how many trials came before.
     """
-    seen, silent = observation.response == 1, observation.response == 0
+    seen, unseen = observation.response == 1, observation.response == 0
     log_mep = torch.log(observation.mep_mv)
     limit, threshold = math.log(detection_limit_mv), math.log(response_threshold_mv)
-    low = torch.where(seen, threshold, torch.where(silent, -torch.inf, log_mep))
-    high = torch.where(seen, torch.inf, torch.where(silent, threshold, log_mep))
+    low = torch.where(seen, threshold, torch.where(unseen, -torch.inf, log_mep))
+    high = torch.where(seen, torch.inf, torch.where(unseen, threshold, log_mep))
     high = torch.where(observation.mep_mv == 0, limit, high)
     columns = (observation.isi_ms, observation.isi_sd_ms, low, high, torch.full_like(log_mep, order))
     return History(*(x.unsqueeze(-1) for x in columns))

@@ -1,4 +1,4 @@
-"""Settings of the dissertation's own methods: three regressions, a particle filter, and the conventional sweep."""
+"""Settings of the dissertation's methods [Kim2020, 4.2–4.6]: regressions, particle filter, and conventional sweep."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Settling:
         max_iterations: stop after this many stimuli beyond the initial ones; mistrials count.
 
     Raises:
-        InvalidValueError: an invalid number, or another word for the edges.
+        InvalidValueError: an invalid number, or an unknown value of the edges.
     """
 
     stop_variance_ms2: float = 50.0

@@ -1,0 +1,86 @@
+"""What is reached without stimulating anybody: the default's answer before any trial, and the best fixed window.
+
+    python benchmarks/zero_trials.py > benchmarks/results/zero_trials.md
+
+The fixed window is the one with the largest mean F1 on other people of the cohort, or no window at all. Neither of the
+two has learnt anything from the person: a method is worth what it reaches beyond them.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+import typer
+
+import isiw
+from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.metrics import f1, f1_of_masks
+from isiw.subjects.cohorts import COHORTS
+from isiw.types import BoolArray, FloatArray, IntArray
+from isiw.window import Window
+
+
+def masks_of(cohort: str, people: int, seed: int, space: DesignSpace) -> BoolArray:
+    """The true windows of a cohort's people on the grid, shape (n, t)."""
+    windows = [person.window(space) for person in isiw.subjects.cohort(cohort, people, seed)]
+    return np.stack([np.zeros(len(space.grid_ms), bool) if w is None else w.mask(space.grid_ms) for w in windows])
+
+
+def best_fixed(masks: BoolArray, space: DesignSpace) -> Window | None:
+    """The interval with the largest mean F1 over true windows, or None where no window has more.
+
+    Args:
+        masks: the true windows, shape (n, t).
+        space: the design space.
+    """
+    inside = np.pad(np.cumsum(masks, axis=1), ((0, 0), (1, 0)))
+    means = [_means_from(inside, first) for first in range(masks.shape[1])]
+    first = int(np.argmax([mean.max() for mean in means]))
+    if means[first].max() < (~masks.any(axis=1)).mean():
+        return None
+    last = first + int(means[first].argmax())
+    return Window(space.grid_ms[first], space.grid_ms[last])
+
+
+def _means_from(inside: IntArray, first: int) -> FloatArray:
+    """Mean F1 of the intervals from a grid point to each one behind it, from cumulated masks (n, t + 1)."""
+    shared = inside[:, first + 1 :] - inside[:, [first]]
+    means: FloatArray = (2 * shared / (inside[:, [-1]] + np.arange(1, shared.shape[1] + 1))).mean(axis=0)
+    return means
+
+
+def main(
+    people: Annotated[int, typer.Option(help="People per cohort.")] = 1000,
+    seed: Annotated[int, typer.Option(help="Seed of the people that are reported.")] = 90_000,
+    other_seed: Annotated[int, typer.Option(help="Seed of the people on whom the fixed window is chosen.")] = 10_000,
+) -> None:
+    """Print mean F1 of both, by cohort, over 500 ms after the valve command."""
+    space = VALVE_SPACE
+    before = isiw.make_strategy("default", space=space).estimate().window
+    rows = []
+    for cohort in COHORTS:
+        masks = masks_of(cohort, people, seed, space)
+        fixed = best_fixed(masks_of(cohort, people, other_seed, space), space)
+        reached = f1_of_masks(np.zeros(len(space.grid_ms), bool) if fixed is None else fixed.mask(space.grid_ms), masks)
+        default = [f1(before, Window.from_mask(space.grid_ms, mask), space) for mask in masks]
+        rows.append(
+            {
+                "cohort": cohort,
+                "default before any trial": np.mean(default),
+                "best fixed window": np.mean(reached),
+                "which": "none" if fixed is None else str(fixed),
+            }
+        )
+    print(f"- command: `{shlex.join(['python', *sys.argv])}`")
+    print(f"- people: {people} per cohort; standard errors about .01 at most")
+    print("- `kim11` has eleven people, so its fixed window was chosen on the same ones")
+    print(f"- the default before any trial: {before}\n")
+    print(pd.DataFrame(rows).to_markdown(index=False, floatfmt=".2f"))
+
+
+if __name__ == "__main__":
+    typer.run(main)
