@@ -6,17 +6,21 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from isiw.config.run import load_config
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def blocks(language):
+def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
 
 
-def test_the_python_examples_run_one_after_the_other(tmp_path, monkeypatch, capsys) -> None:
+def test_the_python_examples_run_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     assert len(blocks("python")) == 4
     for block in blocks("python"):
@@ -35,7 +39,7 @@ def test_the_examples_are_as_short_as_promised() -> None:
         assert len([line for line in block.splitlines() if line.strip()]) <= 20
 
 
-def test_the_configuration_is_valid(tmp_path) -> None:
+def test_the_configuration_is_valid(tmp_path: Path) -> None:
     (block,) = blocks("toml")
     (tmp_path / "session.toml").write_text(block)
     config = load_config(tmp_path / "session.toml")

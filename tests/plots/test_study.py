@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pandas as pd
 import pytest
 
@@ -27,7 +29,7 @@ def test_each_cohort_has_a_panel_with_a_curve_a_strategy() -> None:
         assert axes.containers[0].lines[0].get_ydata().tolist() == [0.6, 0.7]
 
 
-def test_a_study_is_drawn_into_a_file_and_an_unknown_format_is_refused(tmp_path) -> None:
+def test_a_study_is_drawn_into_a_file_and_an_unknown_format_is_refused(tmp_path: Path) -> None:
     assert save_study_plot(table("wide"), tmp_path / "study.png").stat().st_size > 5000
     with pytest.raises(InvalidValueError, match="format"):
         save_study_plot(table("wide"), tmp_path / "study.xyz")

@@ -17,6 +17,7 @@ from isiw.models.protocol import Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.stopping import Budget, EdgeVariance
 from isiw.strategy.strategy import Recipe, Strategy
+from scripted import scripted_strategy
 
 MakeStrategy = Callable[..., Strategy]
 MEPS_MV = [0.02, 0.0, 0.11, 0.05]
@@ -49,7 +50,7 @@ class Scores:
         return self.values[None]
 
 
-def test_ask_is_the_same_until_the_next_tell(scripted_strategy: MakeStrategy) -> None:
+def test_ask_is_the_same_until_the_next_tell() -> None:
     strategy = scripted_strategy()
     first = strategy.ask()
     assert [strategy.ask() for _ in range(3)] == [first] * 3
@@ -66,7 +67,7 @@ def test_the_same_seed_and_tells_give_the_same_asks() -> None:
     assert runs[0] == runs[1] != runs[2]
 
 
-def test_other_tells_give_other_asks(scripted_strategy: MakeStrategy) -> None:
+def test_other_tells_give_other_asks() -> None:
     assert play(scripted_strategy(), [0.02, 0.05]) != play(scripted_strategy(), [0.02, 0.06])
 
 
@@ -91,7 +92,7 @@ def test_a_restarted_strategy_replays_identically(particles: Strategy) -> None:
     assert particles.posterior.trials == len(MEPS_MV)
 
 
-def test_a_restarted_strategy_keeps_its_recipe_and_forgets_its_mistrials(scripted_strategy: MakeStrategy) -> None:
+def test_a_restarted_strategy_keeps_its_recipe_and_forgets_its_mistrials() -> None:
     strategy = scripted_strategy(max_trials=1)
     strategy.count_mistrial()
     again = strategy.restarted()
@@ -129,9 +130,7 @@ def test_what_cannot_be_is_refused_and_changes_nothing(
     assert (particles.ask(), particles.posterior, particles.estimate(), particles.decision()) == before
 
 
-def test_a_model_that_fails_leaves_the_strategy_as_it_was(
-    scripted_strategy: MakeStrategy, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_model_that_fails_leaves_the_strategy_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     strategy = scripted_strategy()
     isi_ms, posterior = strategy.ask(), strategy.posterior
 
@@ -188,7 +187,7 @@ def test_a_mistrial_moves_the_budget_and_nothing_else(particles: Strategy) -> No
     assert particles.decision().reason == reason.replace("79 stimuli", "78 stimuli")
 
 
-def test_told_trials_and_mistrials_use_up_one_budget(scripted_strategy: MakeStrategy) -> None:
+def test_told_trials_and_mistrials_use_up_one_budget() -> None:
     strategy = scripted_strategy(max_trials=3)
     strategy.tell(strategy.ask(), 0.1)
     strategy.count_mistrial()
@@ -199,7 +198,7 @@ def test_told_trials_and_mistrials_use_up_one_budget(scripted_strategy: MakeStra
 
 @pytest.mark.parametrize("acquisition", [WindowGain(), MutualInformation()])
 def test_an_acquisition_function_that_the_model_cannot_serve_is_refused_with_the_reason(
-    acquisition: WindowGain | MutualInformation, scripted_strategy: MakeStrategy
+    acquisition: WindowGain | MutualInformation,
 ) -> None:
     model = scripted_strategy().model
     with pytest.raises(StrategyError, match="cannot work with RememberingModel") as caught:
@@ -207,14 +206,14 @@ def test_an_acquisition_function_that_the_model_cannot_serve_is_refused_with_the
     assert all(need.__name__ in str(caught.value) for need in acquisition.needs)
 
 
-def test_a_tie_is_asked_at_the_first_isi_and_a_score_that_is_not_finite_never(scripted_strategy: MakeStrategy) -> None:
+def test_a_tie_is_asked_at_the_first_isi_and_a_score_that_is_not_finite_never() -> None:
     model = scripted_strategy().model
     space = DesignSpace(0, 4)
     tie = Scores(torch.tensor([math.inf, 0.0, math.nan, 2.0, 2.0]))
     assert Strategy(space, model, tie, Budget(3)).ask() == 3.0
 
 
-def test_where_no_score_is_finite_the_isi_is_evenly_spaced_and_says_why(scripted_strategy: MakeStrategy) -> None:
+def test_where_no_score_is_finite_the_isi_is_evenly_spaced_and_says_why() -> None:
     nothing = Scores(torch.full((5,), math.nan))
     strategy = Strategy(DesignSpace(0, 4), scripted_strategy().model, nothing, Budget(3))
     asked = []
@@ -225,7 +224,7 @@ def test_where_no_score_is_finite_the_isi_is_evenly_spaced_and_says_why(scripted
     assert len(set(asked)) == 3
 
 
-def test_the_initial_isis_come_first_and_a_mistrial_repeats_one(scripted_strategy: MakeStrategy) -> None:
+def test_the_initial_isis_come_first_and_a_mistrial_repeats_one() -> None:
     usual = scripted_strategy()
     strategy = Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, initial_ms=(0.0, 120.2, 200.0))
     assert strategy.ask() == 0.0
@@ -244,9 +243,7 @@ def settled_after(strategy: Strategy, trials: int) -> bool:
     return strategy.decision().stop
 
 
-def test_only_windows_after_the_initial_isis_tell_whether_the_edges_have_settled(
-    scripted_strategy: MakeStrategy,
-) -> None:
+def test_only_windows_after_the_initial_isis_tell_whether_the_edges_have_settled() -> None:
     usual = scripted_strategy()
     for initial_ms in ((), (0.0,), (0.0, 100.0, 200.0)):
         strategy = Strategy(usual.space, usual.model, usual.acquisition, EdgeVariance(), initial_ms=initial_ms)
@@ -255,7 +252,7 @@ def test_only_windows_after_the_initial_isis_tell_whether_the_edges_have_settled
         assert settled_after(strategy, 1)
 
 
-def test_tms_alone_does_not_settle_the_edges(scripted_strategy: MakeStrategy) -> None:
+def test_tms_alone_does_not_settle_the_edges() -> None:
     usual = scripted_strategy()
     strategy = Strategy(usual.space, usual.model, usual.acquisition, EdgeVariance())
     settled_after(strategy, 4)
@@ -265,7 +262,7 @@ def test_tms_alone_does_not_settle_the_edges(scripted_strategy: MakeStrategy) ->
     assert settled_after(strategy, 1)
 
 
-def test_a_cost_is_taken_off_the_scores(scripted_strategy: MakeStrategy) -> None:
+def test_a_cost_is_taken_off_the_scores() -> None:
     level = Scores(torch.tensor([1.0, 2.0, 3.0, 4.0, 5.0]))
     model = scripted_strategy().model
     assert Strategy(DesignSpace(0, 4), model, level, Budget(3)).ask() == 4.0
@@ -291,14 +288,14 @@ def test_a_batch_says_why_one_of_its_isis_is_not_the_acquisition_functions_choic
     assert "no ISI a finite score" in (first.fallback_reason or "")
 
 
-def test_a_batch_takes_up_the_initial_isis_first(scripted_strategy: MakeStrategy) -> None:
+def test_a_batch_takes_up_the_initial_isis_first() -> None:
     usual = scripted_strategy()
     strategy = Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, initial_ms=(0.0, 100.0, 200.0))
     assert strategy.ask_batch(3) == [0.0, 100.0, 200.0]
     assert strategy.ask_batch(2) == [0.0, 100.0]
 
 
-def test_a_batch_from_a_model_that_imagines_no_trials_is_refused(scripted_strategy: MakeStrategy) -> None:
+def test_a_batch_from_a_model_that_imagines_no_trials_is_refused() -> None:
     with pytest.raises(StrategyError, match="cannot imagine trials"):
         scripted_strategy().ask_batch(2)
     assert len(scripted_strategy().ask_batch(1)) == 1

@@ -19,6 +19,7 @@ from isiw.subjects.cohorts import COHORTS, cohort
 from isiw.subjects.profiles import PeakProfile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
 from isiw.subjects.subject import Drift, SimulatedSubject
+from isiw.trials import Stimulus
 from isiw.types import ArrayLike, FloatArray
 
 PEOPLE = 400
@@ -536,6 +537,6 @@ def test_input_noise_has_its_full_spread_from_the_first_trial_on() -> None:
 
 
 @pytest.mark.parametrize("stimulus", [(100.0, "hit"), (100.0, "Valve"), (float("nan"), "valve")])
-def test_a_stimulus_that_means_nothing_is_refused(stimulus) -> None:
+def test_a_stimulus_that_means_nothing_is_refused(stimulus: Stimulus) -> None:
     with pytest.raises(InvalidValueError):
         cohort("gaussian", 1, 0)[0].begin(0).respond(*stimulus)

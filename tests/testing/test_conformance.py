@@ -12,10 +12,10 @@ import torch
 from isiw.acquisition.information import MutualInformation
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import ACQUISITIONS
-from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import StrategyError
 from isiw.models.particles import ParticleModel, ParticlePosterior
-from isiw.models.protocol import Observation, ProposesIsi, Tensor
+from isiw.models.protocol import Observation, Posterior, ProposesIsi, Tensor
 from isiw.strategy.catalogue import list_strategies, make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
@@ -42,7 +42,7 @@ def particles_after(trials: Trials, people: int = 1) -> ParticlePosterior:
 
 
 @pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
-def test_the_particle_model_conforms(space) -> None:
+def test_the_particle_model_conforms(space: DesignSpace) -> None:
     # Particles are a sample: two orders of the same trials differ by its error.
     check_model(lambda: ParticleModel(particles=400), space, order_tolerance_ms=40.0)
 
@@ -94,10 +94,10 @@ class Broken:
     fault: str
     model: ParticleModel = field(default_factory=lambda: ParticleModel(particles=50))
 
-    def begin(self, space, seed, people=1):
+    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> Posterior:
         return self.model.begin(space, seed, people)
 
-    def update(self, posterior, observation):
+    def update(self, posterior: Any, observation: Observation) -> Posterior:
         after = self.model.update(posterior, observation)
         match self.fault:
             case "counts twice":
@@ -174,7 +174,7 @@ class Forgetful(Strategy):
 class Gullible(Strategy):
     """Accepts whatever it is told."""
 
-    def tell(self, isi_ms, mep_mv=None, **others) -> None:
+    def tell(self, isi_ms: float, mep_mv: float = None, **others: Any) -> None:
         if mep_mv is not None and mep_mv >= 0:
             super().tell(isi_ms, mep_mv, **others)
 

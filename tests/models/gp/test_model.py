@@ -32,6 +32,7 @@ from isiw.subjects.cohorts import cohort
 from isiw.testing import check_model
 from isiw.testing.requirements import usual_trials
 from isiw.window import WindowEstimate
+from known import known
 
 FEW = GaussianProcess(samples=64)
 FIXED = FixedProcess(length_ms=40.0, amplitude=1.1, noise=0.6, centre=-3.8, unit=0.9)
@@ -110,9 +111,9 @@ def test_it_finds_the_window_of_clear_people() -> None:
     for person in (0, 1, 2, 4, 5):
         found = estimate(GaussianProcess(), evenly("gaussian", 40, person))
         truth = cohort("gaussian", person + 1, 0)[person].window(VALVE_SPACE)
-        assert found.probability > 0.9
-        assert found.window.start_ms < truth.start_ms + 0.4 * truth.width_ms
-        assert found.window.end_ms > truth.end_ms - 0.4 * truth.width_ms
+        assert known(found.probability) > 0.9
+        assert known(found.window).start_ms < truth.start_ms + 0.4 * truth.width_ms
+        assert known(found.window).end_ms > truth.end_ms - 0.4 * truth.width_ms
 
 
 def test_a_flat_profile_is_mostly_said_to_have_no_window() -> None:
@@ -209,8 +210,8 @@ def test_a_response_without_an_amplitude_is_refused() -> None:
 def test_trouble_of_a_fit_is_told_and_an_estimate_is_given() -> None:
     hasty = replace(FEW, process=ProcessSettings(hyperparameters="map", max_evaluations=5))
     posterior = after(hasty, list(usual_trials(VALVE_SPACE)))
-    assert posterior.trouble.startswith("The search")
-    assert posterior.trouble.endswith(".")
+    assert known(posterior.trouble).startswith("The search")
+    assert known(posterior.trouble).endswith(".")
     assert posterior.estimate().window is not None
     assert after(FEW, list(usual_trials(VALVE_SPACE))).trouble is None
 

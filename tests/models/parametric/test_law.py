@@ -8,6 +8,7 @@ from isiw.design import VALVE_SPACE
 from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior, latent_names
 from isiw.window import EDGE_LEVEL
+from known import known
 
 LIKELIHOODS: tuple[Likelihood, ...] = ("gamma", "log-normal", "input-noise")
 LEVELS = torch.tensor([0.0, 0.1, 0.5, 1.0], dtype=torch.double)
@@ -43,7 +44,7 @@ def test_tms_alone_has_no_excess_and_leaves_gradients_finite() -> None:
     level = levels(unknowns._replace(width_ms=width_ms), torch.tensor([math.nan, 250.0], dtype=torch.double))
     assert (level[:, 0] == 0).all()
     level.sum().backward()
-    assert width_ms.grad.isfinite().all()
+    assert known(width_ms.grad).isfinite().all()
 
 
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
@@ -104,7 +105,7 @@ def test_however_odd_a_mep_its_likelihood_and_its_gradient_are_finite(likelihood
     total = log_likelihood(unknowns, level, points(log_mep), likelihood)
     total.sum().backward()
     assert total.isfinite().all()
-    assert latents.grad.isfinite().all()
+    assert known(latents.grad).isfinite().all()
 
 
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)

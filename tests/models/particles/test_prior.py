@@ -1,4 +1,5 @@
 from dataclasses import astuple, fields, replace
+from typing import Any
 
 import pytest
 import torch
@@ -23,7 +24,7 @@ from isiw.models.particles.shapes import ShapeKind
 MANY = 20_000
 
 
-def people(prior: Prior, space: DesignSpace):
+def people(prior: Prior, space: DesignSpace) -> Person:
     generator = torch.Generator().manual_seed(1)
     return prior.person(prior.sample(1, MANY, generator), space)
 
@@ -50,19 +51,19 @@ def test_kinds_come_as_often_as_the_prior_says() -> None:
         (SessionPrior, {"startup": (0.5, -0.5)}),
     ],
 )
-def test_an_impossible_part_is_refused(part, wrong) -> None:
+def test_an_impossible_part_is_refused(part: type, wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
         part(**wrong)
 
 
 @pytest.mark.parametrize("wrong", [{"boost": (3.0, 0.0, 0.1)}, {"rest": (-4.5, 0.4, -0.1)}, {"ratio": (-1.0, 0.9)}])
-def test_an_impossible_muscle_is_refused(wrong) -> None:
+def test_an_impossible_muscle_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
         replace(Prior().hand, **wrong)
 
 
 @pytest.mark.parametrize("shares", [ShapeShares, NoiseShares])
-def test_shares_sum_to_one(shares) -> None:
+def test_shares_sum_to_one(shares: type[ShapeShares] | type[NoiseShares]) -> None:
     first = fields(shares)[0].name
     with pytest.raises(InvalidValueError, match="sum to 1"):
         shares(**{first: 1.0})

@@ -40,7 +40,7 @@ def test_a_tail_reaches_further_and_leaves_the_middle_where_it_is() -> None:
 
 
 def test_pairs_and_lists_are_scales() -> None:
-    believed = Believed(width=[80, 0.3, 0], rest=(-4, 1))
+    believed = Believed(**triples)
     assert believed == Believed(width=Scale(80.0, 0.3, 0.0), rest=Scale(-4.0, 1.0, 0.0))
     assert isinstance(believed.width, Scale)
 
@@ -51,8 +51,8 @@ def test_pairs_and_lists_are_scales() -> None:
 )
 def test_anything_else_is_refused_by_name(wrong: tuple[object, ...]) -> None:
     with pytest.raises(InvalidValueError, match=r"Believed\.width"):
-        Believed(width=wrong)
+        Believed(**{"width": wrong})
 
 
 def test_only_positive_quantities_need_a_positive_median() -> None:
-    assert Believed(rest=(-80.0, 0.3)).rest.median == -80.0
+    assert Believed(rest=Scale(-80.0, 0.3)).rest.median == -80.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 import torch
 
@@ -63,6 +65,6 @@ def test_later_latents_are_later_starts() -> None:
         {"after_impact_ms": (50.0, 50.0)},
     ],
 )
-def test_an_impossible_prior_is_refused(wrong: dict[str, object]) -> None:
+def test_an_impossible_prior_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
         StartPrior(**wrong)
