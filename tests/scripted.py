@@ -17,6 +17,7 @@ from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Measurement, Stimulus
 from isiw.window import Window, WindowEstimate
+from known import instance
 
 SPACE = DesignSpace(0, 200, reference="valve")
 
@@ -100,6 +101,10 @@ class ScriptedDevice:
 
     def unstage(self) -> None:
         self.calls.append("unstage")
+
+
+def told_to(strategy: Strategy) -> tuple[tuple[float, float], ...]:
+    return instance(RememberingPosterior, strategy.posterior).told
 
 
 def scripted_strategy(max_trials: int = 6, seed: int = 0, space: DesignSpace = SPACE) -> Strategy:

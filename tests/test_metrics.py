@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from isiw.design import DesignSpace
 from isiw.metrics import covers, edge_error_ms, edge_ranks, f1, f1_of_masks, trials_to_lasting, true_edges_ms
+from isiw.types import ArrayLike
 from isiw.window import Window, WindowEstimate
 from known import known
 
@@ -20,7 +21,7 @@ SPACE = DesignSpace(0, 40, step_ms=1)
 masks = st.lists(st.booleans(), min_size=12, max_size=12).map(np.array)
 
 
-def estimate_of(edges_ms: list[tuple[float, float]]) -> WindowEstimate:
+def estimate_of(edges_ms: ArrayLike) -> WindowEstimate:
     return WindowEstimate(1.0, None, edge_samples_ms=np.array(edges_ms))
 
 

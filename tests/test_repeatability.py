@@ -23,7 +23,7 @@ from isiw.repeatability import (
 )
 from isiw.session.loop import Session
 from isiw.signals import TapEvents
-from isiw.trials import Stimulus
+from isiw.trials import Stimulus, Sweep
 from known import instance, known
 from scripted import scripted_strategy
 

@@ -46,5 +46,4 @@ from .trials import TrialTable as TrialTable
 from .window import Window as Window
 from .window import WindowEstimate as WindowEstimate
 
-__all__: list[str]
 __version__: str

@@ -131,7 +131,7 @@ class Hardware:
     def stage(self) -> None:
         self.armed = self.taken = True
 
-    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement | Sweep:
         del timeout_s
         if not self.armed:
             raise DeviceError("not armed")
@@ -211,7 +211,7 @@ def test_the_suite_finds_what_is_no_device(space: DesignSpace) -> None:
 class Slow(Hardware):
     """Takes longer than it is allowed to."""
 
-    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement | Sweep:
         answer = super().deliver(stimulus, timeout_s)
         time.sleep(1.2 * timeout_s)
         return answer

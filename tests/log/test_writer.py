@@ -184,7 +184,7 @@ def _no_links(new: Path, old: Path) -> Never:
 
 @pytest.mark.parametrize("links", [True, False])
 def test_a_damaged_file_is_kept_beside_what_was_salvaged(
-    broken_log: Path, header: Header, monkeypatch: pytest.MonkeyPatch, links: bool
+    broken_log: Path, header: Header, monkeypatch: pytest.MonkeyPatch, *, links: bool
 ) -> None:
     if not links:  # as on a memory stick
         monkeypatch.setattr(Path, "hardlink_to", _no_links)

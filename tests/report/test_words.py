@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from isiw.log.reader import SessionRecord, read_session
+from isiw.log.schema import Estimate
 from isiw.report.words import (
     PROGRESS_HEADINGS,
     TRIAL_HEADINGS,
@@ -21,6 +22,7 @@ from isiw.session.resume import exclude
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Measurement, MistrialReason, Status, Trial
 from isiw.window import Window, WindowEstimate
+from known import instance
 from scripted import ScriptedDevice, scripted_strategy
 
 
@@ -33,7 +35,7 @@ def record(tmp_path: Path) -> SessionRecord:
 
 def with_estimate(record: SessionRecord, **changes: Any) -> SessionRecord:
     entries = list(record.history)
-    entries[-1] = entries[-1].model_copy(update=changes)
+    entries[-1] = instance(Estimate, entries[-1]).model_copy(update=changes)
     return type(record)(record.path, record.header, tuple(entries), {}, (), True)
 
 

@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 from pathlib import Path
-from typing import Never
+from typing import Any, Never, cast
 
 import numpy as np
 import pytest
@@ -22,7 +22,8 @@ from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Recipe, Strategy
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
-from scripted import ScriptedDevice, scripted_strategy
+from known import instance, known
+from scripted import ScriptedDevice, scripted_strategy, told_to
 
 
 @pytest.fixture
@@ -30,7 +31,7 @@ def log(tmp_path: Path) -> Path:
     return tmp_path / "s.mcap"
 
 
-def run_failing(session: Session, error: type[Exception]) -> tuple[SessionRecord, str]:
+def run_failing(session: Session, error: type[BaseException]) -> tuple[SessionRecord, str]:
     with pytest.raises(error) as caught:
         session.run()
     return read_session(session.log_path), str(caught.value)
@@ -57,7 +58,7 @@ def test_the_intent_is_on_disk_before_the_device_is_called(log: Path) -> None:
     device = ScriptedDevice()
 
     def answer(stimulus: Stimulus) -> Measurement | Sweep:
-        last = read_session(log).history[-1]
+        last = instance(Intent, read_session(log).history[-1])
         assert last == Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=last.t_s)
         return Measurement(0.1, stimulus.isi_ms)
 
@@ -120,9 +121,9 @@ def test_the_same_or_an_unknown_detection_limit_is_accepted(
 
 
 def test_the_raw_sweeps_are_logged(log: Path) -> None:
-    def answer(stimulus: Stimulus) -> Measurement | Sweep:
+    def answer(stimulus: Stimulus) -> Sweep:
         emg = 0.001 * np.random.default_rng(stimulus.trial).standard_normal(451)
-        return Sweep({"emg": Channel(emg, 3000.0, "mV", -50.0)}, t_valve_ms=-stimulus.isi_ms, t_tms_ms=0.0)
+        return Sweep({"emg": Channel(emg, 3000.0, "mV", -50.0)}, t_valve_ms=-known(stimulus.isi_ms), t_tms_ms=0.0)
 
     device = ScriptedDevice(answer)
     Session(device, scripted_strategy(2), log=log).run()
@@ -173,13 +174,13 @@ def test_the_device_is_always_stopped(log: Path) -> None:
     assert device.calls == ["stage", "stop", "unstage"]
 
 
-def test_a_device_that_cannot_be_staged_is_stopped_all_the_same(log: Path) -> None:
+def test_a_device_that_cannot_be_staged_is_stopped_all_the_same(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     device = ScriptedDevice()
 
     def stage() -> Never:
         raise DeviceError("no air pressure")
 
-    device.stage = stage
+    monkeypatch.setattr(device, "stage", stage)
     record, _ = run_failing(Session(device, scripted_strategy(), log=log), DeviceError)
     assert device.calls == ["stop", "unstage"]
     assert record.events[-1].text == "DeviceError: no air pressure"
@@ -202,7 +203,7 @@ def test_a_device_that_fails_leaves_an_intact_log_and_is_stopped(log: Path, erro
     assert record.table[2].commanded_isi_ms == device.delivered[2].isi_ms
     assert (record.events[-1].kind, record.events[-1].trial) == ("fault", 2)
     assert device.calls == ["stage", "stop", "unstage"]
-    assert len(session.strategy.posterior.told) == 2
+    assert len(told_to(session.strategy)) == 2
 
 
 @pytest.mark.parametrize("mep_mv", [math.nan, math.inf, -math.inf, -0.001])
@@ -213,7 +214,7 @@ def test_an_impossible_amplitude_is_an_error_that_names_it(log: Path, mep_mv: fl
     assert "mep_mv" in message
     assert repr(mep_mv) in message
     assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
-    assert session.strategy.posterior.told == ()
+    assert told_to(session.strategy) == ()
 
 
 @pytest.mark.parametrize("isi_ms", [math.nan, math.inf])
@@ -241,7 +242,7 @@ def test_an_answer_to_another_kind_of_trial_is_an_error(log: Path) -> None:
 def test_an_isi_that_is_off_is_a_mistrial_and_asked_again(log: Path) -> None:
     def answer(stimulus: Stimulus) -> Measurement | Sweep:
         off_ms = 10.1 if stimulus.trial == 1 else 9.9
-        return Measurement(0.1, stimulus.isi_ms + off_ms)
+        return Measurement(0.1, known(stimulus.isi_ms) + off_ms)
 
     device = ScriptedDevice(answer)
     session = Session(device, scripted_strategy(3), log=log)
@@ -249,7 +250,7 @@ def test_an_isi_that_is_off_is_a_mistrial_and_asked_again(log: Path) -> None:
     record = read_session(log)
     assert record.table[1].reason is MistrialReason.ISI_OFF
     assert device.delivered[1].isi_ms == device.delivered[2].isi_ms
-    assert len(session.strategy.posterior.told) == 2
+    assert len(told_to(session.strategy)) == 2
 
 
 def test_an_active_muscle_is_a_mistrial(log: Path) -> None:
@@ -261,7 +262,7 @@ def test_an_active_muscle_is_a_mistrial(log: Path) -> None:
 
 
 def test_a_device_that_measures_keeps_the_sessions_limits(log: Path) -> None:
-    device = ScriptedDevice(lambda stimulus: Measurement(0.1, stimulus.isi_ms + 3.0))
+    device = ScriptedDevice(lambda stimulus: Measurement(0.1, known(stimulus.isi_ms) + 3.0))
     result = Session(device, scripted_strategy(2), log=log, signals=SignalLimits(isi_tolerance_ms=2.0)).run()
     assert {trial.reason for trial in result.trials} == {MistrialReason.ISI_OFF}
 
@@ -314,7 +315,7 @@ def test_without_a_writable_log_nothing_is_delivered(log: Path, monkeypatch: pyt
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 @pytest.mark.parametrize("delay_s", [0.005, 0.05, 0.12, 0.2])
-def test_ctrl_c_at_any_time_leaves_an_intact_log(log: Path, delay_s: float) -> None:
+def test_ctrl_c_at_any_time_leaves_an_intact_log(log: Path, monkeypatch: pytest.MonkeyPatch, delay_s: float) -> None:
     device = ScriptedDevice()
     session = Session(device, scripted_strategy(100_000), log=log, limits=Limits(0, 200, 0.0, 100_000))
     timer = threading.Timer(delay_s, os.kill, (os.getpid(), signal.SIGINT))
@@ -325,7 +326,7 @@ def test_ctrl_c_at_any_time_leaves_an_intact_log(log: Path, delay_s: float) -> N
         stage()
         timer.start()
 
-    device.stage = stage_and_start
+    monkeypatch.setattr(device, "stage", stage_and_start)
     with pytest.raises(KeyboardInterrupt):
         session.run()
     timer.join()
@@ -352,25 +353,27 @@ def test_a_strategy_that_knows_of_other_trials_is_refused_before_anything_is_del
 
 
 @pytest.mark.parametrize("times", [{"timeout_s": 0.0}, {"timeout_s": math.nan}, {"ask_deadline_s": -1.0}])
-def test_times_that_nobody_can_keep_are_refused(log: Path, times: dict[str, float]) -> None:
+def test_times_that_nobody_can_keep_are_refused(log: Path, times: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"timeout_s|deadline_s"):
         Session(ScriptedDevice(), scripted_strategy(3), log=log, **times)
 
 
 @pytest.mark.parametrize("channels", [{"emg": "microvolt"}, {"event": "mV"}])
 def test_channels_that_cannot_be_judged_or_logged_are_refused_before_anything_is_delivered(
-    log: Path, channels: dict[str, str]
+    log: Path, monkeypatch: pytest.MonkeyPatch, channels: dict[str, str]
 ) -> None:
     device = ScriptedDevice()
     info = dataclasses.replace(device.describe(), channels=channels)
-    device.describe = lambda: info
+    monkeypatch.setattr(device, "describe", lambda: info)
     with pytest.raises(InvalidValueError, match=r"unit of the channel|cannot have this name"):
         Session(device, scripted_strategy(3), log=log)
 
 
 def test_numbers_of_numpy_are_numbers(space: DesignSpace, log: Path) -> None:
-    strategy = make_strategy("even", space, np.int64(3), max_trials=np.int64(2), particles=np.int64(64))
-    limits = Limits(np.int64(0), np.float32(space.high_ms), np.float32(5), np.int64(2))
+    seed, low_ms, pulses = cast("tuple[int, int, int]", (np.int64(3), np.int64(0), np.int64(2)))
+    high_ms, iti_s = cast("tuple[float, float]", (np.float32(space.high_ms), np.float32(5)))
+    strategy = make_strategy("even", space, seed, max_trials=np.int64(2), particles=np.int64(64))
+    limits = Limits(low_ms, high_ms, iti_s, pulses)
     result = Session(ScriptedDevice(), strategy, log=log, limits=limits).run()
     assert len(result.trials) == 2
     assert read_session(log).header.strategy.settings["particles"] == 64

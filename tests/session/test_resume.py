@@ -26,7 +26,8 @@ from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Measurement, MistrialReason, Stimulus
-from scripted import ScriptedDevice, scripted_strategy
+from known import known
+from scripted import ScriptedDevice, scripted_strategy, told_to
 
 
 @pytest.fixture
@@ -86,7 +87,7 @@ def test_resuming_a_finished_session_delivers_nothing(log: Path) -> None:
     assert len(read_session(log).table) == 3
 
 
-def kill_during_trial_4(log: Path, isi_ms: float) -> None:
+def kill_during_trial_4(log: Path, isi_ms: float | None) -> None:
     with LogWriter.continuing(log, salvage(log), read_session(log).header) as writer:
         writer.append(Intent(trial=4, isi_ms=isi_ms))
 
@@ -103,7 +104,7 @@ def test_a_stimulus_without_outcome_becomes_a_mistrial_and_is_asked_again(
     assert device.delivered[0].trial == 5
     assert device.delivered[0].isi_ms == uninterrupted[4]
     assert len(result.trials) == 10
-    assert len(session.strategy.posterior.told) == 9
+    assert len(told_to(session.strategy)) == 9
 
 
 def test_earlier_stimuli_count_against_the_limits(interrupted: Path, space: DesignSpace) -> None:
@@ -165,7 +166,7 @@ def test_an_ask_that_was_answered_by_the_fallback_is_replayed_as_logged(
 ) -> None:
     strategy = scripted_strategy(10)
     asked = strategy.ask
-    monkeypatch.setattr(strategy, "ask", lambda _=None: 1.0 if len(strategy.posterior.told) == 2 else asked())
+    monkeypatch.setattr(strategy, "ask", lambda _=None: 1.0 if len(told_to(strategy)) == 2 else asked())
     with pytest.raises(KeyboardInterrupt):
         Session(ScriptedDevice(), strategy, log=log, on_trial=stop_after(5)).run()
     with pytest.raises(StrategyError, match="trial 2"):
@@ -182,14 +183,25 @@ def test_an_ask_that_was_answered_by_the_fallback_is_replayed_as_logged(
 def test_the_times_allowed_are_those_of_the_log_or_of_the_call(
     log: Path, monkeypatch: pytest.MonkeyPatch, overrides: dict[str, Any], timeout_s: float, ask_deadline_s: float
 ) -> None:
-    times = {"timeout_s": 7.0, "ask_deadline_s": 40.0}
+    times: dict[str, Any] = {"timeout_s": 7.0, "ask_deadline_s": 40.0}
     with pytest.raises(KeyboardInterrupt):
         Session(ScriptedDevice(), scripted_strategy(4), log=log, on_trial=stop_after(2), **times).run()
-    device, deadlines, timeouts = ScriptedDevice(), [], []
+    device = ScriptedDevice()
+    deadlines: list[float | None] = []
+    timeouts: list[float] = []
     session = resume(log, device, scripted_strategy(4), **overrides)
     ask, deliver = session.strategy.ask, device.deliver
-    monkeypatch.setattr(session.strategy, "ask", lambda s=None: deadlines.append(s) or ask(s))
-    monkeypatch.setattr(device, "deliver", lambda stimulus, s: timeouts.append(s) or deliver(stimulus, s))
+
+    def timed_ask(deadline_s: float | None = None) -> float:
+        deadlines.append(deadline_s)
+        return ask(deadline_s)
+
+    def timed_deliver(stimulus: Stimulus, timeout_s: float) -> Any:
+        timeouts.append(timeout_s)
+        return deliver(stimulus, timeout_s)
+
+    monkeypatch.setattr(session.strategy, "ask", timed_ask)
+    monkeypatch.setattr(device, "deliver", timed_deliver)
     session.run()
     assert (set(timeouts), set(deadlines)) == ({timeout_s}, {ask_deadline_s})
 
@@ -204,7 +216,7 @@ def test_an_exclusion_counts_from_where_it_stands(interrupted: Path, uninterrupt
     device = ScriptedDevice()
     session = resume(interrupted, device, scripted_strategy(10))
     session.run()
-    assert len(session.strategy.posterior.told) == 9
+    assert len(told_to(session.strategy)) == 9
     expected = scripted_strategy(10)
     for trial in session.trials.told[:3]:
         expected.tell(trial.isi_ms, trial.mep_mv)
@@ -252,7 +264,7 @@ def test_a_log_with_a_lost_trial_goes_on_after_an_exclusion(interrupted: Path) -
     result = session.run()
     assert [trial.index for trial in result.trials] == list(range(10))
     assert [trial.index for trial in result.trials if not trial.told] == [1, 2]
-    assert len(session.strategy.posterior.told) == 8
+    assert len(told_to(session.strategy)) == 8
 
 
 def test_what_was_asked_before_an_exclusion_is_compared_as_it_was_asked(
@@ -272,7 +284,7 @@ def test_a_stimulus_of_which_nothing_is_left_is_compared_with_nothing(
     with LogWriter.continuing(interrupted, salvage(interrupted), read_session(interrupted).header) as writer:
         writer.append(Intent(trial=5, isi_ms=77.0))  # intent and trial 4 are lost; what was told of it is not known
     result = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
-    assert [trial.commanded_isi_ms for trial in result.trials[4:6]] == [None, 77.0]
+    assert [trial.commanded_isi_ms for trial in list(result.trials)[4:6]] == [None, 77.0]
     again = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert again.trials == result.trials
 
@@ -339,7 +351,7 @@ def test_a_default_session_with_a_drifting_person_goes_on_as_if_never_interrupte
 VICTIM = """
 import sys, time
 sys.path.insert(0, {tests!r})
-from conftest import ScriptedDevice, scripted_strategy
+from scripted import ScriptedDevice, scripted_strategy, told_to
 from isiw.devices.clock import VirtualClock
 from isiw.session.loop import Session
 
@@ -352,7 +364,7 @@ point, answer, tell = {point!r}, device.answer, strategy.tell
 if point == "while the device delivers":
     device.answer = lambda stimulus: hang() if stimulus.trial == 4 else answer(stimulus)
 elif point == "before the trial is told":
-    strategy.tell = lambda *a, **k: hang() if len(strategy.posterior.told) == 3 else tell(*a, **k)
+    strategy.tell = lambda *a, **k: hang() if len(told_to(strategy)) == 3 else tell(*a, **k)
 elif point == "after the trial was reported":
     on_trial = lambda update: hang() if update.trial.index == 3 else None
 else:
@@ -376,7 +388,7 @@ def test_a_killed_session_loses_nothing_and_asks_the_same_again(
 ) -> None:
     script = VICTIM.format(tests=str(Path(__file__).parents[1]), point=point, log=str(log))
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as victim:  # noqa: S603
-        assert victim.stdout.readline() == "hanging\n"
+        assert known(victim.stdout).readline() == "hanging\n"
         victim.send_signal(signal.SIGKILL)
     assert victim.returncode == -signal.SIGKILL
     killed = read_session(log)
@@ -393,10 +405,10 @@ def test_a_killed_session_loses_nothing_and_asks_the_same_again(
 
 def test_a_measured_zero_and_its_uncertainty_are_replayed(log: Path) -> None:
     def answer(stimulus: Stimulus) -> Measurement:
-        return Measurement(0.0, stimulus.isi_ms + 0.25, isi_sd_ms=2.0)
+        return Measurement(0.0, known(stimulus.isi_ms) + 0.25, isi_sd_ms=2.0)
 
     with pytest.raises(KeyboardInterrupt):
         Session(ScriptedDevice(answer), scripted_strategy(10), log=log, on_trial=stop_after(2)).run()
     session = resume(log, ScriptedDevice(answer), scripted_strategy(10))
-    assert [mep for _, mep in session.strategy.posterior.told] == [0.0, 0.0]
+    assert [mep for _, mep in told_to(session.strategy)] == [0.0, 0.0]
     assert [trial.isi_sd_ms for trial in session.trials] == [2.0, 2.0]

@@ -27,7 +27,7 @@ def test_noise_doubled_with_hum_drift_and_a_weaker_hit_leaves_95_of_100_within_1
 
 
 @pytest.mark.parametrize("harsh", [False, True])
-def test_a_hammer_that_sticks_is_never_given_an_impact(harsh: bool) -> None:
+def test_a_hammer_that_sticks_is_never_given_an_impact(*, harsh: bool) -> None:
     still = render("subject1", n=100, seed=12, harsh=harsh, faults=Faults(stuck_probability=1.0))
     assert np.isnan(impact_times(still.waves["acceleration"], 5000.0)).all()
 
@@ -63,7 +63,7 @@ def test_batch_and_single_sweep_agree() -> None:
 
 
 @pytest.mark.parametrize("unit", [0.001, 1 / 9.81, 1000.0])
-def test_the_unit_and_offset_of_the_acceleration_do_not_matter(unit: str) -> None:
+def test_the_unit_and_offset_of_the_acceleration_do_not_matter(unit: float) -> None:
     waves = render("subject3", n=20).waves["acceleration"]
     np.testing.assert_allclose(impact_times(unit * waves + 5.0 * unit, 5000.0), impact_times(waves, 5000.0), atol=1e-6)
 

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from isiw.signals import MEP_WINDOWS_MS, background_rms, is_saturated, mep_amplitudes, mep_onsets, mep_present
+from isiw.types import FloatArray
 
 PULSE_MS, RATE_HZ = 50.0, 3000.0
+
+Recorded: TypeAlias = tuple[FloatArray, pd.DataFrame, tuple[float, float]]
+"""Sweeps of EMG [mV], what the toolbox found in them, and the window of their MEPs [ms]."""
 
 
 @pytest.fixture(params=[("ID10_1_ECR", "ID10_1", "forearm"), ("ID01_FDI", "ID01", "hand")], ids=["ECR", "FDI"])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from isiw.strategy.stopping import (
     NoWindow,
     ParticleSpread,
     Progress,
+    StopDecision,
     SweptPast,
     looks_back,
     stimuli_left,
@@ -128,7 +131,7 @@ def test_any_of_no_rules_would_never_stop_and_is_refused() -> None:
     ],
 )
 @pytest.mark.parametrize("edges_ms", [None, edges_with_width(5)])
-def test_every_reason_is_a_full_sentence(decide: object, edges_ms: object) -> None:
+def test_every_reason_is_a_full_sentence(decide: Callable[[Progress], StopDecision], edges_ms: Any) -> None:
     reason = decide(progress(edges_ms=edges_ms)).reason
     assert not reason[0].islower()
     assert reason.endswith(".")

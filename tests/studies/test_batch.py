@@ -17,6 +17,7 @@ from isiw.strategy.stopping import EdgeVariance
 from isiw.strategy.strategy import Strategy
 from isiw.studies import SimulatedSession, simulate
 from isiw.studies.batch import simulate_batch
+from isiw.studies.sessions import Stopping
 from isiw.subjects.subject import Responder, Response
 from isiw.types import Reference
 from studies.tiny import FEW, timeless
@@ -67,7 +68,8 @@ def test_where_nothing_is_drawn_a_batch_is_its_sessions(strategy: str, trials: i
 def test_each_person_is_asked_by_a_draw_of_its_own_where_the_acquisition_function_draws(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    asked, usual = {}, Responder.respond
+    asked: dict[float, list[float]] = {}
+    usual = Responder.respond
 
     def respond(responder: Responder, isi_ms: float, reference: Reference) -> Response:
         asked.setdefault(responder.subject.hit_delay_ms, []).append(isi_ms)
@@ -113,7 +115,7 @@ class NaNForOne:
 
     needs: tuple[type, ...] = ()
 
-    def __call__(self, posterior: Any, isi_ms: float) -> torch.Tensor:
+    def __call__(self, posterior: Any, isi_ms: torch.Tensor) -> torch.Tensor:
         scores = torch.zeros((posterior.told.people, len(isi_ms)))
         scores[:, 7] = 1.0
         scores[1:2] = math.nan

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -36,6 +37,6 @@ def test_the_example_in_python_runs(
 
 def test_every_column_of_a_row_is_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    names = {"__name__": "docs"}
+    names: dict[str, Any] = {"__name__": "docs"}
     exec(compile(blocks("python")[0], "studies.md", "exec"), names)  # noqa: S102 - as above
     assert [name for name in names["rows"].columns if f"`{name}`" not in TEXT] == []

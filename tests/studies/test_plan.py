@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 import tomli_w
@@ -96,4 +97,4 @@ def test_an_unknown_strategy_is_told_with_the_known_ones(tmp_path: Path) -> None
 
 def test_from_python_what_cannot_be_is_refused_as_well() -> None:
     with pytest.raises(InvalidValueError, match="engine is unknown"):
-        Study((StudyStrategy("even"),), ("wide",), engine="fast")
+        Study((StudyStrategy("even"),), ("wide",), engine=cast("Any", "fast"))

@@ -9,21 +9,23 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import psutil
 import pytest
 
 from isiw.errors import ConfigError, StudyError
-from isiw.studies import Processes, Study, begin_store, conduct, load_study, open_store, replay, unit_of_row
+from isiw.studies import Processes, Study, begin_store, conduct, load_study, open_store, replay, sessions, unit_of_row
 from isiw.studies import plan as plan_module
+from isiw.studies.plan import Engine, Unit
 from isiw.studies.sessions import SimulatedSession
 from studies.tiny import TOML, timeless, tiny
 
 posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 
 
-def keys_run(study: Study, folder: Path, **how: object) -> list[str]:
+def keys_run(study: Study, folder: Path, **how: Any) -> list[str]:
     """The keys of the units that a run of the study had to run."""
     keys: list[str] = []
     conduct(study, folder, on_done=lambda unit, _result: keys.append(unit.key), **how)
@@ -31,9 +33,9 @@ def keys_run(study: Study, folder: Path, **how: object) -> list[str]:
 
 
 @pytest.fixture
-def crash(monkeypatch: pytest.MonkeyPatch) -> None:
+def crash(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Makes the sessions of one strategy raise."""
-    usual = plan_module.simulate
+    usual = sessions.simulate
 
     def simulate(session: SimulatedSession) -> pd.DataFrame:
         if session.strategy == "incremental" and session.cohort == "nonresponder":
@@ -87,7 +89,7 @@ def test_a_folder_without_a_study_is_an_error(tmp_path: Path) -> None:
         open_store(tmp_path)
 
 
-def test_a_strategy_that_crashes_is_reported_and_the_study_finishes(tmp_path: Path, crash: None) -> None:
+def test_a_strategy_that_crashes_is_reported_and_the_study_finishes(tmp_path: Path, crash: pytest.MonkeyPatch) -> None:
     store = conduct(tiny(), tmp_path)
     errors = store.errors()
     assert errors["person"].tolist() == [0, 1, 2]
@@ -146,9 +148,10 @@ def workers_of(process: psutil.Process) -> list[psutil.Process]:
 
 @posix
 def test_the_death_of_a_worker_in_mid_study_loses_no_row(tmp_path: Path) -> None:
-    study, killed, keys = tiny(people=6), [], []
+    study, killed = tiny(people=6), list[int]()
+    keys: list[str] = []
 
-    def on_done(unit: str, _result: object) -> None:
+    def on_done(unit: Unit, _result: object) -> None:
         keys.append(unit.key)
         if len(keys) == 4:
             victim = workers_of(psutil.Process())[0]
@@ -168,7 +171,7 @@ COMMAND = [sys.executable, "-c", f"{LISTEN}; from isiw.cli import app; app()"]
 
 
 @pytest.fixture
-def started(tmp_path: Path) -> Iterator[Started]:
+def started(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     """A study that runs in another process, some of it finished; its workers must not outlive it."""
     (tmp_path / "tiny.toml").write_text(TOML.replace("people = 12", "people = 80"))
     parts = tmp_path / "tiny.study" / "parts"
@@ -197,7 +200,9 @@ def finished_to_the_end(folder: Path) -> pd.DataFrame:
 
 
 @posix
-def test_the_death_of_the_main_process_in_mid_study_loses_no_row(tmp_path: Path, started: Started) -> None:
+def test_the_death_of_the_main_process_in_mid_study_loses_no_row(
+    tmp_path: Path, started: subprocess.Popen[str]
+) -> None:
     started.kill()
     started.wait(timeout=10)
     rows = finished_to_the_end(tmp_path / "tiny.study")
@@ -206,7 +211,7 @@ def test_the_death_of_the_main_process_in_mid_study_loses_no_row(tmp_path: Path,
 
 
 @posix
-def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path: Path, started: Started) -> None:
+def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path: Path, started: subprocess.Popen[str]) -> None:
     os.killpg(started.pid, signal.SIGINT)  # a terminal tells the workers, too
     _, errors = started.communicate(timeout=30)
     assert started.returncode == 130, errors

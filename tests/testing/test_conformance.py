@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -139,7 +140,7 @@ def moody(_posterior: object, isi_ms: Tensor) -> Tensor:
 class Scoring:
     """An acquisition function of a plain function."""
 
-    score: Any
+    score: Callable[[Any, Tensor], Tensor]
     needs: tuple[type, ...] = ()
 
     def __call__(self, posterior: object, isi_ms: Tensor) -> Tensor:
@@ -174,7 +175,7 @@ class Forgetful(Strategy):
 class Gullible(Strategy):
     """Accepts whatever it is told."""
 
-    def tell(self, isi_ms: float, mep_mv: float = None, **others: Any) -> None:
+    def tell(self, isi_ms: float | None, mep_mv: float | None = None, **others: Any) -> None:
         if mep_mv is not None and mep_mv >= 0:
             super().tell(isi_ms, mep_mv, **others)
 

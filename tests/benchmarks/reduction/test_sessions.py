@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ def test_without_accelerometer_500_ms_from_the_valve_command_are_searched() -> N
 
 
 @pytest.mark.parametrize(("end", "length_ms"), [("valve", 320.0), ("hit", 500.0)])
-def test_with_accelerometer_the_range_begins_at_the_impact(end: str, length_ms: float) -> None:
+def test_with_accelerometer_the_range_begins_at_the_impact(end: Literal["valve", "hit"], length_ms: float) -> None:
     where = searched(replace(HIT, reading=Reading(range_end=end)), 182.0)
     assert where.space.reference == "impact"
     assert (where.space.low_ms, where.space.high_ms, where.offset_ms) == (0.0, length_ms, 180.0)

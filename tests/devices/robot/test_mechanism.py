@@ -89,10 +89,10 @@ def test_faults_come_as_often_as_their_probability() -> None:
         {"hit": (183.0, 0.1)},
     ],
 )
-def test_an_impossible_geometry_is_an_error(wrong: dict[str, Any]) -> None:
-    times: dict[str, Any] = {"descent": (131.0, 5.0), "hit": (183.0, 4.0), "contact": (15.0, 1.0)} | wrong
+def test_an_impossible_geometry_is_an_error(wrong: dict[str, tuple[float, float]]) -> None:
+    times = {"descent": (131.0, 5.0), "hit": (183.0, 4.0), "contact": (15.0, 1.0)} | wrong
     with pytest.raises(InvalidValueError):
-        Geometry(**{name: Event(*mean_sd) for name, mean_sd in times.items()})
+        Geometry(Event(*times["descent"]), Event(*times["hit"]), Event(*times["contact"]))
 
 
 @pytest.mark.parametrize("wrong", [{"stuck_probability": 1.5}, {"late_probability": 0.1, "late_ms": (20.0, 10.0)}])

@@ -52,11 +52,11 @@ def realised_ms(sweep: Sweep) -> float:
 def tapper(
     geometry: str | Geometry = "subject2",
     *,
-    respond: Callable[[float | None], Evoked] = Listener(),
+    respond: Callable[[float | None], Evoked] | None = None,
     seed: int = 0,
     **settings: Any,
 ) -> SimulatedDevice:
-    device = SimulatedDevice(Tapper(respond, geometry, TapperSettings(**settings), seed=seed))
+    device = SimulatedDevice(Tapper(respond or Listener(), geometry, TapperSettings(**settings), seed=seed))
     device.stage()
     return device
 
@@ -73,7 +73,7 @@ def test_it_is_a_device_with_a_memory() -> None:
 
 
 @pytest.mark.parametrize(("trigger", "accelerometer"), [("open-loop", True), ("open-loop", False), ("impact", True)])
-def test_it_keeps_what_every_device_promises(trigger: Trigger, accelerometer: bool) -> None:
+def test_it_keeps_what_every_device_promises(trigger: Trigger, *, accelerometer: bool) -> None:
     def made(reference: Reference) -> SimulatedDevice:
         subject = cohort("recruitment", 1, 0)[0].begin(1)
         settings = TapperSettings(reference=reference, trigger=trigger, accelerometer=accelerometer)

@@ -19,6 +19,7 @@ from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
 from isiw.testing import check_model
+from isiw.types import ArrayLike
 from known import known
 from models.told_trials import bell_mv, observation, told
 
@@ -26,10 +27,10 @@ PF = BootstrapFilter()
 STILL = BootstrapFilter(diffusion_ms=0.0)
 
 
-def generation(posterior: BootstrapPosterior, mep_mv: Callable[[float], float]) -> BootstrapPosterior:
+def generation(posterior: BootstrapPosterior, mep_mv: Callable[[float], ArrayLike]) -> BootstrapPosterior:
     """After all particles were measured, with MEPs by ISI."""
     for isi_ms in posterior.proposed_isis_ms()[0].tolist():
-        posterior = posterior.model.update(posterior, observation([isi_ms], [float(mep_mv(isi_ms))]))
+        posterior = posterior.model.update(posterior, observation([isi_ms], [np.asarray(mep_mv(isi_ms)).item()]))
     return posterior
 
 

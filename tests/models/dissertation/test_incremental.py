@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Never
 
 import numpy as np
 import pytest
@@ -12,8 +12,7 @@ import torch
 from isiw.acquisition.fixed import IncrementalSweep
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.dissertation.incremental import SweepModel
-from isiw.models.protocol import Posterior
+from isiw.models.dissertation.incremental import SweepModel, SweepPosterior
 from isiw.models.shared.floor import FloorTreatment
 from isiw.strategy.catalogue import make_strategy
 from isiw.testing import check_model
@@ -26,14 +25,17 @@ BRIEF = SweepModel(step_ms=20.0, trials_per_isi=4, discarded=2, neighbours=1)
 BASELINE = [(None, 0.01), (None, 0.02)]
 
 
-def swept(model: SweepModel, means_mv: list[float], startle_mv: float = 0.0, spread_mv: float = 0.001) -> Posterior:
+def swept(
+    model: SweepModel, means_mv: list[float], startle_mv: float = 0.0, spread_mv: float = 0.001
+) -> SweepPosterior:
     """After a sweep of SPACE with these means, the first two trials of each ISI enlarged."""
     trials = []
     for stop, mean_mv in enumerate(means_mv):
         for k in range(model.trials_per_isi):
             startle = startle_mv if k < model.discarded else 0.0
             trials.append((stop * model.step_ms, mean_mv + startle + spread_mv * (-1) ** k))
-    return told(model, [*BASELINE, *trials], SPACE)
+    posterior: SweepPosterior = told(model, [*BASELINE, *trials], SPACE)
+    return posterior
 
 
 def test_the_first_two_trials_at_each_isi_are_discarded() -> None:
@@ -106,14 +108,19 @@ def test_a_second_sweep_adds_to_the_first() -> None:
 
 
 @dataclass(frozen=True)
-class AmplitudeHistory:
+class Counted:
+    """A posterior of which only the number of trials matters."""
+
     trials: int
+
+    def estimate(self, person: int = 0) -> Never:
+        raise AssertionError(person)
 
 
 def test_it_goes_where_the_incremental_design_goes() -> None:
     plan = SweepModel().begin(VALVE_SPACE, 0).proposed_isis_ms()[0]
     grid = torch.arange(0.0, 501.0, 5.0)
-    picks = [float(grid[IncrementalSweep()(AmplitudeHistory(trial), grid).argmax()]) for trial in range(1212)]
+    picks = [float(grid[IncrementalSweep()(Counted(trial), grid).argmax()]) for trial in range(1212)]
     assert plan.tolist() == picks
 
 

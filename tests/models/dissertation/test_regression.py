@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -127,4 +128,4 @@ def test_a_response_without_its_amplitude_is_refused() -> None:
 
 def test_an_unknown_word_for_the_segments_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="peak or all"):
-        RegressionModel(NonlinearRegression(), segments="some")
+        RegressionModel(NonlinearRegression(), segments=cast("Any", "some"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def trials(n: int = 30, seed: int = 0, alone: int = 0) -> PersonTrials:
     return PersonTrials(isis_ms, expected_mv * rng.lognormal(0, 0.5, n), 0.01 * rng.lognormal(0, 0.5, alone))
 
 
-def fitted(told: PersonTrials, **options: bool) -> Fit:
+def fitted(told: PersonTrials, **options: Any) -> Fit:
     return fit(PRIOR, "rbf", scale_of(told.mep_mv, "log", 0.005), told, **options)
 
 

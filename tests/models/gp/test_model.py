@@ -110,7 +110,7 @@ def test_it_has_the_capabilities_that_it_says() -> None:
 def test_it_finds_the_window_of_clear_people() -> None:
     for person in (0, 1, 2, 4, 5):
         found = estimate(GaussianProcess(), evenly("gaussian", 40, person))
-        truth = cohort("gaussian", person + 1, 0)[person].window(VALVE_SPACE)
+        truth = known(cohort("gaussian", person + 1, 0)[person].window(VALVE_SPACE))
         assert known(found.probability) > 0.9
         assert known(found.window).start_ms < truth.start_ms + 0.4 * truth.width_ms
         assert known(found.window).end_ms > truth.end_ms - 0.4 * truth.width_ms
@@ -129,7 +129,7 @@ def test_a_flat_profile_becomes_ever_more_certain_to_be_flat() -> None:
 
 def test_without_trials_it_believes_what_was_believed_before() -> None:
     # Of the paths that change something, some rise too little to have a window.
-    probability = FEW.begin(VALVE_SPACE, 0).estimate().probability
+    probability = known(FEW.begin(VALVE_SPACE, 0).estimate().probability)
     assert 0.6 < probability <= FEW.process.prior.p_window + 0.01
 
 

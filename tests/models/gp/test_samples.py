@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from botorch.posteriors.gpytorch import GPyTorchPosterior
 
 from isiw.design import DesignSpace
 from isiw.models.gp.fit import fixed_fit
@@ -118,6 +119,7 @@ def test_drawn_paths_have_the_mean_and_the_covariance_of_the_process() -> None:
     level = draw_paths(fit, isi_ms, 20_000, rng).level
     with torch.no_grad():
         posterior = fit.regression(torch.tensor(0)).posterior(isi_ms[:, None])
+    assert isinstance(posterior, GPyTorchPosterior)
     mean, covariance = -4.0 + 0.7 * posterior.mean[:, 0], 0.49 * posterior.distribution.covariance_matrix
     error = covariance.diagonal().sqrt() / 20_000**0.5
     assert ((level.mean(0) - mean).abs() < 5 * error).all()

@@ -141,7 +141,7 @@ def test_an_estimate_knows_the_noise_that_its_samples_suppose() -> None:
     posterior.latents.z[..., width] = torch.where(recruits, 2.5, -2.5)
     weights = torch.linspace(-3.0, 3.0, recruits.shape[-1]).unsqueeze(0)  # every pick is another particle than its own
     estimate = replace(posterior, log_weights=torch.log_softmax(weights, -1)).estimate()
-    edges_ms, kinds = estimate.edge_samples_ms, estimate.hypotheses
+    edges_ms, kinds = known(estimate.edge_samples_ms), known(estimate.hypotheses)
     assert set(kinds.tolist()) == {NoiseKind.CONSTANT_CV, NoiseKind.FOREARM}
     inside = np.isfinite(edges_ms).all(1)
     widths_ms = edges_ms[inside, 1] - edges_ms[inside, 0]

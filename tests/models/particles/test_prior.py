@@ -13,6 +13,7 @@ from isiw.models.particles.prior import (
     FloorPrior,
     GainPrior,
     NoiseShares,
+    Person,
     Prior,
     ProfilePrior,
     SessionPrior,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.models.shared.floor import FloorTreatment
+from isiw.models.shared.floor import FloorKind, FloorTreatment
 from isiw.models.shared.history import PersonTrials
 
 
@@ -26,7 +26,7 @@ def test_without_tms_alone_the_floor_is_the_median_of_all_meps() -> None:
 
 
 @pytest.mark.parametrize("kind", ["zeroed", "raw"])
-def test_only_a_subtracted_floor_is_above_zero(kind: Kind) -> None:
+def test_only_a_subtracted_floor_is_above_zero(kind: FloorKind) -> None:
     assert FloorTreatment(kind).level_mv(trials([0.1, 0.2], [0.01])) == 0.0
 
 
