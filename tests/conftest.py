@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from isiw.design import DesignSpace
 from scripted import SPACE
+
+hypothesis.settings.register_profile("isiw", deadline=None)  # how fast a machine is, is not what is tested
+hypothesis.settings.load_profile("isiw")
 
 
 @pytest.fixture

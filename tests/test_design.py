@@ -110,6 +110,11 @@ def test_a_space_that_cannot_be_is_refused(fields: dict[str, Any]) -> None:
         DesignSpace(**fields)
 
 
+def test_a_space_is_printed_with_the_event_that_its_isis_count_from() -> None:
+    assert str(DesignSpace(0, 500, reference="valve")) == "0–500 ms after the valve command, every 1 ms"
+    assert str(DesignSpace(10, 50, 2.5)) == "10–50 ms after the impact, every 2.5 ms"
+
+
 def test_the_grid_cannot_be_written_to() -> None:
     with pytest.raises(ValueError, match="read-only"):
         VALVE_SPACE.grid_ms[0] = 1.0

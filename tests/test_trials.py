@@ -121,6 +121,12 @@ def test_indices_ascend(indices: tuple[int, int]) -> None:
         TrialTable(tuple(accepted(index) for index in indices))
 
 
+def test_a_table_is_printed_as_its_counts() -> None:
+    assert str(TrialTable((accepted(0),))) == "1 delivered, 1 told"
+    table = TrialTable((accepted(0), mistrial(1), mistrial(2), accepted(3))).excluding([3])
+    assert str(table) == "4 delivered, 1 told, 2 mistrials (2 no pulse), 1 excluded"
+
+
 def test_the_frame_has_a_row_a_trial_and_its_values() -> None:
     frame = TrialTable((accepted(0, 0.07), mistrial(2))).to_frame()
     assert frame.index.tolist() == [0, 2]

@@ -172,6 +172,22 @@ def test_an_edge_beyond_the_range_makes_an_infinite_interval_and_never_nan() -> 
     assert intervals == ((-math.inf, 30.0), (50.0, math.inf))
 
 
+def test_an_estimate_is_printed_with_its_probability_medians_and_intervals() -> None:
+    edges_ms = np.array([[-math.inf, 150.0], [30.0, 160.0], [34.0, math.inf]])
+    estimate = WindowEstimate(0.876, Window(31.6, 158.0), 30.0, 160.0, edge_samples_ms=edges_ms)
+    assert str(estimate).splitlines() == [
+        "Window: 31.6–158 ms (probability of a window: 0.88)",
+        "Start: 30 ms, 90 % interval before the range to 34 ms",
+        "End: 160 ms, 90 % interval 150 ms to beyond the range",
+    ]
+
+
+def test_an_estimate_is_printed_without_what_it_does_not_have() -> None:
+    assert str(WindowEstimate(None, Window(10, 40))) == "Window: 10–40 ms"
+    no_window = WindowEstimate(0.2, None, 10.0, 40.0, edge_samples_ms=np.array([[10.0, 40.0]]))
+    assert str(no_window) == "Window: none (probability of a window: 0.20)"
+
+
 def test_the_robust_interval_is_the_hull_over_probable_hypotheses() -> None:
     rng = np.random.default_rng(6)
     hypotheses = rng.choice(4, 2000, p=[0.6, 0.3, 0.09, 0.01])

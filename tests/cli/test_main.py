@@ -11,6 +11,7 @@ from typing import TypeAlias
 import pytest
 from typer.testing import CliRunner, Result
 
+from isiw import __version__
 from isiw.cli import app
 from isiw.config.run import true_window
 from isiw.log.reader import read_session
@@ -69,6 +70,35 @@ def test_run_with_recorded_emg_logs_the_raw_sweeps(isiw: Command, short: Path, r
     record = read_session("r.mcap")
     assert [len(record.sweep(trial)["emg"].values) for trial in range(3)] == [451] * 3
     assert len(record.table.told) == 3
+
+
+def test_the_version_is_shown(isiw: Command) -> None:
+    result = isiw("--version")
+    assert (result.exit_code, result.output) == (0, f"isiw {__version__}\n")
+
+
+def test_a_strategys_settings_are_listed_as_a_configuration_has_them_with_unit_and_meaning(isiw: Command) -> None:
+    output = isiw("strategies", "default").output
+    assert "\nmax_trials = 80\n    stop after this many stimuli; mistrials count." in output
+    assert "\nstop_width_ms = 30.0  # ms\n" in output
+    assert "\nprior.profile.width_ms = [100.0, 0.42, 0.02]  # ms; median, sd, tail\n" in output
+    assert "\nprior.profile\n" in output
+    assert "\nfixed  # not set\n" in isiw("strategies", "gp-variance").output
+
+
+def test_what_is_listed_can_be_set(isiw: Command, tmp_path: Path) -> None:
+    listed = isiw("strategies", "default").output.splitlines()
+    lines = [line for line in listed if " = " in line and not line.startswith(" ")]
+    (tmp_path / "all.toml").write_text("\n".join(["[strategy.settings]", *lines]).replace("= 80", "= 2"))
+    result = isiw("run", "all.toml")
+    assert result.exit_code == 0, result.output
+    assert "The budget of 2 stimuli is used up." in result.output
+
+
+def test_the_settings_of_an_unknown_strategy_name_the_known_ones(isiw: Command) -> None:
+    result = isiw("strategies", "defualt")
+    assert result.exit_code == 1
+    assert "expected default, particles-window" in result.stderr
 
 
 def test_strategies_are_listed_and_can_be_named(isiw: Command, short: Path) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,15 @@ def test_an_intent_without_a_trial_is_unknown(tmp_path: Path, header: Header) ->
         write_trials(log, range(2))
         log.append(Intent(trial=2, isi_ms=77.0))
     assert [(i.trial, i.isi_ms) for i in read_session(tmp_path / "s.mcap").unknown] == [(2, 77.0)]
+
+
+def test_a_record_is_printed_with_what_is_unknown_and_what_is_lost(tmp_path: Path, header: Header) -> None:
+    with LogWriter.create(tmp_path / "s.mcap", header) as log:
+        write_trials(log, range(2))
+        log.append(Intent(trial=2, isi_ms=30.0))
+    record = read_session(tmp_path / "s.mcap")
+    assert "\nTrials: 2 delivered, 2 told, 1 of unknown outcome\n" in str(record)
+    assert "\nLost: the end.\nLog: " in str(replace(record, losses=("the end.",)))
 
 
 def test_before_the_first_trial_there_is_no_decision(tmp_path: Path, header: Header) -> None:

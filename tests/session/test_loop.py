@@ -49,6 +49,20 @@ def test_a_session_runs_to_its_budget_and_logs_everything(log: Path) -> None:
     assert record.losses == ()
 
 
+def test_a_result_and_its_record_are_printed_in_a_few_lines(log: Path) -> None:
+    result = Session(ScriptedDevice(), scripted_strategy(2), log=log, subject="P07").run()
+    found = [str(result.estimate), "Ended: The budget of 2 stimuli is used up.", f"Log: {log}"]
+    assert str(result).split("\n") == [*found[0].split("\n"), "Trials: 2 delivered, 2 told", *found[1:]]
+    record = read_session(log)
+    assert str(record).split("\n") == [
+        f"Session of P07, {record.header.created}",
+        "Strategy: of a user's own objects, seed 0, 0–200 ms after the valve command, every 1 ms",
+        "Trials: 2 delivered, 2 told",
+        *found[0].split("\n"),
+        *found[1:],
+    ]
+
+
 def test_each_trial_is_logged_as_intent_then_trial_then_estimate(log: Path) -> None:
     Session(ScriptedDevice(), scripted_strategy(2), log=log).run()
     assert [type(entry) for entry in read_session(log).history] == [Intent, Trial, Estimate] * 2

@@ -102,6 +102,19 @@ def test_a_restarted_strategy_keeps_its_recipe_and_forgets_its_mistrials() -> No
     assert (strategy.decision().stop, again.decision().stop) == (True, False)
 
 
+def test_a_strategy_is_printed_with_what_it_is_made_of_and_what_it_knows() -> None:
+    strategy = make_strategy("even", particles=64, seed=3)
+    strategy.tell(250.0, 0.1)
+    strategy.count_mistrial()
+    assert str(strategy).splitlines() == [
+        "Strategy 'even', seed 3",
+        "Space: 0–500 ms after the valve command, every 1 ms",
+        "Model: ParticleModel, asked by EvenSpacing",
+        "Trials: 1 told, 1 mistrials",
+    ]
+    assert str(scripted_strategy()).startswith("Strategy, seed 0\n")
+
+
 REFUSED = [
     ({"isi_ms": 250.0, "mep_mv": math.nan}, InvalidValueError, "mep_mv"),
     ({"isi_ms": 250.0, "mep_mv": math.inf}, InvalidValueError, "mep_mv"),

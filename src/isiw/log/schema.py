@@ -29,7 +29,7 @@ from isiw.signals.judgement import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window, WindowEstimate, finding
 
 __all__ = [
     "ANNOUNCEMENT",
@@ -179,6 +179,10 @@ class Estimate(_Record):
             reason=decision.reason,
             **_profile(estimate),
         )
+
+    def __str__(self) -> str:
+        start = (self.start_ms, self.start_low_ms, self.start_high_ms)
+        return finding(self.probability, self.window, start, (self.end_ms, self.end_low_ms, self.end_high_ms))
 
     @property
     def window(self) -> Window | None:

@@ -72,6 +72,9 @@ class SessionResult:
     trials: TrialTable
     log: Path
 
+    def __str__(self) -> str:
+        return f"{self.estimate}\nTrials: {self.trials}\nEnded: {self.decision.reason}\nLog: {self.log}"
+
 
 def versions() -> dict[str, str]:
     """The versions that what a strategy asks depends on, by package."""
