@@ -22,7 +22,13 @@ NO_DEFAULT: dict[str, Any] = {"show_default": False}
 
 
 def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:
-    """Print, coloured where the output is a terminal."""
+    """Print, coloured where the output is a terminal.
+
+    Args:
+        text: what to print.
+        style: one of rich's.
+        stderr: on standard error instead.
+    """
     Console(stderr=stderr, highlight=False, soft_wrap=True).print(text, style=style, markup=False)
 
 

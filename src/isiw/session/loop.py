@@ -83,7 +83,12 @@ def versions() -> dict[str, str]:
 
 
 def learn(strategy: Strategy, trial: Trial) -> None:
-    """Tell a strategy one trial, or count it where there is nothing to tell."""
+    """Tell a strategy one trial, or count it where there is nothing to tell.
+
+    Args:
+        strategy: the strategy.
+        trial: the trial.
+    """
     if trial.told:
         strategy.tell(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
     else:
