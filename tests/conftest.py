@@ -6,10 +6,12 @@ from pathlib import Path
 
 import hypothesis
 import pytest
+import torch
 
 from isiw.design import DesignSpace
 from scripted import SPACE
 
+torch.set_num_threads(1)  # workers share the cores, and answers are the same again with one thread only
 hypothesis.settings.register_profile("isiw", deadline=None)  # how fast a machine is, is not what is tested
 hypothesis.settings.load_profile("isiw")
 

@@ -48,7 +48,7 @@ def test_the_configuration_is_valid(tmp_path: Path) -> None:
 
 def test_there_are_exactly_two_commands_to_set_up() -> None:
     commands = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("pip")]
-    assert commands == ["pip install -e . && isiw run", 'pip install -e ".[test]" && pytest']
+    assert commands == ["pip install -e . && isiw run", 'pip install -e ".[test]" && pytest -n auto']
 
 
 def test_every_linked_file_exists() -> None:

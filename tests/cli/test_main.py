@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -34,18 +35,31 @@ def isiw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
     return run
 
 
+SHORT = "[strategy.settings]\nmax_trials = 3\nparticles = 100\n"
+
+
 @pytest.fixture
 def short(tmp_path: Path) -> Path:
     """A configuration of few trials."""
     path = tmp_path / "short.toml"
-    path.write_text("[strategy.settings]\nmax_trials = 3\n")
+    path.write_text(SHORT)
     return path
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The log of a short session."""
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "short.toml").write_text(SHORT)
+    result = CliRunner().invoke(app, ["run", str(folder / "short.toml"), "--log", str(folder / "s.mcap")])
+    assert result.exit_code == 0, result.output
+    return folder / "s.mcap"
+
+
 @pytest.fixture
-def log(isiw: Command, short: Path, tmp_path: Path) -> Path:
-    assert isiw("run", short, "--log", "s.mcap").exit_code == 0
-    return tmp_path / "s.mcap"
+def log(finished: Path, tmp_path: Path) -> Path:
+    """A copy of that log."""
+    return Path(shutil.copy(finished, tmp_path))
 
 
 def test_run_ends_with_a_statement_a_log_and_a_picture(isiw: Command, short: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pandas as pd
@@ -13,6 +14,8 @@ from isiw.studies import Failure, open_store
 from isiw.studies.store import Store
 from studies.tiny import TOML
 
+SMALL = TOML.replace("people = 12", "people = 2")
+
 
 def study(*arguments: object) -> Result:
     return CliRunner().invoke(app, ["study", *map(str, arguments)])
@@ -21,14 +24,23 @@ def study(*arguments: object) -> Result:
 @pytest.fixture
 def plan(tmp_path: Path) -> Path:
     path = tmp_path / "tiny.toml"
-    path.write_text(TOML.replace("people = 12", "people = 2"))
+    path.write_text(SMALL)
     return path
 
 
-@pytest.fixture
-def folder(plan: Path) -> Path:
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a study that is finished."""
+    plan = tmp_path_factory.mktemp("finished") / "tiny.toml"
+    plan.write_text(SMALL)
     assert study("run", plan, "--workers", 1).exit_code == 0
     return plan.with_name("tiny.study")
+
+
+@pytest.fixture
+def folder(finished: Path, tmp_path: Path) -> Path:
+    """A copy of that folder."""
+    return Path(shutil.copytree(finished, tmp_path / "tiny.study"))
 
 
 def test_run_puts_the_results_beside_the_file_and_says_what_is_there(plan: Path) -> None:

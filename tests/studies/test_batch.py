@@ -144,7 +144,7 @@ def test_a_batch_on_a_gpu_finds_windows_as_well() -> None:
     assert rows[rows["trial"] == 20]["f1"].mean() > 0.7
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("strategy", "trials"), [("default", 15), ("nr", 20), ("pf", 40)])
 def test_the_mean_f1_of_a_batch_is_that_of_one_at_a_time(strategy: str, trials: int) -> None:
     # The same people with the same noise, other draws of the model: paired, so that people do not blur the difference.

@@ -173,7 +173,7 @@ COMMAND = [sys.executable, "-c", f"{LISTEN}; from isiw.cli import app; app()"]
 @pytest.fixture
 def started(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     """A study that runs in another process, some of it finished; its workers must not outlive it."""
-    (tmp_path / "tiny.toml").write_text(TOML.replace("people = 12", "people = 80"))
+    (tmp_path / "tiny.toml").write_text(TOML.replace("people = 12", "people = 40"))
     parts = tmp_path / "tiny.study" / "parts"
     command = [*COMMAND, "study", "run", str(tmp_path / "tiny.toml"), "--workers", "2"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:  # noqa: S603

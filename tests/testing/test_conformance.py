@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import pytest
@@ -29,10 +30,17 @@ NAMES = sorted(list_strategies())
 SCORING = sorted(name for name, make in ACQUISITIONS.items() if ProposesIsi not in make(0).needs)
 
 
+EFFORT: dict[str, Any] = {"scouts": 96, "starts": 4, "steps": 8, "draws": 150, "fits": 3, "enough": 100}
+
+
 def settings_of(name: str) -> dict[str, Any]:
+    """Settings with which a strategy is quick."""
+    if name.startswith("parametric"):
+        return {"samples": 64, "effort": EFFORT}
     return FEW if name in {"default", "even", "random"} or name.startswith("particles") else {}
 
 
+@cache  # a posterior never changes
 def particles_after(trials: Trials, people: int = 1) -> ParticlePosterior:
     model = ParticleModel(particles=100)
     posterior = model.begin(VALVE_SPACE, 1, people)
@@ -65,7 +73,7 @@ def test_every_named_strategy_conforms(name: str) -> None:
     check_strategy(lambda: make_strategy(name, seed=1, **settings_of(name)))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_every_named_strategy_conforms_over_forty_trials(name: str) -> None:
     check_strategy(lambda: make_strategy(name, seed=1), trials=40)

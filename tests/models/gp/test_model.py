@@ -257,12 +257,13 @@ def coverage(people: int, trials: int, strategy: str = "gp-straddle", **settings
     return rows["start_covered"].mean(), rows["end_covered"].mean()
 
 
+@pytest.mark.slow
 def test_intervals_of_the_edges_hold_them_after_thirty_random_trials() -> None:
     # 40 people, so 80 edges: 0.80 of them, less two standard errors where 0.80 were the truth.
     assert np.mean(coverage(40, 30, acquisition="random")) > 0.71
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("acquisition", ["random", "straddle", "integrated-variance"])
 def test_intervals_of_the_edges_cover_at_least_080(acquisition: str) -> None:
     assert np.mean(coverage(100, 30, acquisition=acquisition)) >= 0.80

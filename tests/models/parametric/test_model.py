@@ -83,7 +83,7 @@ def test_the_parametric_model_conforms_whatever_the_order_of_the_trials() -> Non
     check_model(lambda: replace(model), IMPACT_SPACE, order_tolerance_ms=0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_the_parametric_model_conforms_with_every_likelihood(likelihood: Likelihood, space: DesignSpace) -> None:
@@ -298,7 +298,7 @@ def nuts_gap_ms(model: ParametricModel, observations: Sequence[Observation]) -> 
         return np.where(fast == slow, 0.0, np.abs(fast - slow))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_fast_inference_agrees_with_nuts() -> None:
     # One data set and few draws: the Monte-Carlo error of a median is about 2 ms.
     model = ParametricModel(likelihood="log-normal", samples=90, chains=Chains(warmup=60))
@@ -322,7 +322,7 @@ def test_chains_of_nuts_that_disagree_are_reported(monkeypatch: pytest.MonkeyPat
     assert "R-hat" in trouble
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_fast_inference_agrees_with_nuts_on_twenty_data_sets() -> None:
     model = ParametricModel(prior=WindowPrior(p_window=1.0), likelihood="log-normal", samples=300)
     gaps_ms = []
@@ -332,7 +332,7 @@ def test_fast_inference_agrees_with_nuts_on_twenty_data_sets() -> None:
     assert np.median(gaps_ms) < 3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_ranks_of_the_true_edges_are_uniform_on_the_models_own_people(likelihood: Likelihood) -> None:
     # Simulation-based calibration (Talts et al., arXiv:1804.06788) with 200 people and 20 trials. The 90 % intervals of

@@ -182,6 +182,7 @@ def test_moved_particles_agree_with_plain_importance_sampling() -> None:
     assert np.mean([e.probability for e in got]) == pytest.approx(expected.probability, abs=0.03)
 
 
+@pytest.mark.slow
 def test_the_order_of_trials_matters_little() -> None:
     # Startle and drift are the only things in the model that know the order. Averaged over six seeds.
     trials = evenly(cohort("gaussian", 3, 0)[2], 16)
@@ -201,6 +202,7 @@ def test_a_clear_responder_is_found_and_a_silent_person_is_not_given_a_window() 
     assert silent.window is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [10.0, 1 / 3])
 def test_the_unit_of_the_amplitude_is_learnt(factor: float) -> None:
     # The prior of the floor, and particles far out in it, pull by less than a posterior SD, averaged over six seeds.

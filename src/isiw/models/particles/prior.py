@@ -53,7 +53,12 @@ LATENTS: Final = tuple(name for names in BLOCKS.values() for name in names)
 
 
 def block(*names: str, device: torch.device) -> Tensor:
-    """Which latents belong to some of `BLOCKS`, shape (d,)."""
+    """Which latents belong to some of `BLOCKS`, shape (d,).
+
+    Args:
+        *names: of the blocks.
+        device: torch device.
+    """
     chosen = {latent for name in names for latent in BLOCKS[name]}
     return torch.tensor([latent in chosen for latent in LATENTS], device=device)
 
@@ -316,7 +321,12 @@ class Prior:
     session: SessionPrior = field(default_factory=SessionPrior)
 
     def sample_kinds(self, size: tuple[int, ...], generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
-        """Shape, noise and presence of new particles, each of `size`."""
+        """Shape, noise and presence of new particles, each of `size`.
+
+        Args:
+            size: of each.
+            generator: what they are drawn from.
+        """
         uniform = torch.rand((3, *size), generator=generator, device=generator.device)
         shape, noise = _kinds(self.profile.shapes, uniform[0]), _kinds(self.noise, uniform[1])
         return shape, noise, uniform[2] < self.profile.p_window
@@ -333,7 +343,12 @@ class Prior:
         return Latents(z, *self.sample_kinds((people, particles), generator))
 
     def person(self, latents: Latents, space: DesignSpace) -> Person:
-        """What particles mean in a design space."""
+        """What particles mean in a design space.
+
+        Args:
+            latents: of the particles.
+            space: the ISIs that may be asked.
+        """
         z = dict(zip(LATENTS, latents.z.unbind(-1), strict=True))
         start_ms = self.profile.start.start_ms(z["start"], space)
         shape = Shape(latents.shape, start_ms, self.profile.width_ms.log_normal(z["width"]), _even(z["form"]))
