@@ -1,124 +1,24 @@
-"""A strategy without torch models that remembers all it was told, and devices that misbehave on command."""
+"""What tests of several rooms are handed."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
+import hypothesis
 import pytest
 import torch
 
 from isiw.design import DesignSpace
-from isiw.devices.protocol import DeviceInfo
-from isiw.models.protocol import Observation, Tensor
-from isiw.strategy.stopping import Budget
-from isiw.strategy.strategy import Strategy
-from isiw.trials import Measurement, Stimulus
-from isiw.window import Window, WindowEstimate
+from scripted import SPACE
 
-SPACE = DesignSpace(0, 200, reference="valve")
-
-
-@dataclass(frozen=True)
-class RememberingPosterior:
-    """Remembers every trial; its next ISI depends on all of them."""
-
-    space: DesignSpace
-    seed: int
-    told: tuple[tuple[float, float], ...] = ()
-
-    def estimate(self, person: int = 0) -> WindowEstimate:
-        del person
-        middle = 60.0 + len(self.told)
-        grid = self.space.grid_ms
-        profile = 0.05 * np.exp(-(((grid - middle) / 20) ** 2))
-        return WindowEstimate(
-            probability=0.9,
-            window=Window(middle - 30, middle + 30),
-            start_ms=middle - 30,
-            end_ms=math.inf,
-            grid_ms=grid,
-            edge_samples_ms=np.array([[middle - 35, math.inf], [middle - 30, 150.0], [middle - 25, math.inf]]),
-            profile_quantiles_mv=np.stack([0.5 * profile, profile, 2 * profile]) + 0.01,
-        )
-
-    @property
-    def wanted_ms(self) -> float:
-        scrambled = math.fsum((k + 1) * (isi + 1e3 * mep) for k, (isi, mep) in enumerate(self.told))
-        return self.space.low_ms + (37.0 * self.seed + 53.0 + 7.0 * scrambled) % (
-            self.space.high_ms - self.space.low_ms
-        )
-
-
-@dataclass(frozen=True)
-class RememberingModel:
-    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> RememberingPosterior:
-        assert people == 1
-        return RememberingPosterior(space, seed)
-
-    def update(self, posterior: RememberingPosterior, observation: Observation) -> RememberingPosterior:
-        trial = (float(observation.isi_ms[0]), float(observation.mep_mv[0]))
-        return replace(posterior, told=(*posterior.told, trial))
-
-
-@dataclass(frozen=True)
-class WantedIsi:
-    needs: tuple[type, ...] = ()
-
-    def __call__(self, posterior: RememberingPosterior, isi_ms: Tensor) -> Tensor:
-        return -torch.abs(isi_ms - posterior.wanted_ms)[None]
-
-
-class ScriptedDevice:
-    """Answers by a formula, or as a function of the stimulus says; counts what happens to it."""
-
-    def __init__(self, answer: Callable[[Stimulus], object] | None = None, *, simulated: bool = True) -> None:
-        self.answer = answer or (lambda stimulus: Measurement(0.01 + (stimulus.isi_ms or 0) / 1e4, stimulus.isi_ms))
-        self.info = DeviceInfo("scripted", "valve", simulated=simulated)
-        self.delivered: list[Stimulus] = []
-        self.calls: list[str] = []
-
-    def describe(self) -> DeviceInfo:
-        return self.info
-
-    def stage(self) -> None:
-        self.calls.append("stage")
-
-    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Any:
-        assert timeout_s > 0
-        self.delivered.append(stimulus)
-        return self.answer(stimulus)
-
-    def stop(self) -> None:
-        self.calls.append("stop")
-
-    def unstage(self) -> None:
-        self.calls.append("unstage")
-
-
-def make_scripted_strategy(max_trials: int = 6, seed: int = 0, space: DesignSpace = SPACE) -> Strategy:
-    return Strategy(space, RememberingModel(), WantedIsi(), Budget(max_trials), seed=seed)
+torch.set_num_threads(1)  # workers share the cores, and answers are the same again with one thread only
+hypothesis.settings.register_profile("isiw", deadline=None)  # how fast a machine is, is not what is tested
+hypothesis.settings.load_profile("isiw")
 
 
 @pytest.fixture
 def space() -> DesignSpace:
     return SPACE
-
-
-@pytest.fixture
-def scripted_strategy() -> Callable[..., Strategy]:
-    """Makes a strategy whose asks depend on every trial told."""
-    return make_scripted_strategy
-
-
-@pytest.fixture
-def scripted_device() -> type[ScriptedDevice]:
-    """A device that answers as it is told to."""
-    return ScriptedDevice
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,7 +66,9 @@ def test_what_is_compared_is_the_plain_number() -> None:
         ({"above": 0, "below": 1}, (0.5,), (0, 1), "above 0 and below 1"),
     ],
 )
-def test_bounds_are_kept_and_said(bounds, inside, outside, words) -> None:
+def test_bounds_are_kept_and_said(
+    bounds: dict[str, float], inside: tuple[float, ...], outside: tuple[float, ...], words: str
+) -> None:
     for value in inside:
         assert number("x", value, **bounds) == value
     for value in outside:
@@ -126,7 +129,8 @@ class Checked:
 
 
 def test_fields_become_plain_values() -> None:
-    checked = Checked(width_ms=np.float32(2), trials=np.int64(3), limit=1)
+    numpys: dict[str, Any] = {"width_ms": np.float32(2), "trials": np.int64(3)}
+    checked = Checked(**numpys, limit=1)
     assert (checked.width_ms, checked.trials, checked.limit, checked.most) == (2.0, 3, 1.0, None)
     assert [type(value) for value in (checked.width_ms, checked.trials, checked.limit)] == [float, int, float]
 
@@ -134,6 +138,6 @@ def test_fields_become_plain_values() -> None:
 @pytest.mark.parametrize(
     "wrong", [{"width_ms": 0}, {"share": 1.5}, {"trials": 0}, {"limit": "x"}, {"most": 2.5}, {"kind": "c"}]
 )
-def test_a_wrong_field_is_named_with_its_class(wrong: dict[str, object]) -> None:
+def test_a_wrong_field_is_named_with_its_class(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=rf"Checked\.{next(iter(wrong))}"):
         Checked(**wrong)

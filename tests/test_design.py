@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -87,8 +88,9 @@ def test_a_realised_isi_beyond_the_tolerance_is_refused_with_the_reference(isi_m
 @pytest.mark.parametrize("name", ["low_ms", "high_ms", "step_ms", "tolerance_ms"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, "5", None, True])
 def test_a_field_that_is_no_finite_number_is_named(name: str, value: object) -> None:
+    wrong: dict[str, Any] = {name: value}
     with pytest.raises(InvalidValueError, match=name):
-        dataclasses.replace(VALVE_SPACE, **{name: value})
+        dataclasses.replace(VALVE_SPACE, **wrong)
 
 
 @pytest.mark.parametrize(
@@ -103,9 +105,14 @@ def test_a_field_that_is_no_finite_number_is_named(name: str, value: object) -> 
         {"low_ms": 0, "high_ms": 10, "reference": "pulse"},
     ],
 )
-def test_a_space_that_cannot_be_is_refused(fields: dict[str, object]) -> None:
+def test_a_space_that_cannot_be_is_refused(fields: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         DesignSpace(**fields)
+
+
+def test_a_space_is_printed_with_the_event_that_its_isis_count_from() -> None:
+    assert str(DesignSpace(0, 500, reference="valve")) == "0–500 ms after the valve command, every 1 ms"
+    assert str(DesignSpace(10, 50, 2.5)) == "10–50 ms after the impact, every 2.5 ms"
 
 
 def test_the_grid_cannot_be_written_to() -> None:

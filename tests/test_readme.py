@@ -6,6 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
 from benchmarks.readme_results import table
 
 from isiw.config.run import load_config
@@ -14,11 +15,13 @@ ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def blocks(language):
+def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
 
 
-def test_the_python_examples_run_one_after_the_other(tmp_path, monkeypatch, capsys) -> None:
+def test_the_python_examples_run_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     assert len(blocks("python")) == 4
     for block in blocks("python"):
@@ -52,7 +55,7 @@ def test_the_results_are_those_of_the_files() -> None:
     assert shown == table()
 
 
-def test_the_configuration_is_valid(tmp_path) -> None:
+def test_the_configuration_is_valid(tmp_path: Path) -> None:
     (block,) = blocks("toml")
     (tmp_path / "session.toml").write_text(block)
     config = load_config(tmp_path / "session.toml")
@@ -62,4 +65,4 @@ def test_the_configuration_is_valid(tmp_path) -> None:
 def test_one_command_sets_up_one_spares_the_gpu_libraries_and_one_tests() -> None:
     commands = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("pip")]
     torch = "pip install torch --index-url https://download.pytorch.org/whl/cpu"
-    assert commands == ["pip install -e . && isiw run", torch, 'pip install -e ".[test]" && pytest']
+    assert commands == ["pip install -e . && isiw run", torch, 'pip install -e ".[test]" && pytest -n auto']

@@ -5,6 +5,7 @@ import pytest
 
 from isiw.errors import InvalidValueError
 from isiw.response_counts import STIMULATION, effective_window, response_counts, study_counts
+from known import known
 
 
 def test_responses_are_counted_by_isi() -> None:
@@ -17,7 +18,7 @@ def test_responses_are_counted_by_isi() -> None:
 
 def test_exactly_40_percent_is_not_effective() -> None:
     counts = response_counts([0] * 5 + [5] * 5, [1, 1, 0, 0, 0, 1, 1, 1, 0, 0], threshold_mv=0.5)
-    window = effective_window(counts)
+    window = known(effective_window(counts))
     assert (window.start_ms, window.end_ms) == (5.0, 5.0)
 
 
@@ -26,7 +27,7 @@ def test_no_responses_make_no_window() -> None:
 
 
 @pytest.mark.parametrize(("kind", "width_ms"), [("electrical", 20.0), ("mechanical", 50.0)])
-def test_the_two_kinds_of_stimulation_have_the_widths_of_the_dissertation(kind, width_ms) -> None:
+def test_the_two_kinds_of_stimulation_have_the_widths_of_the_dissertation(kind: str, width_ms: float) -> None:
     study = study_counts(STIMULATION[kind], np.arange(0.0, 140.0), trials=300, seed=1)
     assert (study.counts["share"] > 0.4).sum() == pytest.approx(width_ms, abs=4)
 
@@ -36,13 +37,13 @@ def test_the_window_depends_on_the_threshold() -> None:
         study_counts(STIMULATION["mechanical"], np.arange(0.0, 140.0, 5.0), trials=200, threshold_mv=threshold, seed=1)
         for threshold in (0.02, 0.03, 0.05)
     ]
-    low, middle, high = (study.window.width_ms for study in widths)
+    low, middle, high = (known(study.window).width_ms for study in widths)
     assert low > middle > high
 
 
 @pytest.mark.parametrize(
     ("isi", "mep", "threshold"), [([1, 2], [1], 0.1), ([1], [np.nan], 0.1), ([1], [1], 0.0), ([np.inf], [1], 0.1)]
 )
-def test_what_cannot_be_counted_is_an_error(isi, mep, threshold) -> None:
+def test_what_cannot_be_counted_is_an_error(isi: list[float], mep: list[float], threshold: float) -> None:
     with pytest.raises(InvalidValueError):
         response_counts(isi, mep, threshold)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -34,12 +36,12 @@ def test_values_become_the_dataclass() -> None:
         ({"people": 3}, r"the key parts is missing"),
     ],
 )
-def test_what_is_wrong_is_named(values, message) -> None:
+def test_what_is_wrong_is_named(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         checked(Whole, values, "f.toml")
 
 
-def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path) -> None:
+def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path: Path) -> None:
     (tmp_path / "broken.toml").write_text("people = = 3")
     with pytest.raises(ConfigError, match=r"broken\.toml is not valid TOML"):
         read_toml(tmp_path / "broken.toml")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,24 +40,25 @@ def test_trials_count_from_0() -> None:
 @pytest.mark.parametrize("name", ["mep_mv", "isi_sd_ms", "background_rms_uv"])
 @pytest.mark.parametrize("value", [*NOT_FINITE, -0.001])
 def test_an_amplitude_that_cannot_be_is_named(name: str, value: float) -> None:
-    values = {"mep_mv": 0.1, "isi_ms": 10.0, name: value}
+    values: dict[str, Any] = {"mep_mv": 0.1, name: value}
     with pytest.raises(InvalidValueError, match=name):
-        Measurement(**values)
+        Measurement(isi_ms=10.0, **values)
     with pytest.raises(InvalidValueError, match=name):
-        Trial(0, Status.ACCEPTED, 10.0, **({"mep_mv": 0.1} | {name: value}))
+        Trial(0, Status.ACCEPTED, 10.0, **values)
 
 
 @pytest.mark.parametrize("name", ["isi_ms", "t_valve_ms", "t_hit_ms", "t_tms_ms"])
 @pytest.mark.parametrize("value", NOT_FINITE)
 def test_a_time_that_is_not_finite_is_named(name: str, value: float) -> None:
+    times: dict[str, Any] = {name: value}
     with pytest.raises(InvalidValueError, match=name):
-        Measurement(**({"mep_mv": 0.1, "isi_ms": 10.0} | {name: value}))
+        Measurement(**({"mep_mv": 0.1, "isi_ms": 10.0} | times))
     with pytest.raises(InvalidValueError, match=name):
-        Trial(0, Status.ACCEPTED, 10.0, mep_mv=0.1, **{name: value})
+        Trial(0, Status.ACCEPTED, 10.0, mep_mv=0.1, **times)
 
 
 def test_a_channel_keeps_its_samples_as_floats() -> None:
-    channel = Channel([1, 2, 3], 1000.0, "mV")
+    channel = Channel(np.array([1, 2, 3]), 1000.0, "mV")
     assert channel.values.dtype == np.float64
 
 
@@ -88,13 +90,15 @@ def test_an_accepted_trial_needs_its_mep() -> None:
 
 
 def test_status_and_reason_may_be_given_in_words() -> None:
-    trial = Trial(0, "mistrial", 10.0, reason="no impact")
+    words: dict[str, Any] = {"status": "mistrial", "reason": "no impact"}
+    trial = Trial(0, commanded_isi_ms=10.0, **words)
     assert (trial.status, trial.reason) == (Status.MISTRIAL, MistrialReason.NO_IMPACT)
 
 
 def test_a_reason_outside_the_closed_list_is_refused() -> None:
+    words: dict[str, Any] = {"reason": "bad luck"}
     with pytest.raises(ValueError, match="bad luck"):
-        Trial(0, Status.MISTRIAL, 10.0, reason="bad luck")
+        Trial(0, Status.MISTRIAL, 10.0, **words)
 
 
 def test_a_strategy_learns_neither_from_mistrials_nor_from_excluded_trials() -> None:
@@ -115,6 +119,12 @@ def test_appending_and_excluding_leave_the_table_itself_as_it_was() -> None:
 def test_indices_ascend(indices: tuple[int, int]) -> None:
     with pytest.raises(InvalidValueError, match="ascend"):
         TrialTable(tuple(accepted(index) for index in indices))
+
+
+def test_a_table_is_printed_as_its_counts() -> None:
+    assert str(TrialTable((accepted(0),))) == "1 delivered, 1 told"
+    table = TrialTable((accepted(0), mistrial(1), mistrial(2), accepted(3))).excluding([3])
+    assert str(table) == "4 delivered, 1 told, 2 mistrials (2 no pulse), 1 excluded"
 
 
 def test_the_frame_has_a_row_a_trial_and_its_values() -> None:

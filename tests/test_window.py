@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from isiw.errors import InvalidValueError
 from isiw.types import FloatArray
 from isiw.window import EDGE_LEVEL, Window, WindowEstimate, window_from_excess
+from known import known
 
 GRID_MS = np.arange(0.0, 100.0, 2.0)
 
@@ -171,18 +172,36 @@ def test_an_edge_beyond_the_range_makes_an_infinite_interval_and_never_nan() -> 
     assert intervals == ((-math.inf, 30.0), (50.0, math.inf))
 
 
+def test_an_estimate_is_printed_with_its_probability_medians_and_intervals() -> None:
+    edges_ms = np.array([[-math.inf, 150.0], [30.0, 160.0], [34.0, math.inf]])
+    estimate = WindowEstimate(0.876, Window(31.6, 158.0), 30.0, 160.0, edge_samples_ms=edges_ms)
+    assert str(estimate).splitlines() == [
+        "Window: 31.6–158 ms (probability of a window: 0.88)",
+        "Start: 30 ms, 90 % interval before the range to 34 ms",
+        "End: 160 ms, 90 % interval 150 ms to beyond the range",
+    ]
+
+
+def test_an_estimate_is_printed_without_what_it_does_not_have() -> None:
+    assert str(WindowEstimate(None, Window(10, 40))) == "Window: 10–40 ms"
+    no_window = WindowEstimate(0.2, None, 10.0, 40.0, edge_samples_ms=np.array([[10.0, 40.0]]))
+    assert str(no_window) == "Window: none (probability of a window: 0.20)"
+
+
 def test_the_robust_interval_is_the_hull_over_probable_hypotheses() -> None:
     rng = np.random.default_rng(6)
     hypotheses = rng.choice(4, 2000, p=[0.6, 0.3, 0.09, 0.01])
     middles = np.array([[50.0, 150.0], [60.0, 140.0], [45.0, 170.0], [10.0, 490.0]])[hypotheses]
     samples = middles + rng.uniform(-2, 2, (2000, 2))
-    estimate = WindowEstimate(1.0, None, edge_samples_ms=samples, hypotheses=hypotheses)
-    assert estimate.robust_interval() == (
-        pytest.approx((45 - 1.8, 60 + 1.8), abs=0.3),
-        pytest.approx((140 - 1.8, 170 + 1.8), abs=0.3),
-    )
-    (start_low, _), (_, end_high) = estimate.robust_interval(min_share=0.0) or ((0, 0), (0, 0))
-    assert (start_low, end_high) == (pytest.approx(8.2, abs=0.8), pytest.approx(491.8, abs=0.8))
+    names = ("a", "b", "c", "d")
+    estimate = WindowEstimate(1.0, None, edge_samples_ms=samples, hypothesis_samples=hypotheses, hypothesis_names=names)
+    assert list(known(estimate.hypotheses)) == list(names)
+    assert list(known(estimate.hypotheses).values()) == pytest.approx([0.6, 0.3, 0.09, 0.01], abs=0.04)
+    start, end = known(estimate.robust_interval())
+    assert start == pytest.approx((45 - 1.8, 60 + 1.8), abs=0.3)
+    assert end == pytest.approx((140 - 1.8, 170 + 1.8), abs=0.3)
+    (start_low, _), (_, end_high) = known(estimate.robust_interval(min_share=0.0))
+    assert [start_low, end_high] == pytest.approx([8.2, 491.8], abs=0.8)
 
 
 def test_without_hypotheses_the_robust_interval_is_the_interval() -> None:
@@ -194,7 +213,18 @@ def test_without_hypotheses_the_robust_interval_is_the_interval() -> None:
 @pytest.mark.parametrize("samples", [None, np.zeros((3, 2))])
 def test_every_sample_has_one_hypothesis(samples: FloatArray | None) -> None:
     with pytest.raises(InvalidValueError, match="one hypothesis"):
-        WindowEstimate(1.0, None, edge_samples_ms=samples, hypotheses=np.zeros(2, dtype=int))
+        WindowEstimate(1.0, None, edge_samples_ms=samples, hypothesis_samples=np.zeros(2, dtype=int))
+
+
+def test_every_hypothesis_has_a_name() -> None:
+    with pytest.raises(InvalidValueError, match="has a name"):
+        WindowEstimate(
+            1.0,
+            None,
+            edge_samples_ms=np.zeros((2, 2)),
+            hypothesis_samples=np.array([0, 1]),
+            hypothesis_names=("only",),
+        )
 
 
 def test_edges_beyond_the_range_are_counted() -> None:

@@ -33,6 +33,7 @@ from .log.reader import read_session as read_session
 from .session.loop import Session as Session
 from .session.resume import exclude as exclude
 from .session.resume import resume as resume
+from .strategy.catalogue import list_settings as list_settings
 from .strategy.catalogue import list_strategies as list_strategies
 from .strategy.catalogue import make_strategy as make_strategy
 from .strategy.stopping import StopDecision as StopDecision

@@ -54,6 +54,10 @@ class DesignSpace:
                 remedy="Choose high_ms = low_ms + k * step_ms with a whole k.",
             )
 
+    def __str__(self) -> str:
+        counted = "impact" if self.reference == "impact" else "valve command"
+        return f"{self.low_ms:g}–{self.high_ms:g} ms after the {counted}, every {self.step_ms:g} ms"
+
     @cached_property
     def grid_ms(self) -> FloatArray:
         """All ISIs that may be asked [ms], shape (t,)."""

@@ -42,7 +42,12 @@ def f1(estimate: WindowEstimate | Window | None, truth: Window | None, space: De
 
 
 def true_edges_ms(truth: Window, space: DesignSpace) -> Interval:
-    """Start and end of a true window [ms], ±inf where it runs out of the range."""
+    """Start and end of a true window [ms], ±inf where it runs out of the range.
+
+    Args:
+        truth: the true window.
+        space: the range.
+    """
     start = -math.inf if truth.start_ms <= space.low_ms else truth.start_ms
     end = math.inf if truth.end_ms >= space.high_ms else truth.end_ms
     return start, end
@@ -90,7 +95,12 @@ def edge_ranks(
 
 
 def edge_error_ms(estimate: WindowEstimate | Window | None, truth: Window | None) -> tuple[float, float] | None:
-    """Estimated minus true start and end [ms]; None where either has no window."""
+    """Estimated minus true start and end [ms]; None where either has no window.
+
+    Args:
+        estimate: the estimate, or its window.
+        truth: the true window.
+    """
     window = estimate.window if isinstance(estimate, WindowEstimate) else estimate
     if window is None or truth is None:
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -230,6 +231,16 @@ class TrialTable:
 
     def __getitem__(self, position: int) -> Trial:
         return self.trials[position]
+
+    def __str__(self) -> str:
+        mistrials = Counter(str(trial.reason) for trial in self.trials if trial.reason is not None)
+        reasons = ", ".join(f"{count} {reason}" for reason, count in mistrials.items())
+        excluded = sum(trial.excluded for trial in self.trials)
+        return (
+            f"{len(self)} delivered, {len(self.told)} told"
+            + (f", {mistrials.total()} mistrials ({reasons})" if reasons else "")
+            + (f", {excluded} excluded" if excluded else "")
+        )
 
     def appended(self, trial: Trial) -> TrialTable:
         """A table with one more trial at its end."""

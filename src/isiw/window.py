@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,7 @@ __all__ = [
     "ProfileBand",
     "Window",
     "WindowEstimate",
+    "finding",
     "least_excess_mv",
     "window_from_excess",
 ]
@@ -33,7 +34,8 @@ EDGE_LEVEL = 0.135
 MIN_EXCESS_MV = 0.002
 MIN_EXCESS_OF_BASELINE = 0.10
 
-Interval = tuple[float, float]
+Interval: TypeAlias = tuple[float, float]
+_Edge: TypeAlias = tuple[float | None, float | None, float | None]
 
 
 @dataclass(frozen=True)
@@ -238,6 +240,10 @@ class WindowEstimate:
         shares = (counts / counts.sum()).tolist()
         return dict(zip(self.hypothesis_names, shares, strict=True))
 
+    def __str__(self) -> str:
+        start, end = self.interval(0.9) or ((None, None), (None, None))
+        return finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end))
+
     def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:
         """Credible intervals of start and end, given that there is a window [ms].
 
@@ -303,6 +309,30 @@ class WindowEstimate:
         isi = np.atleast_1d(np.asarray(isi_ms, dtype=float))
         low, median, high = (np.interp(isi, self.grid_ms, row) for row in self.profile_quantiles_mv)
         return ProfileBand(median, low, high)
+
+
+def finding(probability: float | None, window: Window | None, start: _Edge, end: _Edge) -> str:
+    """A window in a line, and each of its edges in another, where they are known.
+
+    Args:
+        probability: that there is a window.
+        window: the reported decision.
+        start: median, and lower and upper end of the 90 % interval, of its start [ms]; None where not known.
+        end: those of its end [ms].
+    """
+    chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
+    lines = [f"Window: {'none' if window is None else window}{chance}"]
+    for name, edge in (("Start", start), ("End", end)):
+        median, low, high = ("" if edge_ms is None else _edge(edge_ms) for edge_ms in edge)
+        if window is not None and low:
+            lines.append(f"{name}: {median}, 90 % interval {low} to {high}")
+    return "\n".join(lines)
+
+
+def _edge(edge_ms: float) -> str:
+    if math.isinf(edge_ms):
+        return "before the range" if edge_ms < 0 else "beyond the range"
+    return f"{edge_ms:.0f} ms"
 
 
 def _central(edges_ms: FloatArray, level: float) -> FloatArray:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import torch
 
 from isiw.models.protocol import Tensor
 from isiw.window import WindowEstimate
+
+Score: TypeAlias = Callable[["HandMadePosterior", Tensor], Tensor]
+"""Scores ISIs [ms] (shape (t,)) for each person, shape (b, t)."""
 
 ISIS_MS = torch.arange(4.0)
 
@@ -49,10 +53,14 @@ class HandMadePosterior:
 
 def some_posterior(seed: int, people: int = 2, samples: int = 5, isis: int = 4, outcomes: int = 3) -> HandMadePosterior:
     rng = np.random.default_rng(seed)
-    mass = rng.dirichlet(0.5 * np.ones(outcomes), size=(people, samples, isis))
-    masks = rng.random((people, samples, isis)) < 0.5
-    profiles, baselines = rng.lognormal(size=(people, samples, isis)), 0.1 * rng.random((people, samples))
-    return HandMadePosterior(*(torch.tensor(x, dtype=torch.float32) for x in (mass, masks, profiles, baselines)))
+    drawn = (
+        rng.dirichlet(0.5 * np.ones(outcomes), size=(people, samples, isis)),
+        rng.random((people, samples, isis)) < 0.5,
+        rng.lognormal(size=(people, samples, isis)),
+        0.1 * rng.random((people, samples)),
+    )
+    mass, masks, profiles, baselines = (torch.tensor(x, dtype=torch.float32) for x in drawn)
+    return HandMadePosterior(mass, masks, profiles, baselines)
 
 
 def expected_gain(mass: Tensor, values: Tensor, loss: Callable[[np.ndarray, np.ndarray], float]) -> np.ndarray:

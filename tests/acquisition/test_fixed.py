@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -101,7 +102,7 @@ def test_the_sweep_stays_at_each_isi_for_its_trials_and_begins_again_at_the_end(
 
 
 @pytest.mark.parametrize("settings", [{"step_ms": 0.0}, {"trials_per_isi": 0}])
-def test_a_sweep_without_step_or_trials_is_refused(settings: dict[str, float]) -> None:
+def test_a_sweep_without_step_or_trials_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match="IncrementalSweep"):
         IncrementalSweep(**settings)
 

@@ -10,7 +10,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.hand_made import ISIS_MS, expected_gain, some_posterior
+from acquisition.hand_made import ISIS_MS, Score, expected_gain, some_posterior
 from isiw.acquisition.improvement import (
     KnowledgeGradient,
     LogExpectedImprovement,
@@ -21,6 +21,7 @@ from isiw.acquisition.improvement import (
     thompson,
     upper_confidence_bound,
 )
+from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.errors import InvalidValueError
 
 seeds = st.integers(0, 2**31)
@@ -83,7 +84,7 @@ def test_the_knowledge_gradient_is_what_the_best_mean_is_expected_to_gain(seed: 
         (KnowledgeGradient(), knowledge_gradient),
     ],
 )
-def test_the_settings_class_scores_as_its_function_does(acquisition, score) -> None:
+def test_the_settings_class_scores_as_its_function_does(acquisition: AcquisitionFunction, score: Score) -> None:
     p = some_posterior(2)
     torch.testing.assert_close(acquisition(p, ISIS_MS), score(p, ISIS_MS))
     assert all(isinstance(p, capability) for capability in acquisition.needs)

@@ -11,7 +11,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.hand_made import ISIS_MS, HandMadePosterior, expected_gain, some_posterior
+from acquisition.hand_made import ISIS_MS, HandMadePosterior, Score, expected_gain, some_posterior
 from isiw.acquisition.information import (
     Alternating,
     MutualInformation,
@@ -78,13 +78,13 @@ def test_the_window_is_never_more_informative_than_everything(seed: int) -> None
 
 @pytest.mark.parametrize("score", ALL)
 @given(seed=seeds)
-def test_nothing_is_expected_to_be_lost(score, seed: int) -> None:
+def test_nothing_is_expected_to_be_lost(score: Score, seed: int) -> None:
     assert (score(some_posterior(seed), ISIS_MS) >= -ROUNDING).all()
 
 
 @pytest.mark.parametrize("score", ALL)
 @given(seed=seeds)
-def test_an_outcome_that_does_not_depend_on_the_sample_says_nothing(score, seed: int) -> None:
+def test_an_outcome_that_does_not_depend_on_the_sample_says_nothing(score: Score, seed: int) -> None:
     p = some_posterior(seed)
     assert score(replace(p, mass=p.mass[:, :1].expand_as(p.mass)), ISIS_MS).abs().max() < ROUNDING
 
@@ -114,7 +114,7 @@ def test_a_window_that_is_known_has_nothing_to_gain_where_other_unknowns_have() 
 
 @pytest.mark.parametrize("score", ALL)
 @given(seed=seeds)
-def test_people_are_scored_independently_of_each_other(score, seed: int) -> None:
+def test_people_are_scored_independently_of_each_other(score: Score, seed: int) -> None:
     p = some_posterior(seed, people=3)
     torch.testing.assert_close(score(p, ISIS_MS)[1:2], score(p.of(1), ISIS_MS), atol=ROUNDING, rtol=ROUNDING)
 

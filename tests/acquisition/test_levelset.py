@@ -10,7 +10,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.hand_made import ISIS_MS, expected_gain, some_posterior
+from acquisition.hand_made import ISIS_MS, HandMadePosterior, Score, expected_gain, some_posterior
 from isiw.acquisition.levelset import (
     IntegratedFeasibility,
     Straddle,
@@ -18,12 +18,13 @@ from isiw.acquisition.levelset import (
     integrated_feasibility_reduction,
     straddle,
 )
+from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.errors import InvalidValueError
 
 seeds = st.integers(0, 2**31)
 
 
-def margins_of(p) -> torch.Tensor:
+def margins_of(p: HandMadePosterior) -> torch.Tensor:
     excess = p.profiles - p.baselines[..., None]
     return excess - 0.135 * excess.amax(-1, keepdim=True).clamp_min(0)
 
@@ -74,13 +75,13 @@ def test_the_interval_reaches_furthest_where_the_sign_of_the_margin_is_least_cle
         (IntegratedFeasibility(1.5), lambda p, isi_ms: integrated_feasibility_reduction(p, isi_ms, 1.5)),
     ],
 )
-def test_the_settings_class_scores_as_its_function_does(acquisition, score) -> None:
+def test_the_settings_class_scores_as_its_function_does(acquisition: AcquisitionFunction, score: Score) -> None:
     p = some_posterior(2)
     torch.testing.assert_close(acquisition(p, ISIS_MS), score(p, ISIS_MS))
     assert all(isinstance(p, capability) for capability in acquisition.needs)
 
 
 @pytest.mark.parametrize("kind", [Straddle, IntegratedFeasibility])
-def test_a_width_that_is_not_positive_is_refused(kind) -> None:
+def test_a_width_that_is_not_positive_is_refused(kind: type[Straddle | IntegratedFeasibility]) -> None:
     with pytest.raises(InvalidValueError, match="above 0"):
         kind(0.0)

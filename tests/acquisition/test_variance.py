@@ -10,7 +10,8 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.hand_made import ISIS_MS, expected_gain, some_posterior
+from acquisition.hand_made import ISIS_MS, Score, expected_gain, some_posterior
+from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.variance import (
     EdgeVariance,
     IntegratedVariance,
@@ -35,7 +36,7 @@ def variance_of_edges(weights: np.ndarray, masks: np.ndarray) -> float:
         return 0.0
     edges = np.array([[np.flatnonzero(mask)[0], np.flatnonzero(mask)[-1]] for mask in masks[found]], dtype=float)
     share = weights[found].sum()
-    return share * summed_variance(weights[found] / share, edges)
+    return float(share) * summed_variance(weights[found] / share, edges)
 
 
 @given(seeds)
@@ -72,7 +73,7 @@ def test_where_no_sample_has_a_window_no_isi_is_better_than_another() -> None:
         (EdgeVariance(), edge_variance_reduction),
     ],
 )
-def test_the_settings_class_scores_as_its_function_does(acquisition, score) -> None:
+def test_the_settings_class_scores_as_its_function_does(acquisition: AcquisitionFunction, score: Score) -> None:
     p = some_posterior(2)
     torch.testing.assert_close(acquisition(p, ISIS_MS), score(p, ISIS_MS))
     assert all(isinstance(p, capability) for capability in acquisition.needs)

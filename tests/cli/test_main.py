@@ -1,46 +1,68 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeAlias
 
 import pytest
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
+from isiw import __version__
 from isiw.cli import app
 from isiw.config.run import true_window
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import list_strategies
+from known import known
+from scripted import ScriptedDevice, scripted_strategy
+
+Command: TypeAlias = Callable[..., Result]
 
 
 @pytest.fixture
-def isiw(tmp_path, monkeypatch):
+def isiw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
     """Runs isiw in an empty folder."""
     monkeypatch.chdir(tmp_path)
 
-    def run(*arguments):
+    def run(*arguments: object) -> Result:
         return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
     return run
 
 
+SHORT = "[strategy.settings]\nmax_trials = 3\nparticles = 100\n"
+
+
 @pytest.fixture
-def short(tmp_path):
+def short(tmp_path: Path) -> Path:
     """A configuration of few trials."""
     path = tmp_path / "short.toml"
-    path.write_text("[strategy.settings]\nmax_trials = 3\n")
+    path.write_text(SHORT)
     return path
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The log of a short session."""
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "short.toml").write_text(SHORT)
+    result = CliRunner().invoke(app, ["run", str(folder / "short.toml"), "--log", str(folder / "s.mcap")])
+    assert result.exit_code == 0, result.output
+    return folder / "s.mcap"
+
+
 @pytest.fixture
-def log(isiw, short, tmp_path):
-    assert isiw("run", short, "--log", "s.mcap").exit_code == 0
-    return tmp_path / "s.mcap"
+def log(finished: Path, tmp_path: Path) -> Path:
+    """A copy of that log."""
+    return Path(shutil.copy(finished, tmp_path))
 
 
-def test_run_ends_with_a_statement_a_log_and_a_picture(isiw, short, tmp_path) -> None:
+def test_run_ends_with_a_statement_a_log_and_a_picture(isiw: Command, short: Path, tmp_path: Path) -> None:
     result = isiw("run", short, "--seed", 3)
     assert result.exit_code == 0, result.output
     (log,) = (tmp_path / "isiw-sessions").glob("*.mcap")
@@ -56,13 +78,13 @@ def test_run_ends_with_a_statement_a_log_and_a_picture(isiw, short, tmp_path) ->
     assert read_session(log).header.seed == 3
 
 
-def test_run_shows_every_trial_as_it_comes(isiw, short) -> None:
+def test_run_shows_every_trial_as_it_comes(isiw: Command, short: Path) -> None:
     lines = isiw("run", short).output.splitlines()
     headings = next(number for number, line in enumerate(lines) if line.startswith("trial"))
     assert [line.split()[0] for line in lines[headings + 1 : headings + 4]] == ["0", "1", "2"]
 
 
-def test_run_with_recorded_emg_logs_the_raw_sweeps(isiw, short, recordings_folder) -> None:
+def test_run_with_recorded_emg_logs_the_raw_sweeps(isiw: Command, short: Path, recordings_folder: Path) -> None:
     result = isiw("run", short, "--subject", "recorded", "--data", recordings_folder, "--log", "r.mcap")
     assert result.exit_code == 0, result.output
     record = read_session("r.mcap")
@@ -70,7 +92,36 @@ def test_run_with_recorded_emg_logs_the_raw_sweeps(isiw, short, recordings_folde
     assert len(record.table.told) == 3
 
 
-def test_strategies_are_listed_and_can_be_named(isiw, short) -> None:
+def test_the_version_is_shown(isiw: Command) -> None:
+    result = isiw("--version")
+    assert (result.exit_code, result.output) == (0, f"isiw {__version__}\n")
+
+
+def test_a_strategys_settings_are_listed_as_a_configuration_has_them_with_unit_and_meaning(isiw: Command) -> None:
+    output = isiw("strategies", "default").output
+    assert "\nmax_trials = 80\n    stop after this many stimuli; mistrials count." in output
+    assert "\nstop_width_ms = 30.0  # ms\n" in output
+    assert "\nprior.profile.width_ms = [100.0, 0.42, 0.02]  # ms; median, sd, tail\n" in output
+    assert "\nprior.profile\n" in output
+    assert "\nfixed  # not set\n" in isiw("strategies", "gp-variance").output
+
+
+def test_what_is_listed_can_be_set(isiw: Command, tmp_path: Path) -> None:
+    listed = isiw("strategies", "default").output.splitlines()
+    lines = [line for line in listed if " = " in line and not line.startswith(" ")]
+    (tmp_path / "all.toml").write_text("\n".join(["[strategy.settings]", *lines]).replace("= 80", "= 2"))
+    result = isiw("run", "all.toml")
+    assert result.exit_code == 0, result.output
+    assert "The budget of 2 stimuli is used up." in result.output
+
+
+def test_the_settings_of_an_unknown_strategy_name_the_known_ones(isiw: Command) -> None:
+    result = isiw("strategies", "defualt")
+    assert result.exit_code == 1
+    assert "expected default, particles-window" in result.stderr
+
+
+def test_strategies_are_listed_and_can_be_named(isiw: Command, short: Path) -> None:
     listed = isiw("strategies").output
     for name, summary in list_strategies().items():
         assert name in listed
@@ -82,7 +133,7 @@ def test_strategies_are_listed_and_can_be_named(isiw, short) -> None:
     assert (settings["acquisition"], settings["max_trials"]) == ("mutual-information", 3)
 
 
-def test_run_never_overwrites_a_log(isiw, short, log) -> None:
+def test_run_never_overwrites_a_log(isiw: Command, short: Path, log: Path) -> None:
     before = log.read_bytes()
     result = isiw("run", short, "--log", log)
     assert result.exit_code == 1
@@ -100,7 +151,7 @@ def test_run_never_overwrites_a_log(isiw, short, log) -> None:
         (["resume", "nowhere.mcap"], "no such log"),
     ],
 )
-def test_an_error_is_a_message_and_exit_code_1(isiw, arguments, message) -> None:
+def test_an_error_is_a_message_and_exit_code_1(isiw: Command, arguments: list[str], message: str) -> None:
     result = isiw(*arguments)
     assert result.exit_code == 1
     assert result.output.startswith("error: ")
@@ -108,14 +159,14 @@ def test_an_error_is_a_message_and_exit_code_1(isiw, arguments, message) -> None
     assert "Traceback" not in result.output
 
 
-def test_show_lists_trials_and_repeats_the_statement(isiw, log) -> None:
+def test_show_lists_trials_and_repeats_the_statement(isiw: Command, log: Path) -> None:
     result = isiw("show", log)
     assert result.exit_code == 0
     assert len([line for line in result.output.splitlines() if line[:1].isdigit() and "ms" in line]) >= 3
     assert "The budget of 3 stimuli is used up." in result.output
 
 
-def test_show_of_a_damaged_log_says_what_was_lost_and_exits_3(isiw, log) -> None:
+def test_show_of_a_damaged_log_says_what_was_lost_and_exits_3(isiw: Command, log: Path) -> None:
     whole = bytearray(log.read_bytes())
     blocks = [at for at in range(len(whole)) if whole.startswith(b"\x04\x00\x00\x00zstd", at)]
     whole[blocks[4] + 60] ^= 0xFF
@@ -126,28 +177,29 @@ def test_show_of_a_damaged_log_says_what_was_lost_and_exits_3(isiw, log) -> None
     assert "trial" in result.output
 
 
-def test_show_of_an_unreadable_log_exits_3(isiw, tmp_path) -> None:
+def test_show_of_an_unreadable_log_exits_3(isiw: Command, tmp_path: Path) -> None:
     (tmp_path / "s.mcap").write_bytes(b"")
     assert isiw("show", "s.mcap").exit_code == 3
 
 
-def test_plot_draws_into_the_file(isiw, log, tmp_path) -> None:
+def test_plot_draws_into_the_file(isiw: Command, log: Path, tmp_path: Path) -> None:
     result = isiw("plot", log, "-o", "picture.pdf")
     assert result.exit_code == 0
     assert (tmp_path / "picture.pdf").stat().st_size > 5000
 
 
 def test_a_session_of_lab_software_with_its_own_configuration_is_drawn_without_a_truth(
-    isiw, tmp_path, scripted_strategy, scripted_device
+    isiw: Command,
+    tmp_path: Path,
 ) -> None:
-    Session(scripted_device(), scripted_strategy(2), log=tmp_path / "lab.mcap", config={"rig": "A", "seed": 3}).run()
+    Session(ScriptedDevice(), scripted_strategy(2), log=tmp_path / "lab.mcap", config={"rig": "A", "seed": 3}).run()
     result = isiw("plot", "lab.mcap", "-o", "picture.png")
     assert result.exit_code == 0, result.output
     assert true_window(read_session("lab.mcap")) is None
     assert isiw("show", "lab.mcap").exit_code == 0
 
 
-def test_exclude_appends_and_resume_learns_without_it(isiw, log) -> None:
+def test_exclude_appends_and_resume_learns_without_it(isiw: Command, log: Path) -> None:
     assert isiw("exclude", log, 1, "--reason", "sneezed").exit_code == 0
     shown = isiw("show", log).output
     assert "exclusion (trial 1): sneezed" in shown
@@ -157,8 +209,8 @@ def test_exclude_appends_and_resume_learns_without_it(isiw, log) -> None:
     assert "2 count; 1 excluded" in result.output
 
 
-def test_resume_of_another_softwares_log_says_how(isiw, tmp_path, scripted_strategy, scripted_device) -> None:
-    Session(scripted_device(), scripted_strategy(1), log=tmp_path / "s.mcap").run()
+def test_resume_of_another_softwares_log_says_how(isiw: Command, tmp_path: Path) -> None:
+    Session(ScriptedDevice(), scripted_strategy(1), log=tmp_path / "s.mcap").run()
     result = isiw("resume", "s.mcap")
     assert result.exit_code == 1
     assert "isiw.resume(path, device)" in result.output
@@ -168,11 +220,11 @@ COMMAND = [sys.executable, "-c", "from isiw.cli import app; app()"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
-def test_ctrl_c_closes_the_log_and_the_exit_code_says_so(tmp_path) -> None:
+def test_ctrl_c_closes_the_log_and_the_exit_code_says_so(tmp_path: Path) -> None:
     (tmp_path / "long.toml").write_text("[strategy.settings]\nmax_trials = 190\nstop_width_ms = 0.01\n")
     command = [*COMMAND, "run", "long.toml", "--log", "s.mcap"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603
-        lines = [process.stdout.readline() for _ in range(5)]
+        lines = [known(process.stdout).readline() for _ in range(5)]
         process.send_signal(signal.SIGINT)
         output, errors = process.communicate(timeout=60)
     assert lines[1].startswith("trial")
@@ -187,13 +239,13 @@ def test_ctrl_c_closes_the_log_and_the_exit_code_says_so(tmp_path) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
-def test_a_killed_run_is_resumed_to_where_it_would_have_come(tmp_path, isiw) -> None:
+def test_a_killed_run_is_resumed_to_where_it_would_have_come(tmp_path: Path, isiw: Command) -> None:
     text = "[strategy.settings]\nmax_trials = 12\nstop_width_ms = 0.01\n"
     (tmp_path / "twelve.toml").write_text(text)
     with subprocess.Popen(  # noqa: S603
         [*COMMAND, "run", "twelve.toml", "--log", "killed.mcap"], cwd=tmp_path, stdout=subprocess.PIPE, text=True
     ) as process:
-        reported = [process.stdout.readline() for _ in range(6)][2:]
+        reported = [known(process.stdout).readline() for _ in range(6)][2:]
         process.send_signal(signal.SIGKILL)
     assert len(read_session("killed.mcap").table) >= len(reported)
     assert isiw("resume", "killed.mcap").exit_code == 0
@@ -217,14 +269,14 @@ def test_help_and_import_load_no_torch_and_are_fast() -> None:
     assert (end.children_user - begin.children_user) + (end.children_system - begin.children_system) < 0.5
 
 
-def test_a_log_is_not_overwritten_by_its_picture(isiw, short, tmp_path) -> None:
+def test_a_log_is_not_overwritten_by_its_picture(isiw: Command, short: Path, tmp_path: Path) -> None:
     result = isiw("run", short, "--log", "s.png")
     assert result.exit_code == 1
     assert "overwritten by its picture" in result.output
     assert not (tmp_path / "s.png").exists()
 
 
-def test_what_the_operating_system_refuses_is_a_message(isiw, log, tmp_path) -> None:
+def test_what_the_operating_system_refuses_is_a_message(isiw: Command, log: Path, tmp_path: Path) -> None:
     (tmp_path / "picture.png").mkdir()
     result = isiw("plot", log, "-o", "picture.png")
     assert result.exit_code == 1

@@ -2,34 +2,48 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 from isiw.cli import app
 from isiw.studies import Failure, open_store
 from isiw.studies.store import Store
 from studies.tiny import TOML
 
+SMALL = TOML.replace("people = 12", "people = 2")
 
-def study(*arguments: object):
+
+def study(*arguments: object) -> Result:
     return CliRunner().invoke(app, ["study", *map(str, arguments)])
 
 
 @pytest.fixture
-def plan(tmp_path):
+def plan(tmp_path: Path) -> Path:
     path = tmp_path / "tiny.toml"
-    path.write_text(TOML.replace("people = 12", "people = 2"))
+    path.write_text(SMALL)
     return path
 
 
-@pytest.fixture
-def folder(plan):
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a study that is finished."""
+    plan = tmp_path_factory.mktemp("finished") / "tiny.toml"
+    plan.write_text(SMALL)
     assert study("run", plan, "--workers", 1).exit_code == 0
     return plan.with_name("tiny.study")
 
 
-def test_run_puts_the_results_beside_the_file_and_says_what_is_there(plan) -> None:
+@pytest.fixture
+def folder(finished: Path, tmp_path: Path) -> Path:
+    """A copy of that folder."""
+    return Path(shutil.copytree(finished, tmp_path / "tiny.study"))
+
+
+def test_run_puts_the_results_beside_the_file_and_says_what_is_there(plan: Path) -> None:
     result = study("run", plan, "--workers", 1)
     assert result.exit_code == 0, result.output
     assert "4/4" in result.output
@@ -38,7 +52,7 @@ def test_run_puts_the_results_beside_the_file_and_says_what_is_there(plan) -> No
     assert len(open_store(plan.with_name("tiny.study")).rows()) == 8
 
 
-def test_run_of_a_folder_goes_on_with_it(folder) -> None:
+def test_run_of_a_folder_goes_on_with_it(folder: Path) -> None:
     (folder / "parts" / "even.gaussian.00001.parquet").unlink()
     result = study("run", folder, "--workers", 1)
     assert result.exit_code == 0, result.output
@@ -46,7 +60,7 @@ def test_run_of_a_folder_goes_on_with_it(folder) -> None:
     assert len(open_store(folder).rows()) == 8
 
 
-def test_run_of_another_study_into_the_folder_is_refused(plan, folder) -> None:
+def test_run_of_another_study_into_the_folder_is_refused(plan: Path, folder: Path) -> None:
     plan.write_text(TOML)
     result = study("run", plan)
     assert result.exit_code == 1
@@ -54,13 +68,13 @@ def test_run_of_another_study_into_the_folder_is_refused(plan, folder) -> None:
     assert study("run", plan, "--out", folder.with_name("other"), "--workers", 0).exit_code == 1
 
 
-def test_replay_says_that_a_unit_is_identical(folder) -> None:
+def test_replay_says_that_a_unit_is_identical(folder: Path) -> None:
     result = study("replay", folder, "even.gaussian.00001")
     assert result.exit_code == 0, result.output
     assert "even.gaussian.00001 is identical: 2 rows." in result.output
 
 
-def test_replay_of_a_row_finds_its_unit_and_what_differs_is_exit_code_1(folder) -> None:
+def test_replay_of_a_row_finds_its_unit_and_what_differs_is_exit_code_1(folder: Path) -> None:
     path = folder / "parts" / "even.gaussian.00001.parquet"
     pd.read_parquet(path).assign(f1=-1.0).to_parquet(path)
     result = study("replay", folder, 3)
@@ -68,7 +82,7 @@ def test_replay_of_a_row_finds_its_unit_and_what_differs_is_exit_code_1(folder) 
     assert "even.gaussian.00001 is not what it was: f1 differ" in result.output
 
 
-def test_summary_prints_the_table_and_writes_it_with_a_figure(folder) -> None:
+def test_summary_prints_the_table_and_writes_it_with_a_figure(folder: Path) -> None:
     result = study("summary", folder)
     assert result.exit_code == 0, result.output
     table = pd.read_csv(folder / "summary.csv")
@@ -82,7 +96,7 @@ def test_summary_prints_the_table_and_writes_it_with_a_figure(folder) -> None:
     assert (folder / "summary.png").stat().st_size > 5000
 
 
-def test_sessions_that_failed_are_told_by_their_error(folder) -> None:
+def test_sessions_that_failed_are_told_by_their_error(folder: Path) -> None:
     store: Store = open_store(folder)
     for unit in store.study.units()[:2]:
         (folder / "parts" / f"{unit.key}.parquet").unlink()
@@ -96,7 +110,7 @@ def test_sessions_that_failed_are_told_by_their_error(folder) -> None:
     ("arguments", "message"),
     [(["run", "nowhere.toml"], "cannot be read"), (["summary", "nowhere"], "cannot be read")],
 )
-def test_an_error_is_a_message_and_exit_code_1(arguments, message) -> None:
+def test_an_error_is_a_message_and_exit_code_1(arguments: list[str], message: str) -> None:
     result = study(*arguments)
     assert result.exit_code == 1
     assert result.output.startswith("error: ")

@@ -1,20 +1,23 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 from isiw.cli import app
 from isiw.design import DesignSpace
 from isiw.devices.robot.tapper import Tapper
 from isiw.devices.simulated import SimulatedDevice
 from isiw.session.loop import Session
+from scripted import scripted_strategy
 
 
-def run(*arguments: object):
+def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, ["timing", *map(str, arguments)])
 
 
-def test_timing_of_a_preset_is_printed_and_drawn(tmp_path) -> None:
+def test_timing_of_a_preset_is_printed_and_drawn(tmp_path: Path) -> None:
     result = run("subject1", "--taps", 12, "--output", tmp_path / "timing.png")
     assert result.exit_code == 0
     assert "subject1: 108 taps" in result.output
@@ -27,7 +30,7 @@ def test_the_same_seed_gives_the_same_study() -> None:
     assert run("cushion", "--taps", 5, "--seed", 3).output != run("cushion", "--taps", 5, "--seed", 4).output
 
 
-def test_an_unknown_source_is_a_message_with_the_presets(tmp_path) -> None:
+def test_an_unknown_source_is_a_message_with_the_presets(tmp_path: Path) -> None:
     result = run(tmp_path / "nothing.mcap")
     assert result.exit_code == 1
     assert "timing-fault" in result.output
@@ -38,7 +41,7 @@ class NoResponse:
 
 
 @pytest.mark.parametrize(("there", "asked"), [("s.mcap.part", "s.mcap"), ("s.mcap", "s.mcap.part")])
-def test_timing_of_a_log_takes_either_of_its_names(tmp_path, scripted_strategy, there, asked) -> None:
+def test_timing_of_a_log_takes_either_of_its_names(tmp_path: Path, there: str, asked: str) -> None:
     strategy = scripted_strategy(4, space=DesignSpace(20, 200, reference="impact"))
     log = (
         Session(SimulatedDevice(Tapper(lambda _: NoResponse(), "subject4")), strategy, log=tmp_path / "s.mcap")

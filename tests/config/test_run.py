@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import pytest
 
@@ -18,11 +20,14 @@ from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
+from scripted import ScriptedDevice, scripted_strategy
+
+WriteFile: TypeAlias = Callable[[str], Path]
 
 
 @pytest.fixture
-def config_file(tmp_path):
-    def write(text):
+def config_file(tmp_path: Path) -> WriteFile:
+    def write(text: str) -> Path:
         path = tmp_path / "session.toml"
         path.write_text(text, encoding="utf-8")
         return path
@@ -36,7 +41,7 @@ def test_without_a_file_there_are_defaults() -> None:
     assert (config.space.reference, config.subject.cohort) == ("valve", "recruitment")
 
 
-def test_a_file_changes_what_it_names(config_file) -> None:
+def test_a_file_changes_what_it_names(config_file: WriteFile) -> None:
     config = load_config(config_file('seed = 7\n[subject]\ncohort = "gaussian"\n[strategy.settings]\nmax_trials = 4\n'))
     assert config.seed == 7
     assert config.subject.cohort == "gaussian"
@@ -65,7 +70,9 @@ def test_a_file_changes_what_it_names(config_file) -> None:
         ("seed = = 7", ["session.toml", "not valid TOML", "line 1"]),
     ],
 )
-def test_a_bad_file_is_an_error_that_names_file_key_value_and_remedy(config_file, text, parts) -> None:
+def test_a_bad_file_is_an_error_that_names_file_key_value_and_remedy(
+    config_file: WriteFile, text: str, parts: list[str]
+) -> None:
     with pytest.raises(ConfigError) as caught:
         load_config(config_file(text))
     for part in parts:
@@ -73,12 +80,12 @@ def test_a_bad_file_is_an_error_that_names_file_key_value_and_remedy(config_file
     assert str(caught.value).endswith(".")
 
 
-def test_a_missing_file_is_named(tmp_path) -> None:
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"cannot be read.*nowhere.toml"):
         load_config(tmp_path / "nowhere.toml")
 
 
-def test_the_command_line_wins_over_the_file(config_file) -> None:
+def test_the_command_line_wins_over_the_file(config_file: WriteFile) -> None:
     config = load_config(config_file("seed = 7\n")).with_overrides(seed=8, subject="recorded", data=Path("there"))
     assert (config.seed, config.subject.kind, config.subject.data) == (8, "recorded", Path("there"))
     assert config.with_overrides() == config
@@ -90,7 +97,9 @@ def test_a_bad_value_on_the_command_line_is_named() -> None:
 
 
 @pytest.mark.parametrize("given", [{"max_trials": 80}, {"max_trials": 50}, {}])
-def test_another_strategy_on_the_command_line_keeps_the_settings_that_were_given(config_file, given) -> None:
+def test_another_strategy_on_the_command_line_keeps_the_settings_that_were_given(
+    config_file: WriteFile, given: dict[str, int]
+) -> None:
     text = "".join(f"{key} = {value}\n" for key, value in given.items())
     config = load_config(config_file(f"[strategy.settings]\n{text}"))
     overridden = config.with_overrides(seed=8).with_overrides(strategy="pf")
@@ -98,7 +107,7 @@ def test_another_strategy_on_the_command_line_keeps_the_settings_that_were_given
     assert overridden.with_overrides(strategy="default").strategy == config.strategy
 
 
-def test_what_a_strategys_name_stands_for_is_not_kept_with_another(config_file) -> None:
+def test_what_a_strategys_name_stands_for_is_not_kept_with_another(config_file: WriteFile) -> None:
     config = load_config(config_file('[strategy]\nname = "nr2"\n'))
     assert config.with_overrides(strategy="nr").strategy.settings == {}
 
@@ -108,7 +117,7 @@ def test_the_same_seed_makes_the_same_person() -> None:
     assert subject_for(RunConfig(seed=3)) != subject_for(RunConfig(seed=4))
 
 
-def test_a_fresh_log_path_is_free(tmp_path, monkeypatch) -> None:
+def test_a_fresh_log_path_is_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     first = fresh_log_path(RunConfig())
     first.parent.mkdir()
@@ -122,7 +131,7 @@ def test_recorded_emg_needs_its_folder() -> None:
         device_for(RunConfig().with_overrides(subject="recorded"))
 
 
-def test_a_folder_without_recordings_is_named(tmp_path) -> None:
+def test_a_folder_without_recordings_is_named(tmp_path: Path) -> None:
     with pytest.raises(DeviceError, match="not found"):
         device_for(RunConfig().with_overrides(subject="recorded", data=tmp_path))
 
@@ -133,7 +142,7 @@ def test_a_simulated_device_answers_on_the_spaces_reference() -> None:
     assert device.describe().reference == "valve"
 
 
-def test_a_log_holds_the_configuration_it_was_run_with(tmp_path, config_file) -> None:
+def test_a_log_holds_the_configuration_it_was_run_with(tmp_path: Path, config_file: WriteFile) -> None:
     config = load_config(config_file("seed = 5\n[strategy.settings]\nmax_trials = 2\n"))
     config = config.with_overrides(log=tmp_path / "s.mcap")
     session_for(config).run()
@@ -144,7 +153,7 @@ def test_a_log_holds_the_configuration_it_was_run_with(tmp_path, config_file) ->
 
 
 @pytest.mark.parametrize("config", [{}, {"rig": "A"}, {"seed": 3}])
-def test_a_log_of_other_software_has_no_configuration(tmp_path, scripted_strategy, scripted_device, config) -> None:
-    Session(scripted_device(), scripted_strategy(1), log=tmp_path / "s.mcap", config=config).run()
+def test_a_log_of_other_software_has_no_configuration(tmp_path: Path, config: dict[str, Any]) -> None:
+    Session(ScriptedDevice(), scripted_strategy(1), log=tmp_path / "s.mcap", config=config).run()
     with pytest.raises(ConfigError, match=r"not run by isiw run.*isiw.resume"):
         config_of_log(read_session(tmp_path / "s.mcap"))

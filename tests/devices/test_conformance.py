@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 
+from isiw.design import DesignSpace
 from isiw.devices.callback import CallbackDevice
-from isiw.devices.clock import MonotonicClock, VirtualClock
+from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.recorded import RecordedPerson, Recordings
@@ -16,23 +19,26 @@ from isiw.devices.replay import RecordedTrials
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError
 from isiw.subjects.cohorts import cohort
+from isiw.subjects.subject import Response
 from isiw.testing import check_device
-from isiw.trials import Channel, Measurement, Status, Sweep, Trial, TrialTable
+from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial, TrialTable
+from isiw.types import Reference
+from known import instance
 
 
-def responder(reference="valve"):
+def responder(reference: Reference = "valve") -> Callable[[float | None], Response]:
     begun = cohort("drift", 1, 0)[0].begin(5)
     return lambda isi_ms: begun.respond(isi_ms, reference)
 
 
-def made_up_recordings():
+def made_up_recordings() -> Recordings:
     time_ms = np.arange(-150, 301) / 3.0
     rng = np.random.default_rng(0)
     mep = 0.5 * np.sin((time_ms - 18) / 2) * ((time_ms > 18) & (time_ms < 30))
     return Recordings(time_ms, 0.001 * rng.standard_normal((3, 451)), np.stack([mep, 2 * mep]))
 
 
-def table():
+def table() -> TrialTable:
     trials = [Trial(0, Status.ACCEPTED, None, mep_mv=0.01)]
     trials += [
         Trial(1 + k, Status.ACCEPTED, isi, isi_ms=isi, mep_mv=isi / 1e3) for k, isi in enumerate((0, 66, 133, 200))
@@ -40,25 +46,25 @@ def table():
     return TrialTable(tuple(trials))
 
 
-def test_a_simulated_device_conforms(space) -> None:
+def test_a_simulated_device_conforms(space: DesignSpace) -> None:
     check_device(lambda: SimulatedDevice(SimulatedPerson(responder(), "valve")), space)
 
 
-def test_a_device_of_recorded_sweeps_conforms(space) -> None:
+def test_a_device_of_recorded_sweeps_conforms(space: DesignSpace) -> None:
     check_device(lambda: SimulatedDevice(RecordedPerson(responder(), "valve", made_up_recordings(), seed=1)), space)
 
 
-def test_a_replaying_device_conforms(space) -> None:
+def test_a_replaying_device_conforms(space: DesignSpace) -> None:
     check_device(lambda: SimulatedDevice(RecordedTrials(table(), "valve")), space)
 
 
-def test_a_device_of_functions_conforms(space) -> None:
+def test_a_device_of_functions_conforms(space: DesignSpace) -> None:
     info = DeviceInfo("functions", "valve")
     device = CallbackDevice(lambda stimulus, timeout_s: Measurement(timeout_s, stimulus.isi_ms), info)
     check_device(lambda: device, space, clock=VirtualClock())
 
 
-def test_a_limited_device_conforms(space) -> None:
+def test_a_limited_device_conforms(space: DesignSpace) -> None:
     limits = Limits.of_space(space, min_iti_s=0.0)
     device = SimulatedDevice(SimulatedPerson(responder(), "valve"))
     check_device(lambda: LimitedDevice(device, limits, VirtualClock()), space)
@@ -70,7 +76,7 @@ class Careless(SimulatedDevice):
     def __init__(self) -> None:
         super().__init__(SimulatedPerson(responder(), "valve"))
 
-    def deliver(self, stimulus, timeout_s):
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:
         del timeout_s
         return Measurement(0.1, stimulus.isi_ms)
 
@@ -78,35 +84,35 @@ class Careless(SimulatedDevice):
 class Forgetful(SimulatedDevice):
     """Begins anew instead of resuming."""
 
-    def resume_after(self, stimuli) -> None:
+    def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
         del stimuli
 
 
 class Inaccurate(SimulatedDevice):
     """Fires too late."""
 
-    def deliver(self, stimulus, timeout_s):
-        answer = super().deliver(stimulus, timeout_s)
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:
+        answer = instance(Measurement, super().deliver(stimulus, timeout_s))
         late_ms = None if answer.isi_ms is None else answer.isi_ms + 20
         return Measurement(answer.mep_mv, late_ms)
 
 
-def test_the_suite_finds_a_device_that_fires_unarmed(space) -> None:
+def test_the_suite_finds_a_device_that_fires_unarmed(space: DesignSpace) -> None:
     with pytest.raises(AssertionError, match=r"before stage\(\)"):
         check_device(Careless, space)
 
 
-def test_the_suite_finds_a_device_that_cannot_resume(space) -> None:
+def test_the_suite_finds_a_device_that_cannot_resume(space: DesignSpace) -> None:
     with pytest.raises(AssertionError, match="never been interrupted"):
         check_device(lambda: Forgetful(SimulatedPerson(responder(), "valve")), space)
 
 
-def test_the_suite_finds_a_device_with_wrong_timing(space) -> None:
+def test_the_suite_finds_a_device_with_wrong_timing(space: DesignSpace) -> None:
     with pytest.raises(AssertionError, match=r"ISI off .* 20.* ms for 0"):
         check_device(lambda: Inaccurate(SimulatedPerson(responder(), "valve")), space)
 
 
-def test_the_suite_finds_a_device_on_another_reference(space) -> None:
+def test_the_suite_finds_a_device_on_another_reference(space: DesignSpace) -> None:
     with pytest.raises(AssertionError, match="reference"):
         check_device(lambda: SimulatedDevice(SimulatedPerson(responder("impact"), "impact")), space)
 
@@ -114,17 +120,18 @@ def test_the_suite_finds_a_device_on_another_reference(space) -> None:
 class Hardware:
     """Stays armed until it is told otherwise, fails at one delivery, and remembers when it fired."""
 
-    def __init__(self, fails_at=None, clock=None) -> None:
+    def __init__(self, fails_at: int | None = None, clock: Clock | None = None) -> None:
         self.fails_at, self.clock = fails_at, clock or VirtualClock()
-        self.armed, self.taken, self.fired_s = False, False, []
+        self.armed, self.taken = False, False
+        self.fired_s: list[float] = []
 
-    def describe(self):
+    def describe(self) -> DeviceInfo:
         return DeviceInfo("hardware", "valve")
 
     def stage(self) -> None:
         self.armed = self.taken = True
 
-    def deliver(self, stimulus, timeout_s):
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement | Sweep:
         del timeout_s
         if not self.armed:
             raise DeviceError("not armed")
@@ -143,14 +150,14 @@ class Hardware:
 class RememberingHardware(Hardware):
     """Has a memory."""
 
-    def resume_after(self, stimuli) -> None:
+    def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
         del stimuli
 
 
 class LateHardware(Hardware):
     """Answers with an ISI that nobody commanded."""
 
-    def deliver(self, stimulus, timeout_s):
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:
         super().deliver(stimulus, timeout_s)
         return Measurement(0.1, 1000.0)
 
@@ -163,7 +170,9 @@ class LateHardware(Hardware):
         (LateHardware(), AssertionError),
     ],
 )
-def test_a_device_that_fails_the_suite_is_left_disarmed(space, device, error) -> None:
+def test_a_device_that_fails_the_suite_is_left_disarmed(
+    space: DesignSpace, device: Hardware, error: type[Exception]
+) -> None:
     with pytest.raises(error):
         check_device(lambda: device, space, clock=VirtualClock())
     assert device.fired_s
@@ -171,42 +180,44 @@ def test_a_device_that_fails_the_suite_is_left_disarmed(space, device, error) ->
     assert not device.taken
 
 
-def test_an_inter_trial_interval_passes_before_each_delivery(space) -> None:
-    device = RememberingHardware()
-    check_device(lambda: device, space, clock=device.clock)
+def test_an_inter_trial_interval_passes_before_each_delivery(space: DesignSpace) -> None:
+    clock = VirtualClock()
+    device = RememberingHardware(clock=clock)
+    check_device(lambda: device, space, clock=clock)
     assert len(device.fired_s) == 8
     assert np.diff([0.0, *device.fired_s]).min() >= 5.0
 
 
-def test_the_suite_waits_in_real_time_for_a_device_that_is_not_simulated(space) -> None:
+def test_the_suite_waits_in_real_time_for_a_device_that_is_not_simulated(space: DesignSpace) -> None:
     device = Hardware(clock=MonotonicClock())
     check_device(lambda: device, space, iti_s=0.01)
     assert np.diff(device.fired_s).min() >= 0.01
 
 
 @pytest.mark.parametrize("iti_s", [-1.0, np.nan, np.inf])
-def test_an_interval_that_nobody_can_wait_for_is_an_error(space, iti_s) -> None:
+def test_an_interval_that_nobody_can_wait_for_is_an_error(space: DesignSpace, iti_s: float) -> None:
     device = Hardware()
     with pytest.raises(InvalidValueError, match="iti_s"):
         check_device(lambda: device, space, iti_s=iti_s)
     assert not device.fired_s
 
 
-def test_the_suite_finds_what_is_no_device(space) -> None:
+def test_the_suite_finds_what_is_no_device(space: DesignSpace) -> None:
+    nothing: Any = object()
     with pytest.raises(AssertionError, match="describe, stage"):
-        check_device(object, space)
+        check_device(lambda: nothing, space)
 
 
 class Slow(Hardware):
     """Takes longer than it is allowed to."""
 
-    def deliver(self, stimulus, timeout_s):
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement | Sweep:
         answer = super().deliver(stimulus, timeout_s)
         time.sleep(1.2 * timeout_s)
         return answer
 
 
-def test_the_suite_finds_a_device_that_ignores_its_timeout(space) -> None:
+def test_the_suite_finds_a_device_that_ignores_its_timeout(space: DesignSpace) -> None:
     with pytest.raises(AssertionError, match="within its timeout"):
         check_device(Slow, space, clock=VirtualClock(), timeout_s=0.05)
 
@@ -214,21 +225,21 @@ def test_the_suite_finds_a_device_that_ignores_its_timeout(space) -> None:
 class Rig(Hardware):
     """Answers with sweeps of some channels and lengths."""
 
-    def __init__(self, *, unit="mV", length_ms=600, other=None) -> None:
+    def __init__(self, *, unit: str = "mV", length_ms: int = 600, other: str | None = None) -> None:
         super().__init__()
         self.unit, self.length_ms, self.other = unit, length_ms, other
 
-    def describe(self):
+    def describe(self) -> DeviceInfo:
         return DeviceInfo("rig", "valve", channels={"emg": self.unit} | ({self.other: "V"} if self.other else {}))
 
-    def deliver(self, stimulus, timeout_s):
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Sweep:
         super().deliver(stimulus, timeout_s)
         noise = 0.001 * np.random.default_rng(stimulus.trial).standard_normal(5 * self.length_ms)
         channels = {name: Channel(noise, 5000.0, unit) for name, unit in self.describe().channels.items()}
         return Sweep(channels, t_valve_ms=100.0, t_tms_ms=100.0 + (stimulus.isi_ms or 0.0))
 
 
-def test_a_device_of_sweeps_conforms(space) -> None:
+def test_a_device_of_sweeps_conforms(space: DesignSpace) -> None:
     check_device(Rig, space, clock=VirtualClock())
 
 
@@ -240,6 +251,6 @@ def test_a_device_of_sweeps_conforms(space) -> None:
         ({"length_ms": 310}, "can use .*missing channel"),
     ],
 )
-def test_the_suite_finds_sweeps_that_no_session_could_use(space, rig, broken) -> None:
+def test_the_suite_finds_sweeps_that_no_session_could_use(space: DesignSpace, rig: dict[str, Any], broken: str) -> None:
     with pytest.raises(AssertionError, match=broken):
         check_device(lambda: Rig(**rig), space, clock=VirtualClock())

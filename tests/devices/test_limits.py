@@ -1,37 +1,41 @@
 from __future__ import annotations
 
 import math
-from typing import Never
+from typing import Any, Never
 
 import pytest
 
+from isiw.design import DesignSpace
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import LimitedDevice, Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError
 from isiw.trials import Stimulus
+from scripted import ScriptedDevice
 
 LIMITS = Limits(low_ms=0, high_ms=200, min_iti_s=5.0, max_pulses=3)
 
 
 @pytest.fixture
-def clock():
+def clock() -> VirtualClock:
     return VirtualClock()
 
 
 @pytest.fixture
-def inner(scripted_device):
-    return scripted_device()
+def inner() -> ScriptedDevice:
+    return ScriptedDevice()
 
 
 @pytest.fixture
-def limited(inner, clock):
+def limited(inner: ScriptedDevice, clock: VirtualClock) -> LimitedDevice:
     device = LimitedDevice(inner, LIMITS, clock)
     device.stage()
     return device
 
 
 @pytest.mark.parametrize("isi_ms", [-0.001, 200.001, 1e9])
-def test_an_isi_beyond_the_range_is_refused_before_anything_is_delivered(limited, inner, isi_ms) -> None:
+def test_an_isi_beyond_the_range_is_refused_before_anything_is_delivered(
+    limited: LimitedDevice, inner: ScriptedDevice, isi_ms: float
+) -> None:
     with pytest.raises(LimitExceededError, match="beyond the limits"):
         limited.deliver(Stimulus(0, isi_ms), 1.0)
     assert inner.delivered == []
@@ -39,12 +43,16 @@ def test_an_isi_beyond_the_range_is_refused_before_anything_is_delivered(limited
 
 
 @pytest.mark.parametrize("isi_ms", [0.0, 200.0, None])
-def test_the_ends_of_the_range_and_tms_alone_are_allowed(limited, inner, isi_ms) -> None:
+def test_the_ends_of_the_range_and_tms_alone_are_allowed(
+    limited: LimitedDevice, inner: ScriptedDevice, isi_ms: float
+) -> None:
     limited.deliver(Stimulus(0, isi_ms), 1.0)
     assert inner.delivered == [Stimulus(0, isi_ms)]
 
 
-def test_a_stimulus_before_the_interval_is_over_is_refused(limited, inner, clock) -> None:
+def test_a_stimulus_before_the_interval_is_over_is_refused(
+    limited: LimitedDevice, inner: ScriptedDevice, clock: VirtualClock
+) -> None:
     limited.deliver(Stimulus(0, 10), 1.0)
     clock.sleep_s(4.999)
     with pytest.raises(LimitExceededError, match="too early"):
@@ -55,8 +63,8 @@ def test_a_stimulus_before_the_interval_is_over_is_refused(limited, inner, clock
     assert len(inner.delivered) == 2
 
 
-def test_the_interval_runs_from_the_end_of_the_last_attempt(inner, clock) -> None:
-    def slow(stimulus) -> Never:
+def test_the_interval_runs_from_the_end_of_the_last_attempt(inner: ScriptedDevice, clock: VirtualClock) -> None:
+    def slow(stimulus: Stimulus) -> Never:
         del stimulus
         clock.sleep_s(3.0)
         raise DeviceError("no answer")
@@ -69,8 +77,8 @@ def test_the_interval_runs_from_the_end_of_the_last_attempt(inner, clock) -> Non
     assert limited.wait_s() == 5.0
 
 
-def test_a_delivery_that_fails_counts_as_delivered(limited, inner) -> None:
-    def failing(stimulus) -> Never:
+def test_a_delivery_that_fails_counts_as_delivered(limited: LimitedDevice, inner: ScriptedDevice) -> None:
+    def failing(stimulus: Stimulus) -> Never:
         raise RuntimeError(stimulus)
 
     inner.answer = failing
@@ -79,7 +87,9 @@ def test_a_delivery_that_fails_counts_as_delivered(limited, inner) -> None:
     assert limited.pulses_left == 2
 
 
-def test_no_pulse_beyond_the_largest_number_is_delivered(limited, inner, clock) -> None:
+def test_no_pulse_beyond_the_largest_number_is_delivered(
+    limited: LimitedDevice, inner: ScriptedDevice, clock: VirtualClock
+) -> None:
     for trial in range(3):
         limited.deliver(Stimulus(trial, 10), 1.0)
         clock.sleep_s(5.0)
@@ -89,7 +99,7 @@ def test_no_pulse_beyond_the_largest_number_is_delivered(limited, inner, clock) 
     assert len(inner.delivered) == 3
 
 
-def test_pulses_of_an_earlier_run_count(inner, clock) -> None:
+def test_pulses_of_an_earlier_run_count(inner: ScriptedDevice, clock: VirtualClock) -> None:
     limited = LimitedDevice(inner, LIMITS, clock, delivered=3)
     limited.stage()
     with pytest.raises(LimitExceededError, match="limit of 3 pulses"):
@@ -97,12 +107,14 @@ def test_pulses_of_an_earlier_run_count(inner, clock) -> None:
     assert inner.delivered == []
 
 
-def test_the_first_stimulus_after_a_resumption_waits_a_whole_interval(inner, clock) -> None:
+def test_the_first_stimulus_after_a_resumption_waits_a_whole_interval(
+    inner: ScriptedDevice, clock: VirtualClock
+) -> None:
     limited = LimitedDevice(inner, LIMITS, clock, delivered=1)
     assert limited.wait_s() == LIMITS.min_iti_s
 
 
-def test_nothing_is_delivered_unless_staged(inner, clock) -> None:
+def test_nothing_is_delivered_unless_staged(inner: ScriptedDevice, clock: VirtualClock) -> None:
     limited = LimitedDevice(inner, LIMITS, clock)
     with pytest.raises(DeviceError, match="not staged"):
         limited.deliver(Stimulus(0, 10), 1.0)
@@ -114,12 +126,13 @@ def test_nothing_is_delivered_unless_staged(inner, clock) -> None:
     assert limited.pulses_left == 3
 
 
-def test_a_device_that_fails_to_stage_stays_disarmed(inner, clock) -> None:
-    def broken() -> Never:
+class Powerless(ScriptedDevice):
+    def stage(self) -> Never:
         raise DeviceError("no power")
 
-    inner.stage = broken
-    limited = LimitedDevice(inner, LIMITS, clock)
+
+def test_a_device_that_fails_to_stage_stays_disarmed(clock: VirtualClock) -> None:
+    limited = LimitedDevice(Powerless(), LIMITS, clock)
     with pytest.raises(DeviceError, match="no power"):
         limited.stage()
     with pytest.raises(DeviceError, match="not staged"):
@@ -141,11 +154,11 @@ def test_a_device_that_fails_to_stage_stays_disarmed(inner, clock) -> None:
         {"max_pulses": True},
     ],
 )
-def test_limits_that_limit_nothing_are_refused(values) -> None:
+def test_limits_that_limit_nothing_are_refused(values: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         Limits(**({"low_ms": 0, "high_ms": 200} | values))
 
 
-def test_limits_of_a_space_hold_exactly_its_isis(space) -> None:
+def test_limits_of_a_space_hold_exactly_its_isis(space: DesignSpace) -> None:
     limits = Limits.of_space(space, max_pulses=7)
     assert (limits.low_ms, limits.high_ms, limits.max_pulses) == (space.low_ms, space.high_ms, 7)

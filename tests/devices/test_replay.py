@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -9,12 +10,14 @@ from isiw.devices.limits import Limits
 from isiw.devices.replay import RecordedTrials
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError
-from isiw.log.reader import read_session
+from isiw.log.reader import SessionRecord, read_session
 from isiw.metrics import f1
-from isiw.session.loop import Session
+from isiw.session.loop import Session, SessionResult
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.cohorts import cohort
-from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
+from isiw.subjects.subject import SimulatedSubject
+from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Trial, TrialTable
+from known import instance
 
 TABLE = TrialTable(
     (
@@ -29,41 +32,41 @@ TABLE = TrialTable(
 
 
 @pytest.fixture
-def device():
+def device() -> SimulatedDevice:
     replay = SimulatedDevice(RecordedTrials(TABLE, "impact"))
     replay.stage()
     return replay
 
 
-def meps(device, *isis):
-    return [device.deliver(Stimulus(trial, isi), 1.0).mep_mv for trial, isi in enumerate(isis)]
+def meps(device: SimulatedDevice, *isis: float | None) -> list[float]:
+    return [instance(Measurement, device.deliver(Stimulus(trial, isi), 1.0)).mep_mv for trial, isi in enumerate(isis)]
 
 
-def test_the_same_asks_get_the_same_answers_in_order(device) -> None:
+def test_the_same_asks_get_the_same_answers_in_order(device: SimulatedDevice) -> None:
     assert meps(device, 10.0, 50.0, 50.0) == [0.01, 0.05, 0.07]
 
 
-def test_another_ask_gets_the_nearest_trial_at_its_own_isi(device) -> None:
-    assert device.deliver(Stimulus(0, 35.0), 1.0).isi_ms == 49.0
+def test_another_ask_gets_the_nearest_trial_at_its_own_isi(device: SimulatedDevice) -> None:
+    assert instance(Measurement, device.deliver(Stimulus(0, 35.0), 1.0)).isi_ms == 49.0
 
 
-def test_tms_alone_is_answered_by_tms_alone(device) -> None:
+def test_tms_alone_is_answered_by_tms_alone(device: SimulatedDevice) -> None:
     assert meps(device, None) == [0.02]
 
 
-def test_each_trial_answers_once(device) -> None:
+def test_each_trial_answers_once(device: SimulatedDevice) -> None:
     meps(device, 10.0, 50.0, 50.0)
     with pytest.raises(DeviceError, match=r"no recorded trial is left.*max_pulses"):
         device.deliver(Stimulus(3, 50.0), 1.0)
 
 
 @pytest.fixture
-def person():
+def person() -> SimulatedSubject:
     return cohort("gaussian", 1, 3)[0]
 
 
 @pytest.fixture
-def recording(person, tmp_path):
+def recording(person: SimulatedSubject, tmp_path: Path) -> SessionRecord:
     """A logged session of a strategy that asks at random."""
     begun = person.begin(5)
     device = SimulatedDevice(SimulatedPerson(lambda isi_ms: begun.respond(isi_ms, "valve"), "valve"))
@@ -71,7 +74,7 @@ def recording(person, tmp_path):
     return read_session(Session(device, strategy, log=tmp_path / "first.mcap").run().log)
 
 
-def run_again(recording, log, tolerance_ms):
+def run_again(recording: SessionRecord, log: Path, tolerance_ms: float) -> SessionResult:
     """A session of the default strategy on the recorded trials, as the device's documentation says."""
     space = replace(recording.header.space, tolerance_ms=tolerance_ms)
     pairs = sum(trial.isi_ms is not None for trial in recording.table.told)
@@ -80,7 +83,9 @@ def run_again(recording, log, tolerance_ms):
     return Session(device, make_strategy(space=space, particles=200), log=log, limits=limits).run()
 
 
-def test_another_strategy_learns_from_every_recorded_trial_of_a_session(recording, person, tmp_path) -> None:
+def test_another_strategy_learns_from_every_recorded_trial_of_a_session(
+    recording: SessionRecord, person: SimulatedSubject, tmp_path: Path
+) -> None:
     result = run_again(recording, tmp_path / "again.mcap", tolerance_ms=1000.0)
     assert all(trial.told for trial in result.trials)
     recorded = {(trial.isi_ms, trial.mep_mv) for trial in recording.table.told}
@@ -89,7 +94,9 @@ def test_another_strategy_learns_from_every_recorded_trial_of_a_session(recordin
     assert f1(result.estimate, person.window(VALVE_SPACE), VALVE_SPACE) > 0.9
 
 
-def test_with_the_usual_tolerance_most_recorded_trials_are_mistrials_for_another_strategy(recording, tmp_path) -> None:
+def test_with_the_usual_tolerance_most_recorded_trials_are_mistrials_for_another_strategy(
+    recording: SessionRecord, tmp_path: Path
+) -> None:
     result = run_again(recording, tmp_path / "again.mcap", tolerance_ms=10.0)
     lost = [trial for trial in result.trials if trial.reason is MistrialReason.ISI_OFF]
     assert len(lost) > len(result.trials) / 2

@@ -5,12 +5,13 @@ from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError
 from isiw.subjects.subject import Response
 from isiw.trials import Measurement, Stimulus
+from known import instance, known
 
 
 def test_it_reports_what_the_person_answers_at_the_realised_isi() -> None:
-    device = SimulatedDevice(SimulatedPerson(lambda isi_ms: Response(isi_ms + 1.5, 0.07, 2.0), "impact"))
+    device = SimulatedDevice(SimulatedPerson(lambda isi_ms: Response(known(isi_ms) + 1.5, 0.07, 2.0), "impact"))
     device.stage()
-    measured = device.deliver(Stimulus(0, 40.0), 1.0)
+    measured = instance(Measurement, device.deliver(Stimulus(0, 40.0), 1.0))
     assert (measured.isi_ms, measured.mep_mv, measured.isi_sd_ms) == (41.5, 0.07, 2.0)
 
 
@@ -21,9 +22,9 @@ def test_it_says_that_it_is_simulated() -> None:
 
 
 def test_resuming_answers_only_what_was_not_answered_before() -> None:
-    asked = []
+    asked: list[float | None] = []
 
-    def respond(isi_ms):
+    def respond(isi_ms: float | None) -> Response:
         asked.append(isi_ms)
         return Response(isi_ms, 0.01)
 
@@ -39,16 +40,17 @@ def test_what_was_refused_before_is_refused_again_and_counts_as_asked() -> None:
         info = DeviceInfo("choosy", "impact", simulated=True)
 
         def __init__(self) -> None:
-            self.answered = []
+            self.answered: list[int] = []
 
-        def answer(self, stimulus):
-            if stimulus.isi_ms < 10:
+        def answer(self, stimulus: Stimulus) -> Measurement:
+            if known(stimulus.isi_ms) < 10:
                 raise DeviceError("too short")
             self.answered.append(stimulus.trial)
             return Measurement(0.1, stimulus.isi_ms)
 
     stimuli = [Stimulus(0, 20.0), Stimulus(1, 5.0), Stimulus(2, 30.0)]
-    device = SimulatedDevice(Choosy())
+    choosy = Choosy()
+    device = SimulatedDevice(choosy)
     device.resume_after(stimuli)
     device.resume_after([*stimuli, Stimulus(3, 40.0)])
-    assert device.simulation.answered == [0, 2, 3]
+    assert choosy.answered == [0, 2, 3]

@@ -1,61 +1,22 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
-import numpy as np
 import pytest
 
-from isiw.design import DesignSpace
-from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
-from isiw.log.schema import Header, Intent, StrategyRecipe, Waveform
+from isiw.log.schema import Header
 from isiw.log.writer import LogWriter
-from isiw.signals.judgement import SignalLimits
-from isiw.trials import Channel, Status, Trial
-
-SPACE = DesignSpace(0, 200)
-
-
-def make_header(**changes):
-    values = {
-        "isiw_version": "0.1.0",
-        "created": "2026-11-21T10:00:00+00:00",
-        "subject": "P07",
-        "seed": 4,
-        "strategy": StrategyRecipe(name="default", seed=4, settings={"max_trials": 9}),
-        "space": SPACE,
-        "limits": Limits.of_space(SPACE),
-        "device": DeviceInfo("bench", "impact", channels={"emg": "mV"}),
-        "signals": SignalLimits(),
-        "config": {"nested": {"answer": 42}},
-    }
-    return Header(**(values | changes))
-
-
-def write_trials(log, trials) -> None:
-    """Write as a session does: intent, sync, waveform, trial, sync."""
-    rng = np.random.default_rng(0)
-    for k in trials:
-        log.append(Intent(trial=k, isi_ms=float(k)))
-        log.sync()
-        log.append(Waveform.of(k, Channel(rng.standard_normal(50), 3000.0, "mV")), "emg")
-        log.append(Trial(k, Status.ACCEPTED, float(k), isi_ms=float(k), mep_mv=0.01 * k))
-        log.sync()
+from log.written import make_header, write_trials
 
 
 @pytest.fixture
-def header():
+def header() -> Header:
     return make_header()
 
 
 @pytest.fixture
-def writes():
-    """Appends some trials to a log."""
-    return write_trials
-
-
-@pytest.fixture
-def finished_log(tmp_path, header):
+def finished_log(tmp_path: Path, header: Header) -> Path:
     """A closed log of eight trials."""
     with LogWriter.create(tmp_path / "s.mcap", header) as log:
         write_trials(log, range(8))
@@ -63,11 +24,12 @@ def finished_log(tmp_path, header):
 
 
 @pytest.fixture
-def broken_log(tmp_path, header):
+def broken_log(tmp_path: Path, header: Header) -> Path:
     """A log of eight trials as a killed session leaves it: never closed."""
     log = LogWriter.create(tmp_path / "running" / "s.mcap", header)
     write_trials(log, range(8))
-    part = shutil.copy(tmp_path / "running" / "s.mcap.part", tmp_path / "s.mcap.part")
+    part = tmp_path / "s.mcap.part"
+    shutil.copy(tmp_path / "running" / "s.mcap.part", part)
     log.close()
     shutil.rmtree(tmp_path / "running")
     return part

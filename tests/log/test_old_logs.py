@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ import isiw
 from isiw.errors import OtherVersionsWarning
 from isiw.plots import save_session_plot
 from isiw.report import final_statement
+from isiw.trials import MistrialReason
 
 FOLDER = Path(__file__).parents[1] / "data" / "logs"
 LOGS = sorted(path.name for path in FOLDER.glob("*.mcap*"))
@@ -36,7 +38,7 @@ def log_of(name: str) -> str:
 
 
 @pytest.fixture
-def copy(tmp_path):
+def copy(tmp_path: Path) -> Callable[[str], Path]:
     def copied(name: str) -> Path:
         shutil.copyfile(FOLDER / name, tmp_path / name)
         return tmp_path / log_of(name)
@@ -44,7 +46,7 @@ def copy(tmp_path):
     return copied
 
 
-def person(name: str):
+def person(name: str) -> isiw.Tapper | isiw.SimulatedPerson:
     if "waveforms" in name:
         answer = type("Answer", (), {"mep_mv": 0.2})()
         return isiw.Tapper(lambda _: answer, "subject2", isiw.TapperSettings(rate_hz=1000.0))
@@ -53,12 +55,12 @@ def person(name: str):
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_it_is_what_it_was(name) -> None:
+def test_it_is_what_it_was(name: str) -> None:
     assert hashlib.sha256((FOLDER / name).read_bytes()).hexdigest() == DIGESTS[name]
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_it_opens_whole(name) -> None:
+def test_it_opens_whole(name: str) -> None:
     record = isiw.read_session(FOLDER / log_of(name))
     assert record.losses == ()
     assert record.finished is not name.endswith(".part")
@@ -69,13 +71,13 @@ def test_it_opens_whole(name) -> None:
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_it_is_drawn(name, tmp_path) -> None:
+def test_it_is_drawn(name: str, tmp_path: Path) -> None:
     record = isiw.read_session(FOLDER / log_of(name))
     assert save_session_plot(record, tmp_path / "session.png").stat().st_size > 5000
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_it_goes_on(name, copy) -> None:
+def test_it_goes_on(name: str, copy: Callable[[str], Path]) -> None:
     log = copy(name)
     before = isiw.read_session(log)
     with warnings.catch_warnings():
@@ -91,13 +93,13 @@ def test_it_goes_on(name, copy) -> None:
     assert [trial.index for trial in after.table] == list(range(len(after.table)))
 
 
-def test_the_killed_session_delivers_what_is_left_of_its_budget(copy) -> None:
+def test_the_killed_session_delivers_what_is_left_of_its_budget(copy: Callable[[str], Path]) -> None:
     log = copy("e31d040-killed.mcap.part")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OtherVersionsWarning)
         trials = isiw.resume(log, isiw.SimulatedDevice(person("killed"))).run().trials
     assert len(trials) == 6
-    assert [trial.reason for trial in trials].count("outcome unknown") == 1
+    assert [trial.reason for trial in trials].count(MistrialReason.OUTCOME_UNKNOWN) == 1
 
 
 def test_the_recorded_waveforms_are_there() -> None:

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -10,19 +12,20 @@ from isiw.devices.limits import Limits
 from isiw.errors import LogError
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
-from isiw.log.schema import SCHEMA_VERSION, Event, Intent, Waveform
+from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel
+from log.written import write_trials
 
 
-def test_the_trials_are_a_data_frame(finished_log) -> None:
+def test_the_trials_are_a_data_frame(finished_log: Path) -> None:
     trials = read_session(finished_log).trials
     assert isinstance(trials, pd.DataFrame)
     assert trials.index.tolist() == list(range(8))
     assert trials.mep_mv.tolist() == pytest.approx([0.01 * k for k in range(8)])
 
 
-def test_the_sweeps_are_there_by_trial(finished_log) -> None:
+def test_the_sweeps_are_there_by_trial(finished_log: Path) -> None:
     record = read_session(finished_log)
     sweep = record.sweep(3)
     assert set(sweep) == {"emg"}
@@ -30,30 +33,39 @@ def test_the_sweeps_are_there_by_trial(finished_log) -> None:
     assert record.sweep(99) == {}
 
 
-def test_an_excluded_trial_is_marked_and_not_gone(tmp_path, header, writes) -> None:
+def test_an_excluded_trial_is_marked_and_not_gone(tmp_path: Path, header: Header) -> None:
     with LogWriter.create(tmp_path / "s.mcap", header) as log:
-        writes(log, range(3))
+        write_trials(log, range(3))
         log.append(Event(kind="exclusion", trial=1, text="sneezed"))
     record = read_session(tmp_path / "s.mcap")
     assert record.trials.excluded.tolist() == [False, True, False]
     assert [trial.index for trial in record.table.told] == [0, 2]
 
 
-def test_an_intent_without_a_trial_is_unknown(tmp_path, header, writes) -> None:
+def test_an_intent_without_a_trial_is_unknown(tmp_path: Path, header: Header) -> None:
     with LogWriter.create(tmp_path / "s.mcap", header) as log:
-        writes(log, range(2))
+        write_trials(log, range(2))
         log.append(Intent(trial=2, isi_ms=77.0))
     assert [(i.trial, i.isi_ms) for i in read_session(tmp_path / "s.mcap").unknown] == [(2, 77.0)]
 
 
-def test_before_the_first_trial_there_is_no_decision(tmp_path, header) -> None:
+def test_a_record_is_printed_with_what_is_unknown_and_what_is_lost(tmp_path: Path, header: Header) -> None:
+    with LogWriter.create(tmp_path / "s.mcap", header) as log:
+        write_trials(log, range(2))
+        log.append(Intent(trial=2, isi_ms=30.0))
+    record = read_session(tmp_path / "s.mcap")
+    assert "\nTrials: 2 delivered, 2 told, 1 of unknown outcome\n" in str(record)
+    assert "\nLost: the end.\nLog: " in str(replace(record, losses=("the end.",)))
+
+
+def test_before_the_first_trial_there_is_no_decision(tmp_path: Path, header: Header) -> None:
     LogWriter.create(tmp_path / "s.mcap", header).close()
     record = read_session(tmp_path / "s.mcap")
     assert record.decision is None
     assert len(record.trials) == 0
 
 
-def test_a_log_of_a_newer_version_is_refused(tmp_path, header) -> None:
+def test_a_log_of_a_newer_version_is_refused(tmp_path: Path, header: Header) -> None:
     newer = header.model_copy(update={"schema_version": SCHEMA_VERSION + 1})
     LogWriter.create(tmp_path / "s.mcap", newer).close()
     with pytest.raises(LogError, match=r"newer isiw.*Upgrade"):
@@ -61,7 +73,7 @@ def test_a_log_of_a_newer_version_is_refused(tmp_path, header) -> None:
 
 
 @pytest.fixture
-def resumed_log(finished_log, header):
+def resumed_log(finished_log: Path, header: Header) -> tuple[Path, Header]:
     """A log whose second header stands in another block than its first, and that header."""
     with LogWriter.continuing(finished_log, salvage(finished_log), header) as log:
         for trial in range(8, 11):
@@ -72,12 +84,12 @@ def resumed_log(finished_log, header):
     return finished_log, tightened
 
 
-def test_the_last_header_holds(resumed_log) -> None:
+def test_the_last_header_holds(resumed_log: tuple[Path, Header]) -> None:
     log, tightened = resumed_log
     assert read_session(log).header == tightened
 
 
-def test_the_last_header_holds_where_its_record_is_lost(resumed_log) -> None:
+def test_the_last_header_holds_where_its_record_is_lost(resumed_log: tuple[Path, Header]) -> None:
     log, tightened = resumed_log
     whole = bytearray(log.read_bytes())
     blocks = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
@@ -89,7 +101,7 @@ def test_the_last_header_holds_where_its_record_is_lost(resumed_log) -> None:
     assert record.header == tightened
 
 
-def test_a_damaged_configuration_is_said_and_not_believed(broken_log, header) -> None:
+def test_a_damaged_configuration_is_said_and_not_believed(broken_log: Path, header: Header) -> None:
     whole = broken_log.read_bytes()
     broken_log.write_bytes(whole.replace(b"max_pulses = 200", b"max_pulses = 900"))
     record = read_session(broken_log)

@@ -1,29 +1,30 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from isiw.errors import DamagedLogError, LogError
-from isiw.log.reader import read_session
+from isiw.log.reader import SessionRecord, read_session
 from isiw.log.salvage import current_file, salvage
-from isiw.log.schema import Intent, Waveform
+from isiw.log.schema import Header, Intent, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel, Status, Trial
 
 
-def sample(below, size):
-    return np.random.default_rng(20).choice(below, size, replace=False).tolist()
+def sample(below: int, size: int) -> list[int]:
+    return [int(place) for place in np.random.default_rng(20).choice(below, size, replace=False)]
 
 
-def content(record):
+def content(record: SessionRecord) -> tuple[object, ...]:
     waveforms = {key: (channel.values.tolist(), channel.rate_hz) for key, channel in record.waveforms.items()}
     return record.header, record.history, waveforms
 
 
 @pytest.mark.parametrize("kind", ["finished_log", "broken_log"])
-def test_no_flipped_bit_changes_what_is_read_unnoticed(kind, request) -> None:
+def test_no_flipped_bit_changes_what_is_read_unnoticed(kind: str, request: pytest.FixtureRequest) -> None:
     log = request.getfixturevalue(kind)
     whole, original = log.read_bytes(), content(read_session(log))
     noticed = 0
@@ -42,7 +43,7 @@ def test_no_flipped_bit_changes_what_is_read_unnoticed(kind, request) -> None:
     assert noticed == 300 if kind == "finished_log" else noticed > 150
 
 
-def test_a_flipped_bit_costs_no_more_than_its_own_block(finished_log) -> None:
+def test_a_flipped_bit_costs_no_more_than_its_own_block(finished_log: Path) -> None:
     whole, all_trials = finished_log.read_bytes(), set(range(8))
     for position in sample(8 * len(whole), 200):
         flipped = bytearray(whole)
@@ -52,7 +53,7 @@ def test_a_flipped_bit_costs_no_more_than_its_own_block(finished_log) -> None:
         assert len(all_trials - kept) <= 1
 
 
-def test_a_length_that_swallows_other_blocks_costs_none_of_them(finished_log) -> None:
+def test_a_length_that_swallows_other_blocks_costs_none_of_them(finished_log: Path) -> None:
     whole = bytearray(finished_log.read_bytes())
     blocks = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
     first, other = blocks[4], blocks[12]
@@ -64,7 +65,7 @@ def test_a_length_that_swallows_other_blocks_costs_none_of_them(finished_log) ->
     assert record.losses
 
 
-def test_a_log_torn_anywhere_keeps_every_trial_before_the_tear(broken_log) -> None:
+def test_a_log_torn_anywhere_keeps_every_trial_before_the_tear(broken_log: Path) -> None:
     whole = broken_log.read_bytes()
     ends = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
     for cut in sample(len(whole) - ends[0] - 2000, 60):
@@ -77,12 +78,12 @@ def test_a_log_torn_anywhere_keeps_every_trial_before_the_tear(broken_log) -> No
         assert record.losses or record.unknown or len(record.table) == (complete + 1) // 2
 
 
-def test_a_session_that_was_killed_between_records_has_lost_nothing(broken_log) -> None:
+def test_a_session_that_was_killed_between_records_has_lost_nothing(broken_log: Path) -> None:
     record = read_session(broken_log)
     assert (len(record.table), record.losses, record.finished) == (8, (), False)
 
 
-def test_what_is_lost_is_said_in_words(finished_log) -> None:
+def test_what_is_lost_is_said_in_words(finished_log: Path) -> None:
     whole = bytearray(finished_log.read_bytes())
     third = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)][5]
     whole[third + 60] ^= 0xFF
@@ -93,7 +94,7 @@ def test_what_is_lost_is_said_in_words(finished_log) -> None:
     assert len(record.table) + len(record.unknown) == 8
 
 
-def test_without_its_first_block_a_log_still_has_its_header(finished_log) -> None:
+def test_without_its_first_block_a_log_still_has_its_header(finished_log: Path) -> None:
     whole = bytearray(finished_log.read_bytes())
     original = read_session(finished_log)
     first = whole.find(b"\x04\x00\x00\x00zstd")
@@ -106,18 +107,18 @@ def test_without_its_first_block_a_log_still_has_its_header(finished_log) -> Non
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAP0\r\n", bytes(5000)])
-def test_what_is_no_log_is_refused(tmp_path, content) -> None:
+def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "s.mcap").write_bytes(content)
     with pytest.raises(DamagedLogError):
         read_session(tmp_path / "s.mcap")
 
 
-def test_a_log_that_does_not_exist_is_named(tmp_path) -> None:
+def test_a_log_that_does_not_exist_is_named(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"no such log.*nowhere"):
         salvage(tmp_path / "nowhere.mcap")
 
 
-def test_the_part_is_read_where_there_are_both(tmp_path) -> None:
+def test_the_part_is_read_where_there_are_both(tmp_path: Path) -> None:
     for name in ("s.mcap", "s.mcap.part"):
         (tmp_path / name).write_bytes(b"x")
     for name in ("s.mcap", "s.mcap.part"):
@@ -125,12 +126,14 @@ def test_the_part_is_read_where_there_are_both(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("path", ["", ".", "/", 300 * "s"])
-def test_what_can_be_no_file_is_an_error_of_its_own(path) -> None:
+def test_what_can_be_no_file_is_an_error_of_its_own(path: str) -> None:
     with pytest.raises(LogError):
         salvage(path)
 
 
-def test_a_channel_of_the_devices_own_is_known_without_the_block_that_defines_it(tmp_path, header) -> None:
+def test_a_channel_of_the_devices_own_is_known_without_the_block_that_defines_it(
+    tmp_path: Path, header: Header
+) -> None:
     with LogWriter.create(tmp_path / "s.mcap", header) as log:
         for trial in range(3):
             log.append(Intent(trial=trial, isi_ms=5.0))

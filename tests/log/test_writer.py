@@ -12,28 +12,29 @@ from mcap.reader import make_reader
 from isiw.errors import LogError
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Waveform
+from isiw.log.schema import Event, Header, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel
+from log.written import write_trials
 
 
-def test_a_log_is_a_part_until_it_is_closed(tmp_path, header) -> None:
+def test_a_log_is_a_part_until_it_is_closed(tmp_path: Path, header: Header) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
     assert [path.name for path in tmp_path.iterdir()] == ["s.mcap.part"]
     log.close()
     assert [path.name for path in tmp_path.iterdir()] == ["s.mcap"]
 
 
-def test_the_header_is_on_disk_at_once(tmp_path, header) -> None:
+def test_the_header_is_on_disk_at_once(tmp_path: Path, header: Header) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
     assert read_session(tmp_path / "s.mcap").header == header
     log.close()
 
 
-def test_what_was_synced_can_be_read_while_the_session_runs(tmp_path, header, writes) -> None:
+def test_what_was_synced_can_be_read_while_the_session_runs(tmp_path: Path, header: Header) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
     for k in range(3):
-        writes(log, [k])
+        write_trials(log, [k])
         record = read_session(tmp_path / "s.mcap")
         assert [trial.index for trial in record.table] == list(range(k + 1))
         assert record.losses == ()
@@ -42,16 +43,16 @@ def test_what_was_synced_can_be_read_while_the_session_runs(tmp_path, header, wr
 
 
 @pytest.mark.parametrize("name", ["s.mcap", "s.mcap.part"])
-def test_an_existing_log_is_never_overwritten(tmp_path, header, name) -> None:
+def test_an_existing_log_is_never_overwritten(tmp_path: Path, header: Header, name: str) -> None:
     (tmp_path / name).write_bytes(b"precious")
     with pytest.raises(LogError, match=r"never overwritten.*isiw resume"):
         LogWriter.create(tmp_path / "s.mcap", header)
     assert (tmp_path / name).read_bytes() == b"precious"
 
 
-def test_a_file_that_appears_meanwhile_is_not_overwritten_at_the_end(tmp_path, header, writes) -> None:
+def test_a_file_that_appears_meanwhile_is_not_overwritten_at_the_end(tmp_path: Path, header: Header) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
-    writes(log, range(2))
+    write_trials(log, range(2))
     (tmp_path / "s.mcap").write_bytes(b"precious")
     with pytest.raises(LogError, match="another file"):
         log.close()
@@ -59,29 +60,33 @@ def test_a_file_that_appears_meanwhile_is_not_overwritten_at_the_end(tmp_path, h
     assert len(read_session(tmp_path / "s.mcap.part").table) == 2
 
 
-def test_a_folder_that_cannot_be_made_is_named(tmp_path, header) -> None:
+def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path, header: Header) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(LogError, match="cannot be created"):
         LogWriter.create(tmp_path / "file" / "s.mcap", header)
 
 
-def full_disk(_) -> Never:
+def full_disk(_: int) -> Never:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def test_a_full_disk_is_an_error_and_what_was_synced_is_safe(tmp_path, header, writes, monkeypatch) -> None:
+def test_a_full_disk_is_an_error_and_what_was_synced_is_safe(
+    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
+) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
-    writes(log, range(3))
+    write_trials(log, range(3))
     with monkeypatch.context() as patched:
         patched.setattr(os, "fsync", full_disk)
         with pytest.raises(LogError, match="No space left"):
-            writes(log, [3])
+            write_trials(log, [3])
     assert len(read_session(tmp_path / "s.mcap").table) >= 3
     log.close()
 
 
 @pytest.mark.parametrize("config", [{"operator": None}, {"rig": object()}, {"name": "\ud800"}])
-def test_a_header_that_cannot_be_written_leaves_no_file(tmp_path, header, config) -> None:
+def test_a_header_that_cannot_be_written_leaves_no_file(
+    tmp_path: Path, header: Header, config: dict[str, object]
+) -> None:
     unwritable = header.model_copy(update={"config": config})
     with pytest.raises(LogError, match=r"header cannot be written.*TOML values"):
         LogWriter.create(tmp_path / "s.mcap", unwritable)
@@ -89,7 +94,9 @@ def test_a_header_that_cannot_be_written_leaves_no_file(tmp_path, header, config
     LogWriter.create(tmp_path / "s.mcap", header).close()
 
 
-def test_a_log_that_cannot_be_begun_leaves_no_file(tmp_path, header, monkeypatch) -> None:
+def test_a_log_that_cannot_be_begun_leaves_no_file(
+    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(os, "fsync", full_disk)
     with pytest.raises(LogError, match="No space left"):
         LogWriter.create(tmp_path / "s.mcap", header)
@@ -97,7 +104,9 @@ def test_a_log_that_cannot_be_begun_leaves_no_file(tmp_path, header, monkeypatch
 
 
 @pytest.mark.parametrize("trouble", ["header", "disk"])
-def test_a_log_that_cannot_go_on_stays_as_it_was(finished_log, header, monkeypatch, trouble) -> None:
+def test_a_log_that_cannot_go_on_stays_as_it_was(
+    finished_log: Path, header: Header, monkeypatch: pytest.MonkeyPatch, trouble: str
+) -> None:
     before, found = finished_log.read_bytes(), salvage(finished_log)
     unwritable = header.model_copy(update={"config": {"operator": None}})
     with monkeypatch.context() as patched:
@@ -109,7 +118,7 @@ def test_a_log_that_cannot_go_on_stays_as_it_was(finished_log, header, monkeypat
     LogWriter.continuing(finished_log, found, header).close()
 
 
-def test_any_mcap_reader_reads_a_finished_log(finished_log) -> None:
+def test_any_mcap_reader_reads_a_finished_log(finished_log: Path) -> None:
     with finished_log.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         topics = [channel.topic for _, channel, _ in reader.iter_messages()]
@@ -122,19 +131,19 @@ def test_any_mcap_reader_reads_a_finished_log(finished_log) -> None:
     assert b"answer = 42" in attachments["configuration.toml"]
 
 
-def test_the_times_of_the_records_never_run_backwards(finished_log) -> None:
+def test_the_times_of_the_records_never_run_backwards(finished_log: Path) -> None:
     with finished_log.open("rb") as file:
         times = [message.log_time for _, _, message in make_reader(file).iter_messages(log_time_order=False)]
     assert times == sorted(times)
 
 
-def test_a_channel_that_isiw_does_not_know_is_kept(tmp_path, header) -> None:
+def test_a_channel_that_isiw_does_not_know_is_kept(tmp_path: Path, header: Header) -> None:
     with LogWriter.create(tmp_path / "s.mcap", header) as log:
         log.append(Waveform.of(0, Channel(np.arange(4.0), 100.0, "N")), "left_hand")
     assert read_session(tmp_path / "s.mcap").sweep(0)["left_hand"].values.tolist() == [0, 1, 2, 3]
 
 
-def test_continuing_keeps_all_records_and_appends(finished_log) -> None:
+def test_continuing_keeps_all_records_and_appends(finished_log: Path) -> None:
     before = read_session(finished_log)
     with LogWriter.continuing(finished_log, salvage(finished_log), before.header) as log:
         log.append(Event(kind="resume", trial=8))
@@ -145,7 +154,7 @@ def test_continuing_keeps_all_records_and_appends(finished_log) -> None:
     assert list(finished_log.parent.iterdir()) == [finished_log]
 
 
-def test_continuing_twice_keeps_metadata_names_unique(broken_log, header) -> None:
+def test_continuing_twice_keeps_metadata_names_unique(broken_log: Path, header: Header) -> None:
     for _ in range(2):
         LogWriter.continuing(broken_log, salvage(broken_log), header).close()
     finished = broken_log.with_suffix("")
@@ -155,26 +164,28 @@ def test_continuing_twice_keeps_metadata_names_unique(broken_log, header) -> Non
         assert [attachment.name for attachment in reader.iter_attachments()] == ["configuration.toml"]
 
 
-def test_while_a_log_goes_on_it_holds_all_that_was_there_before(broken_log, header) -> None:
+def test_while_a_log_goes_on_it_holds_all_that_was_there_before(broken_log: Path, header: Header) -> None:
     log = LogWriter.continuing(broken_log, salvage(broken_log), header)
     assert len(read_session(broken_log).table) == 8
     assert [path.name for path in broken_log.parent.iterdir()] == ["s.mcap.part"]
     log.close()
 
 
-def test_a_copy_left_by_a_killed_resumption_is_no_obstacle(broken_log, header) -> None:
+def test_a_copy_left_by_a_killed_resumption_is_no_obstacle(broken_log: Path, header: Header) -> None:
     broken_log.with_name("s.mcap.resuming").write_bytes(b"half a copy")
     LogWriter.continuing(broken_log, salvage(broken_log), header).close()
     assert [path.name for path in broken_log.parent.iterdir()] == ["s.mcap"]
     assert len(read_session(broken_log).table) == 8
 
 
-def _no_links(new, old) -> Never:
+def _no_links(new: Path, old: Path) -> Never:
     raise OSError(errno.EPERM, f"no link from {new} to {old}")
 
 
 @pytest.mark.parametrize("links", [True, False])
-def test_a_damaged_file_is_kept_beside_what_was_salvaged(broken_log, header, monkeypatch, links) -> None:
+def test_a_damaged_file_is_kept_beside_what_was_salvaged(
+    broken_log: Path, header: Header, monkeypatch: pytest.MonkeyPatch, *, links: bool
+) -> None:
     if not links:  # as on a memory stick
         monkeypatch.setattr(Path, "hardlink_to", _no_links)
     damaged = broken_log.read_bytes()[:-40]
@@ -186,18 +197,18 @@ def test_a_damaged_file_is_kept_beside_what_was_salvaged(broken_log, header, mon
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows does not let an open file be replaced anyway")
-def test_a_running_session_cannot_be_resumed_beside_itself(tmp_path, header, writes) -> None:
+def test_a_running_session_cannot_be_resumed_beside_itself(tmp_path: Path, header: Header) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
-    writes(log, range(2))
+    write_trials(log, range(2))
     with pytest.raises(LogError, match="running session"):
         LogWriter.continuing(tmp_path / "s.mcap", salvage(tmp_path / "s.mcap"), header)
-    writes(log, [2])
+    write_trials(log, [2])
     log.close()
     assert len(read_session(tmp_path / "s.mcap").table) == 3
 
 
 @pytest.mark.parametrize("name", ["s.mcap.part", "", "folder", 300 * "s"])
-def test_a_name_that_no_log_can_have_is_refused_and_leaves_nothing(tmp_path, header, name) -> None:
+def test_a_name_that_no_log_can_have_is_refused_and_leaves_nothing(tmp_path: Path, header: Header, name: str) -> None:
     (tmp_path / "folder").mkdir()
     before = sorted(tmp_path.iterdir())
     with pytest.raises(LogError):

@@ -1,8 +1,10 @@
 import numpy as np
+import pytest
 import torch
 
 from isiw.design import DesignSpace
-from isiw.models.windows import best_window, edge_samples, profile_grid, sampled_estimate
+from isiw.models.windows import SampledProfiles, best_window, edge_samples, profile_grid, sampled_estimate
+from known import known
 
 SPACE = DesignSpace(0, 9)
 
@@ -11,16 +13,22 @@ def masks(*rows: str) -> torch.Tensor:
     return torch.tensor([[float(c) for c in row] for row in rows])
 
 
+def flat(samples: int) -> SampledProfiles:
+    return SampledProfiles(torch.ones(samples, 10), torch.ones(samples))
+
+
 def test_certain_membership_is_reported_as_it_is() -> None:
-    window = best_window(masks("0111001100", "0111001100"), SPACE.grid_ms)
-    assert window.segments == ((1.0, 3.0), (6.0, 7.0))
+    window, expected_f1 = best_window(masks("0111001100", "0111001100"), SPACE.grid_ms)
+    assert known(window).segments == ((1.0, 3.0), (6.0, 7.0))
+    assert expected_f1 == 1.0
 
 
 def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets() -> None:
     rng = np.random.default_rng(0)
     starts, ends = rng.integers(0, 5, 200), rng.integers(5, 10, 200)
     samples = np.array([[float(a <= t <= b) for t in range(10)] for a, b in zip(starts, ends, strict=True)])
-    reported = best_window(torch.tensor(samples, dtype=torch.float32), SPACE.grid_ms).mask(SPACE.grid_ms)
+    window, told = best_window(torch.tensor(samples, dtype=torch.float32), SPACE.grid_ms)
+    reported = known(window).mask(SPACE.grid_ms)
 
     def expected_f1(mask: np.ndarray) -> float:
         return float(np.mean(2 * (samples * mask).sum(1) / (samples.sum(1) + mask.sum())))
@@ -28,6 +36,7 @@ def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets() -> 
     membership = samples.mean(0)
     best = max(expected_f1(membership >= level) for level in membership)
     assert expected_f1(reported) > best - 0.005  # the cuts are a grid
+    assert told == pytest.approx(expected_f1(reported))
 
 
 def test_an_edge_at_the_border_of_the_range_lies_beyond_it() -> None:
@@ -37,13 +46,30 @@ def test_an_edge_at_the_border_of_the_range_lies_beyond_it() -> None:
 
 def test_more_than_one_segment_has_a_probability_given_a_window() -> None:
     sampled = masks("0111001100", "1100110000", "0011110000", "0000000011", "0000000000")
-    estimate = sampled_estimate(sampled, torch.ones(5, 10), SPACE)
-    assert estimate.split_probability == 0.5
-    assert sampled_estimate(masks("0000000000"), torch.ones(1, 10), SPACE).split_probability is None
+    assert sampled_estimate(sampled, flat(5), SPACE).split_probability == 0.5
+    assert sampled_estimate(masks("0000000000"), flat(1), SPACE).split_probability is None
+
+
+def test_the_expected_f1_is_that_of_the_decision() -> None:
+    # The window itself in three of four samples, and no window in the fourth; then the other way round.
+    there, nowhere = "0111000000", "0000000000"
+    assert sampled_estimate(masks(there, there, there, nowhere), flat(4), SPACE).expected_f1 == 0.75
+    decided = sampled_estimate(masks(there, nowhere, nowhere, nowhere), flat(4), SPACE)
+    assert (decided.window, decided.expected_f1) == (None, 0.75)
+
+
+def test_the_best_isi_is_told_of_samples_that_have_one_and_what_is_excluded_of_all() -> None:
+    # Ten samples: peaks of 50 µV at 3 or 4 ms in eight, nothing in two; nine in ten are at most 50 µV.
+    mep_mv = torch.full((10, 10), 0.01)
+    mep_mv[:5, 3], mep_mv[5:8, 4] = 0.06, 0.06
+    estimate = sampled_estimate(masks("0011110000"), SampledProfiles(mep_mv, torch.full((10,), 0.01)), SPACE)
+    assert known(estimate.best_isi) == (3.0, 3.0, 4.0)
+    assert known(estimate.largest_excluded).mep_mv == pytest.approx(0.05)
+    assert sampled_estimate(masks("0000000000"), flat(1), SPACE).best_isi is None
 
 
 def test_a_profile_is_reported_up_to_both_ends_of_the_range() -> None:
     for high_ms in (302, 320, 500):
         grid = profile_grid(DesignSpace(0, high_ms))
-        assert (grid[0], grid[-1]) == (0, high_ms)
+        assert (float(grid[0]), float(grid[-1])) == (0, high_ms)
         assert (grid.diff() > 0).all()

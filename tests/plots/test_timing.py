@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from isiw.errors import InvalidValueError
@@ -14,11 +16,11 @@ def test_the_errors_are_drawn_only_where_isis_were_commanded() -> None:
     assert [label.get_text() for label in figure.axes[1].get_xticklabels()] == ["10", "50"]
 
 
-def test_the_picture_is_saved(tmp_path) -> None:
+def test_the_picture_is_saved(tmp_path: Path) -> None:
     path = save_timing_plot(study_preset("subject1", taps=20, isi_ms=()), tmp_path / "new" / "timing.png")
     assert path.stat().st_size > 10_000
 
 
-def test_an_unknown_format_is_an_error(tmp_path) -> None:
+def test_an_unknown_format_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(InvalidValueError, match="format"):
         save_timing_plot(study_preset("bench", taps=5, isi_ms=()), tmp_path / "timing.docx")

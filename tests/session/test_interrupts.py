@@ -3,6 +3,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from collections.abc import Iterator
 from typing import Never
 
 import pytest
@@ -14,14 +15,14 @@ if os.name == "nt":
 
 
 @pytest.fixture(autouse=True)
-def terminal():
+def terminal() -> Iterator[None]:
     """A terminal whose closing is heard, also where the tests themselves run under nohup."""
     before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
     yield
     signal.signal(signal.SIGHUP, before)
 
 
-def interrupt(number=signal.SIGINT) -> None:
+def interrupt(number: signal.Signals = signal.SIGINT) -> None:
     signal.raise_signal(number)
 
 
@@ -41,7 +42,7 @@ def test_an_interrupt_waits_until_it_is_allowed() -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_where_allowed_it_comes_at_once(number) -> None:
+def test_where_allowed_it_comes_at_once(number: signal.Signals) -> None:
     done = []
 
     def work() -> None:

@@ -5,36 +5,40 @@ import math
 import os
 import signal
 import threading
-from typing import Never
+from pathlib import Path
+from typing import Any, Never, cast
 
 import numpy as np
 import pytest
 
+from isiw.design import DesignSpace
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
-from isiw.log.reader import read_session
+from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate, Intent
-from isiw.session.loop import Session
+from isiw.session.loop import Session, SessionUpdate
 from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.strategy import Recipe
-from isiw.trials import Channel, Measurement, MistrialReason, Status, Sweep, Trial
+from isiw.strategy.strategy import Recipe, Strategy
+from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
+from known import instance, known
+from scripted import ScriptedDevice, scripted_strategy, told_to
 
 
 @pytest.fixture
-def log(tmp_path):
+def log(tmp_path: Path) -> Path:
     return tmp_path / "s.mcap"
 
 
-def run_failing(session, error):
+def run_failing(session: Session, error: type[BaseException]) -> tuple[SessionRecord, str]:
     with pytest.raises(error) as caught:
         session.run()
     return read_session(session.log_path), str(caught.value)
 
 
-def test_a_session_runs_to_its_budget_and_logs_everything(scripted_strategy, scripted_device, log) -> None:
-    result = Session(scripted_device(), scripted_strategy(6), log=log).run()
+def test_a_session_runs_to_its_budget_and_logs_everything(log: Path) -> None:
+    result = Session(ScriptedDevice(), scripted_strategy(6), log=log).run()
     record = read_session(log)
     assert len(result.trials) == len(record.table) == len(record.intents) == len(record.estimates) == 6
     assert record.table == result.trials
@@ -45,16 +49,30 @@ def test_a_session_runs_to_its_budget_and_logs_everything(scripted_strategy, scr
     assert record.losses == ()
 
 
-def test_each_trial_is_logged_as_intent_then_trial_then_estimate(scripted_strategy, scripted_device, log) -> None:
-    Session(scripted_device(), scripted_strategy(2), log=log).run()
+def test_a_result_and_its_record_are_printed_in_a_few_lines(log: Path) -> None:
+    result = Session(ScriptedDevice(), scripted_strategy(2), log=log, subject="P07").run()
+    found = [str(result.estimate), "Ended: The budget of 2 stimuli is used up.", f"Log: {log}"]
+    assert str(result).split("\n") == [*found[0].split("\n"), "Trials: 2 delivered, 2 told", *found[1:]]
+    record = read_session(log)
+    assert str(record).split("\n") == [
+        f"Session of P07, {record.header.created}",
+        "Strategy: of a user's own objects, seed 0, 0–200 ms after the valve command, every 1 ms",
+        "Trials: 2 delivered, 2 told",
+        *found[0].split("\n"),
+        *found[1:],
+    ]
+
+
+def test_each_trial_is_logged_as_intent_then_trial_then_estimate(log: Path) -> None:
+    Session(ScriptedDevice(), scripted_strategy(2), log=log).run()
     assert [type(entry) for entry in read_session(log).history] == [Intent, Trial, Estimate] * 2
 
 
-def test_the_intent_is_on_disk_before_the_device_is_called(scripted_strategy, scripted_device, log) -> None:
-    device = scripted_device()
+def test_the_intent_is_on_disk_before_the_device_is_called(log: Path) -> None:
+    device = ScriptedDevice()
 
-    def answer(stimulus):
-        last = read_session(log).history[-1]
+    def answer(stimulus: Stimulus) -> Measurement | Sweep:
+        last = instance(Intent, read_session(log).history[-1])
         assert last == Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=last.t_s)
         return Measurement(0.1, stimulus.isi_ms)
 
@@ -63,28 +81,28 @@ def test_the_intent_is_on_disk_before_the_device_is_called(scripted_strategy, sc
     assert len(device.delivered) == 3
 
 
-def test_what_is_reported_is_on_disk(scripted_strategy, scripted_device, log) -> None:
+def test_what_is_reported_is_on_disk(log: Path) -> None:
     seen = []
 
-    def on_trial(update) -> None:
+    def on_trial(update: SessionUpdate) -> None:
         record = read_session(log)
         assert record.table[-1] == update.trial
         assert record.estimates[-1].next_isi_ms == update.next_isi_ms
         seen.append(update.stimuli_left)
 
-    Session(scripted_device(), scripted_strategy(4), log=log, on_trial=on_trial).run()
+    Session(ScriptedDevice(), scripted_strategy(4), log=log, on_trial=on_trial).run()
     assert seen == [3, 2, 1, 0]
 
 
-def test_the_next_stimulus_is_the_announced_one(scripted_strategy, scripted_device, log) -> None:
-    device = scripted_device()
+def test_the_next_stimulus_is_the_announced_one(log: Path) -> None:
+    device = ScriptedDevice()
     Session(device, scripted_strategy(6), log=log).run()
     announced = [estimate.next_isi_ms for estimate in read_session(log).estimates]
     assert announced == [stimulus.isi_ms for stimulus in device.delivered[1:]] + [None]
 
 
-def test_the_header_tells_how_to_make_the_session_again(scripted_strategy, scripted_device, log) -> None:
-    session = Session(scripted_device(), scripted_strategy(1, seed=9), log=log, subject="P1", config={"a": {"b": 1}})
+def test_the_header_tells_how_to_make_the_session_again(log: Path) -> None:
+    session = Session(ScriptedDevice(), scripted_strategy(1, seed=9), log=log, subject="P1", config={"a": {"b": 1}})
     session.run()
     header = read_session(log).header
     assert (header.subject, header.seed, header.config) == ("P1", 9, {"a": {"b": 1}})
@@ -93,33 +111,35 @@ def test_the_header_tells_how_to_make_the_session_again(scripted_strategy, scrip
     assert {"python", "torch"} <= set(header.versions)
 
 
-def session_with_detection_limits(device, strategy, log, *, device_mv, strategy_mv):
+def session_with_detection_limits(
+    device: ScriptedDevice, strategy: Strategy, log: Path, *, device_mv: float | None, strategy_mv: float | None
+) -> Session:
     settings = {} if strategy_mv is None else {"detection_limit_mv": strategy_mv}
     strategy.recipe = Recipe("", 0, settings)
     device.info = dataclasses.replace(device.info, detection_limit_mv=device_mv)
     return Session(device, strategy, log=log)
 
 
-def test_another_detection_limit_than_the_strategys_is_refused(scripted_strategy, scripted_device, log) -> None:
+def test_another_detection_limit_than_the_strategys_is_refused(log: Path) -> None:
     with pytest.raises(DeviceError, match=r"0.05 mV.*0.005 mV.*make_strategy\(..., detection_limit_mv=0.05\)"):
-        session_with_detection_limits(scripted_device(), scripted_strategy(), log, device_mv=0.05, strategy_mv=0.005)
+        session_with_detection_limits(ScriptedDevice(), scripted_strategy(), log, device_mv=0.05, strategy_mv=0.005)
     assert not log.exists()
 
 
 @pytest.mark.parametrize(("device_mv", "strategy_mv"), [(0.05, 0.05), (None, 0.005), (0.05, None)])
 def test_the_same_or_an_unknown_detection_limit_is_accepted(
-    scripted_strategy, scripted_device, log, device_mv, strategy_mv
+    log: Path, device_mv: float | None, strategy_mv: float | None
 ) -> None:
     limits = {"device_mv": device_mv, "strategy_mv": strategy_mv}
-    assert session_with_detection_limits(scripted_device(), scripted_strategy(2), log, **limits).run().decision.stop
+    assert session_with_detection_limits(ScriptedDevice(), scripted_strategy(2), log, **limits).run().decision.stop
 
 
-def test_the_raw_sweeps_are_logged(scripted_strategy, scripted_device, log) -> None:
-    def answer(stimulus):
+def test_the_raw_sweeps_are_logged(log: Path) -> None:
+    def answer(stimulus: Stimulus) -> Sweep:
         emg = 0.001 * np.random.default_rng(stimulus.trial).standard_normal(451)
-        return Sweep({"emg": Channel(emg, 3000.0, "mV", -50.0)}, t_valve_ms=-stimulus.isi_ms, t_tms_ms=0.0)
+        return Sweep({"emg": Channel(emg, 3000.0, "mV", -50.0)}, t_valve_ms=-known(stimulus.isi_ms), t_tms_ms=0.0)
 
-    device = scripted_device(answer)
+    device = ScriptedDevice(answer)
     Session(device, scripted_strategy(2), log=log).run()
     record = read_session(log)
     for stimulus in device.delivered:
@@ -128,21 +148,21 @@ def test_the_raw_sweeps_are_logged(scripted_strategy, scripted_device, log) -> N
         assert record.sweep(stimulus.trial)["emg"].t0_ms == -50.0
 
 
-def test_a_simulated_session_does_not_sleep_through_its_intervals(scripted_strategy, scripted_device, log) -> None:
-    Session(scripted_device(), scripted_strategy(4), log=log).run()
+def test_a_simulated_session_does_not_sleep_through_its_intervals(log: Path) -> None:
+    Session(ScriptedDevice(), scripted_strategy(4), log=log).run()
     assert [intent.t_s for intent in read_session(log).intents] == [0.0, 5.0, 10.0, 15.0]
 
 
-def test_the_interval_between_trials_is_waited_for(scripted_strategy, scripted_device, log, space) -> None:
+def test_the_interval_between_trials_is_waited_for(log: Path, space: DesignSpace) -> None:
     clock = VirtualClock(100.0)
     limits = Limits.of_space(space, min_iti_s=7.5)
-    Session(scripted_device(simulated=False), scripted_strategy(3), log=log, clock=clock, limits=limits).run()
+    Session(ScriptedDevice(simulated=False), scripted_strategy(3), log=log, clock=clock, limits=limits).run()
     assert [intent.t_s for intent in read_session(log).intents] == [100.0, 107.5, 115.0]
 
 
-def test_the_limit_of_pulses_ends_the_session_and_is_logged(scripted_strategy, scripted_device, log, space) -> None:
+def test_the_limit_of_pulses_ends_the_session_and_is_logged(log: Path, space: DesignSpace) -> None:
     limits = Limits.of_space(space, max_pulses=3)
-    result = Session(scripted_device(), scripted_strategy(9), log=log, limits=limits).run()
+    result = Session(ScriptedDevice(), scripted_strategy(9), log=log, limits=limits).run()
     assert len(result.trials) == 3
     assert result.decision.reason == "The limit of 3 pulses is reached."
     record = read_session(log)
@@ -150,8 +170,8 @@ def test_the_limit_of_pulses_ends_the_session_and_is_logged(scripted_strategy, s
     assert record.decision == result.decision
 
 
-def test_an_isi_beyond_the_limits_is_never_delivered(scripted_strategy, scripted_device, log) -> None:
-    device = scripted_device()
+def test_an_isi_beyond_the_limits_is_never_delivered(log: Path) -> None:
+    device = ScriptedDevice()
     record, message = run_failing(
         Session(device, scripted_strategy(9), log=log, limits=Limits(0.0, 1.0)), LimitExceededError
     )
@@ -162,34 +182,32 @@ def test_an_isi_beyond_the_limits_is_never_delivered(scripted_strategy, scripted
     assert record.finished
 
 
-def test_the_device_is_always_stopped(scripted_strategy, scripted_device, log) -> None:
-    device = scripted_device()
+def test_the_device_is_always_stopped(log: Path) -> None:
+    device = ScriptedDevice()
     Session(device, scripted_strategy(2), log=log).run()
     assert device.calls == ["stage", "stop", "unstage"]
 
 
-def test_a_device_that_cannot_be_staged_is_stopped_all_the_same(scripted_strategy, scripted_device, log) -> None:
-    device = scripted_device()
+def test_a_device_that_cannot_be_staged_is_stopped_all_the_same(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    device = ScriptedDevice()
 
     def stage() -> Never:
         raise DeviceError("no air pressure")
 
-    device.stage = stage
+    monkeypatch.setattr(device, "stage", stage)
     record, _ = run_failing(Session(device, scripted_strategy(), log=log), DeviceError)
     assert device.calls == ["stop", "unstage"]
     assert record.events[-1].text == "DeviceError: no air pressure"
 
 
 @pytest.mark.parametrize("error", [DeviceError("coil too hot"), RuntimeError("cable"), KeyboardInterrupt()])
-def test_a_device_that_fails_leaves_an_intact_log_and_is_stopped(
-    scripted_strategy, scripted_device, log, error
-) -> None:
-    def answer(stimulus):
+def test_a_device_that_fails_leaves_an_intact_log_and_is_stopped(log: Path, error: BaseException) -> None:
+    def answer(stimulus: Stimulus) -> Measurement | Sweep:
         if stimulus.trial == 2:
             raise error
         return Measurement(0.1, stimulus.isi_ms)
 
-    device = scripted_device(answer)
+    device = ScriptedDevice(answer)
     session = Session(device, scripted_strategy(), log=log)
     record, _ = run_failing(session, type(error))
     assert record.finished
@@ -199,104 +217,102 @@ def test_a_device_that_fails_leaves_an_intact_log_and_is_stopped(
     assert record.table[2].commanded_isi_ms == device.delivered[2].isi_ms
     assert (record.events[-1].kind, record.events[-1].trial) == ("fault", 2)
     assert device.calls == ["stage", "stop", "unstage"]
-    assert len(session.strategy.posterior.told) == 2
+    assert len(told_to(session.strategy)) == 2
 
 
 @pytest.mark.parametrize("mep_mv", [math.nan, math.inf, -math.inf, -0.001])
-def test_an_impossible_amplitude_is_an_error_that_names_it(scripted_strategy, scripted_device, log, mep_mv) -> None:
-    device = scripted_device(lambda stimulus: Measurement(mep_mv, stimulus.isi_ms))
+def test_an_impossible_amplitude_is_an_error_that_names_it(log: Path, mep_mv: float) -> None:
+    device = ScriptedDevice(lambda stimulus: Measurement(mep_mv, stimulus.isi_ms))
     session = Session(device, scripted_strategy(), log=log)
     record, message = run_failing(session, InvalidValueError)
     assert "mep_mv" in message
     assert repr(mep_mv) in message
     assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
-    assert session.strategy.posterior.told == ()
+    assert told_to(session.strategy) == ()
 
 
 @pytest.mark.parametrize("isi_ms", [math.nan, math.inf])
-def test_an_impossible_isi_is_an_error_that_names_it(scripted_strategy, scripted_device, log, isi_ms) -> None:
+def test_an_impossible_isi_is_an_error_that_names_it(log: Path, isi_ms: float) -> None:
     record, message = run_failing(
-        Session(scripted_device(lambda _: Measurement(0.1, isi_ms)), scripted_strategy(), log=log), InvalidValueError
+        Session(ScriptedDevice(lambda _: Measurement(0.1, isi_ms)), scripted_strategy(), log=log), InvalidValueError
     )
     assert "isi_ms" in message
     assert record.finished
 
 
 @pytest.mark.parametrize("answer", [None, 0.1, (50.0, 0.1)])
-def test_an_answer_that_is_none_is_an_error(scripted_strategy, scripted_device, log, answer) -> None:
-    _, message = run_failing(Session(scripted_device(lambda _: answer), scripted_strategy(), log=log), DeviceError)
+def test_an_answer_that_is_none_is_an_error(log: Path, answer: object) -> None:
+    _, message = run_failing(Session(ScriptedDevice(lambda _: answer), scripted_strategy(), log=log), DeviceError)
     assert "Sweep or a Measurement" in message
 
 
-def test_an_answer_to_another_kind_of_trial_is_an_error(scripted_strategy, scripted_device, log) -> None:
+def test_an_answer_to_another_kind_of_trial_is_an_error(log: Path) -> None:
     _, message = run_failing(
-        Session(scripted_device(lambda _: Measurement(0.1, None)), scripted_strategy(), log=log), DeviceError
+        Session(ScriptedDevice(lambda _: Measurement(0.1, None)), scripted_strategy(), log=log), DeviceError
     )
     assert "another kind of trial" in message
 
 
-def test_an_isi_that_is_off_is_a_mistrial_and_asked_again(scripted_strategy, scripted_device, log) -> None:
-    def answer(stimulus):
+def test_an_isi_that_is_off_is_a_mistrial_and_asked_again(log: Path) -> None:
+    def answer(stimulus: Stimulus) -> Measurement | Sweep:
         off_ms = 10.1 if stimulus.trial == 1 else 9.9
-        return Measurement(0.1, stimulus.isi_ms + off_ms)
+        return Measurement(0.1, known(stimulus.isi_ms) + off_ms)
 
-    device = scripted_device(answer)
+    device = ScriptedDevice(answer)
     session = Session(device, scripted_strategy(3), log=log)
     session.run()
     record = read_session(log)
     assert record.table[1].reason is MistrialReason.ISI_OFF
     assert device.delivered[1].isi_ms == device.delivered[2].isi_ms
-    assert len(session.strategy.posterior.told) == 2
+    assert len(told_to(session.strategy)) == 2
 
 
-def test_an_active_muscle_is_a_mistrial(scripted_strategy, scripted_device, log) -> None:
-    device = scripted_device(lambda stimulus: Measurement(0.1, stimulus.isi_ms, background_rms_uv=10.5))
+def test_an_active_muscle_is_a_mistrial(log: Path) -> None:
+    device = ScriptedDevice(lambda stimulus: Measurement(0.1, stimulus.isi_ms, background_rms_uv=10.5))
     result = Session(device, scripted_strategy(3), log=log).run()
     assert {trial.reason for trial in result.trials} == {MistrialReason.BACKGROUND_ACTIVITY}
     assert {trial.mep_mv for trial in result.trials} == {None}
     assert result.decision.reason == "The budget of 3 stimuli is used up."
 
 
-def test_a_device_that_measures_keeps_the_sessions_limits(scripted_strategy, scripted_device, log) -> None:
-    device = scripted_device(lambda stimulus: Measurement(0.1, stimulus.isi_ms + 3.0))
+def test_a_device_that_measures_keeps_the_sessions_limits(log: Path) -> None:
+    device = ScriptedDevice(lambda stimulus: Measurement(0.1, known(stimulus.isi_ms) + 3.0))
     result = Session(device, scripted_strategy(2), log=log, signals=SignalLimits(isi_tolerance_ms=2.0)).run()
     assert {trial.reason for trial in result.trials} == {MistrialReason.ISI_OFF}
 
 
-def test_an_error_of_the_observer_ends_the_session_with_an_intact_log(scripted_strategy, scripted_device, log) -> None:
-    def on_trial(update) -> Never:
+def test_an_error_of_the_observer_ends_the_session_with_an_intact_log(log: Path) -> None:
+    def on_trial(update: SessionUpdate) -> Never:
         raise ZeroDivisionError(update)
 
-    device = scripted_device()
+    device = ScriptedDevice()
     record, _ = run_failing(Session(device, scripted_strategy(), log=log, on_trial=on_trial), ZeroDivisionError)
     assert len(record.table.told) == 1
     assert record.finished
     assert device.calls == ["stage", "stop", "unstage"]
 
 
-def test_a_device_on_another_reference_is_refused(scripted_strategy, scripted_device, log) -> None:
-    device = scripted_device()
+def test_a_device_on_another_reference_is_refused(log: Path) -> None:
+    device = ScriptedDevice()
     object.__setattr__(device.info, "reference", "impact")
     with pytest.raises(DeviceError, match="different events"):
         Session(device, scripted_strategy(), log=log)
 
 
-def test_an_existing_log_stops_the_session_before_anything_is_delivered(
-    scripted_strategy, scripted_device, log
-) -> None:
+def test_an_existing_log_stops_the_session_before_anything_is_delivered(log: Path) -> None:
     log.write_bytes(b"precious")
-    device = scripted_device()
+    device = ScriptedDevice()
     with pytest.raises(LogError, match="never overwritten"):
         Session(device, scripted_strategy(), log=log).run()
     assert device.delivered == []
     assert log.read_bytes() == b"precious"
 
 
-def test_without_a_writable_log_nothing_is_delivered(scripted_strategy, scripted_device, log, monkeypatch) -> None:
-    device = scripted_device()
+def test_without_a_writable_log_nothing_is_delivered(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    device = ScriptedDevice()
 
-    def answer(stimulus):
-        def full(_) -> Never:
+    def answer(stimulus: Stimulus) -> Measurement | Sweep:
+        def full(_: int) -> Never:
             raise OSError(28, "No space left on device")
 
         monkeypatch.setattr(os, "fsync", full)
@@ -313,8 +329,8 @@ def test_without_a_writable_log_nothing_is_delivered(scripted_strategy, scripted
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 @pytest.mark.parametrize("delay_s", [0.005, 0.05, 0.12, 0.2])
-def test_ctrl_c_at_any_time_leaves_an_intact_log(scripted_strategy, scripted_device, log, delay_s) -> None:
-    device = scripted_device()
+def test_ctrl_c_at_any_time_leaves_an_intact_log(log: Path, monkeypatch: pytest.MonkeyPatch, delay_s: float) -> None:
+    device = ScriptedDevice()
     session = Session(device, scripted_strategy(100_000), log=log, limits=Limits(0, 200, 0.0, 100_000))
     timer = threading.Timer(delay_s, os.kill, (os.getpid(), signal.SIGINT))
     stage = device.stage
@@ -324,7 +340,7 @@ def test_ctrl_c_at_any_time_leaves_an_intact_log(scripted_strategy, scripted_dev
         stage()
         timer.start()
 
-    device.stage = stage_and_start
+    monkeypatch.setattr(device, "stage", stage_and_start)
     with pytest.raises(KeyboardInterrupt):
         session.run()
     timer.join()
@@ -339,10 +355,10 @@ def test_ctrl_c_at_any_time_leaves_an_intact_log(scripted_strategy, scripted_dev
 
 
 def test_a_strategy_that_knows_of_other_trials_is_refused_before_anything_is_delivered(
-    scripted_strategy, scripted_device, log, tmp_path
+    log: Path, tmp_path: Path
 ) -> None:
-    strategy, device = scripted_strategy(3), scripted_device()
-    Session(scripted_device(), strategy, log=tmp_path / "another.mcap").run()
+    strategy, device = scripted_strategy(3), ScriptedDevice()
+    Session(ScriptedDevice(), strategy, log=tmp_path / "another.mcap").run()
     with pytest.raises(StrategyError, match=r"not this session's; got '3 trials'; expected 0 .*restarted"):
         Session(device, strategy, log=log).run()
     assert not device.delivered
@@ -351,34 +367,36 @@ def test_a_strategy_that_knows_of_other_trials_is_refused_before_anything_is_del
 
 
 @pytest.mark.parametrize("times", [{"timeout_s": 0.0}, {"timeout_s": math.nan}, {"ask_deadline_s": -1.0}])
-def test_times_that_nobody_can_keep_are_refused(scripted_strategy, scripted_device, log, times) -> None:
+def test_times_that_nobody_can_keep_are_refused(log: Path, times: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"timeout_s|deadline_s"):
-        Session(scripted_device(), scripted_strategy(3), log=log, **times)
+        Session(ScriptedDevice(), scripted_strategy(3), log=log, **times)
 
 
 @pytest.mark.parametrize("channels", [{"emg": "microvolt"}, {"event": "mV"}])
 def test_channels_that_cannot_be_judged_or_logged_are_refused_before_anything_is_delivered(
-    scripted_strategy, scripted_device, log, channels
+    log: Path, monkeypatch: pytest.MonkeyPatch, channels: dict[str, str]
 ) -> None:
-    device = scripted_device()
+    device = ScriptedDevice()
     info = dataclasses.replace(device.describe(), channels=channels)
-    device.describe = lambda: info
+    monkeypatch.setattr(device, "describe", lambda: info)
     with pytest.raises(InvalidValueError, match=r"unit of the channel|cannot have this name"):
         Session(device, scripted_strategy(3), log=log)
 
 
-def test_numbers_of_numpy_are_numbers(scripted_device, space, log) -> None:
-    strategy = make_strategy("even", space, np.int64(3), max_trials=np.int64(2), particles=np.int64(64))
-    limits = Limits(np.int64(0), np.float32(space.high_ms), np.float32(5), np.int64(2))
-    result = Session(scripted_device(), strategy, log=log, limits=limits).run()
+def test_numbers_of_numpy_are_numbers(space: DesignSpace, log: Path) -> None:
+    seed, low_ms, pulses = cast("tuple[int, int, int]", (np.int64(3), np.int64(0), np.int64(2)))
+    high_ms, iti_s = cast("tuple[float, float]", (np.float32(space.high_ms), np.float32(5)))
+    strategy = make_strategy("even", space, seed, max_trials=np.int64(2), particles=np.int64(64))
+    limits = Limits(low_ms, high_ms, iti_s, pulses)
+    result = Session(ScriptedDevice(), strategy, log=log, limits=limits).run()
     assert len(result.trials) == 2
     assert read_session(log).header.strategy.settings["particles"] == 64
 
 
-def test_to_run_a_session_again_that_failed_says_how_to_go_on(scripted_strategy, scripted_device, log) -> None:
-    def answer(stimulus) -> Never:
+def test_to_run_a_session_again_that_failed_says_how_to_go_on(log: Path) -> None:
+    def answer(stimulus: Stimulus) -> Never:
         raise DeviceError(f"unplugged at {stimulus}")
 
-    session = Session(scripted_device(answer), scripted_strategy(3), log=log)
+    session = Session(ScriptedDevice(answer), scripted_strategy(3), log=log)
     run_failing(session, DeviceError)
     assert "isiw resume" in run_failing(session, LogError)[1]

@@ -5,11 +5,13 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from isiw.design import VALVE_SPACE
+from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
@@ -18,28 +20,31 @@ from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, decode
 from isiw.log.writer import LogWriter
-from isiw.session.loop import Session
+from isiw.session.loop import Session, SessionUpdate
 from isiw.session.resume import exclude, resume
 from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
-from isiw.trials import Measurement, MistrialReason
+from isiw.trials import Measurement, MistrialReason, Stimulus
+from known import known
+from scripted import ScriptedDevice, scripted_strategy, told_to
 
 
 @pytest.fixture
-def log(tmp_path):
+def log(tmp_path: Path) -> Path:
     return tmp_path / "s.mcap"
 
 
 @pytest.fixture
-def uninterrupted(scripted_strategy, scripted_device, tmp_path):
+def uninterrupted(tmp_path: Path) -> list[float | None]:
     """The asks of a session of ten trials that nothing disturbed."""
-    device = scripted_device()
+    device = ScriptedDevice()
     Session(device, scripted_strategy(10), log=tmp_path / "uninterrupted.mcap").run()
     return [stimulus.isi_ms for stimulus in device.delivered]
 
 
-def stop_after(trials):
-    def on_trial(update) -> None:
+def stop_after(trials: int) -> Callable[[SessionUpdate], None]:
+    def on_trial(update: SessionUpdate) -> None:
         if update.trial.index + 1 == trials:
             raise KeyboardInterrupt
 
@@ -47,17 +52,17 @@ def stop_after(trials):
 
 
 @pytest.fixture
-def interrupted(scripted_strategy, scripted_device, log):
+def interrupted(log: Path) -> Path:
     """A log that ends after four of ten trials, between two stimuli."""
     with pytest.raises(KeyboardInterrupt):
-        Session(scripted_device(), scripted_strategy(10), log=log, on_trial=stop_after(4)).run()
+        Session(ScriptedDevice(), scripted_strategy(10), log=log, on_trial=stop_after(4)).run()
     return log
 
 
 def test_a_resumed_session_asks_what_an_uninterrupted_one_would_have(
-    interrupted, scripted_strategy, scripted_device, uninterrupted
+    interrupted: Path, uninterrupted: list[float | None]
 ) -> None:
-    device = scripted_device()
+    device = ScriptedDevice()
     result = resume(interrupted, device, scripted_strategy(10)).run()
     assert [stimulus.isi_ms for stimulus in device.delivered] == uninterrupted[4:]
     assert [trial.commanded_isi_ms for trial in result.trials] == uninterrupted
@@ -66,32 +71,32 @@ def test_a_resumed_session_asks_what_an_uninterrupted_one_would_have(
     assert [event.kind for event in record.events] == ["fault", "resume"]
 
 
-def test_resuming_twice_is_no_different(interrupted, scripted_strategy, scripted_device, uninterrupted) -> None:
+def test_resuming_twice_is_no_different(interrupted: Path, uninterrupted: list[float | None]) -> None:
     with pytest.raises(KeyboardInterrupt):
-        resume(interrupted, scripted_device(), scripted_strategy(10), on_trial=stop_after(7)).run()
-    result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+        resume(interrupted, ScriptedDevice(), scripted_strategy(10), on_trial=stop_after(7)).run()
+    result = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert [trial.commanded_isi_ms for trial in result.trials] == uninterrupted
 
 
-def test_resuming_a_finished_session_delivers_nothing(scripted_strategy, scripted_device, log) -> None:
-    Session(scripted_device(), scripted_strategy(3), log=log).run()
-    device = scripted_device()
+def test_resuming_a_finished_session_delivers_nothing(log: Path) -> None:
+    Session(ScriptedDevice(), scripted_strategy(3), log=log).run()
+    device = ScriptedDevice()
     result = resume(log, device, scripted_strategy(3)).run()
     assert device.delivered == []
     assert result.decision.stop
     assert len(read_session(log).table) == 3
 
 
-def kill_during_trial_4(log, isi_ms) -> None:
+def kill_during_trial_4(log: Path, isi_ms: float | None) -> None:
     with LogWriter.continuing(log, salvage(log), read_session(log).header) as writer:
         writer.append(Intent(trial=4, isi_ms=isi_ms))
 
 
 def test_a_stimulus_without_outcome_becomes_a_mistrial_and_is_asked_again(
-    interrupted, scripted_strategy, scripted_device, uninterrupted
+    interrupted: Path, uninterrupted: list[float | None]
 ) -> None:
     kill_during_trial_4(interrupted, uninterrupted[4])
-    device = scripted_device()
+    device = ScriptedDevice()
     session = resume(interrupted, device, scripted_strategy(10))
     result = session.run()
     assert result.trials[4].reason is MistrialReason.OUTCOME_UNKNOWN
@@ -99,36 +104,34 @@ def test_a_stimulus_without_outcome_becomes_a_mistrial_and_is_asked_again(
     assert device.delivered[0].trial == 5
     assert device.delivered[0].isi_ms == uninterrupted[4]
     assert len(result.trials) == 10
-    assert len(session.strategy.posterior.told) == 9
+    assert len(told_to(session.strategy)) == 9
 
 
-def test_earlier_stimuli_count_against_the_limits(interrupted, scripted_strategy, scripted_device, space) -> None:
-    device = scripted_device()
+def test_earlier_stimuli_count_against_the_limits(interrupted: Path, space: DesignSpace) -> None:
+    device = ScriptedDevice()
     limits = Limits.of_space(space, max_pulses=6)
     result = resume(interrupted, device, scripted_strategy(10), limits=limits).run()
     assert len(device.delivered) == 2
     assert result.decision.reason == "The limit of 6 pulses is reached."
 
 
-def test_what_a_session_went_on_with_holds_when_it_is_resumed_again(
-    interrupted, scripted_strategy, scripted_device, space
-) -> None:
-    before, limits, device = read_session(interrupted).header, Limits.of_space(space, max_pulses=6), scripted_device()
+def test_what_a_session_went_on_with_holds_when_it_is_resumed_again(interrupted: Path, space: DesignSpace) -> None:
+    before, limits, device = read_session(interrupted).header, Limits.of_space(space, max_pulses=6), ScriptedDevice()
     device.info = dataclasses.replace(device.info, version="2.1")
     resume(interrupted, device, scripted_strategy(10), limits=limits, timeout_s=9.0).run()
     after = read_session(interrupted).header
     assert (after.limits, after.device.version, after.timeout_s) == (limits, "2.1", 9.0)
     assert (after.created, after.subject, after.seed) == (before.created, before.subject, before.seed)
-    again = scripted_device()
+    again = ScriptedDevice()
     assert resume(interrupted, again, scripted_strategy(10)).run().decision.reason.startswith("The limit of 6 pulses")
     assert again.delivered == []
 
 
-def test_the_header_of_each_part_stays_in_the_log(interrupted, scripted_strategy, scripted_device, space) -> None:
+def test_the_header_of_each_part_stays_in_the_log(interrupted: Path, space: DesignSpace) -> None:
     headers = [read_session(interrupted).header]
     for pulses in (6, 8):
         resume(
-            interrupted, scripted_device(), scripted_strategy(10), limits=Limits.of_space(space, max_pulses=pulses)
+            interrupted, ScriptedDevice(), scripted_strategy(10), limits=Limits.of_space(space, max_pulses=pulses)
         ).run()
         headers.append(read_session(interrupted).header)
     messages = salvage(interrupted).messages
@@ -138,39 +141,39 @@ def test_the_header_of_each_part_stays_in_the_log(interrupted, scripted_strategy
 
 
 def test_the_first_stimulus_after_resuming_waits_a_whole_interval(
-    interrupted, scripted_strategy, scripted_device
+    interrupted: Path,
 ) -> None:
-    resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+    resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert read_session(interrupted).intents[4].t_s == 5.0
 
 
-def test_another_strategy_is_refused_before_anything_happens(interrupted, scripted_strategy, scripted_device) -> None:
+def test_another_strategy_is_refused_before_anything_happens(interrupted: Path) -> None:
     before = interrupted.read_bytes()
     with pytest.raises(StrategyError, match="does not ask again what was asked in trial 0"):
-        resume(interrupted, scripted_device(), scripted_strategy(10, seed=1))
+        resume(interrupted, ScriptedDevice(), scripted_strategy(10, seed=1))
     assert interrupted.read_bytes() == before
 
 
 def test_without_verification_the_logged_trials_are_told_as_they_are(
-    interrupted, scripted_strategy, scripted_device
+    interrupted: Path,
 ) -> None:
-    result = resume(interrupted, scripted_device(), scripted_strategy(10, seed=1), verify=False).run()
+    result = resume(interrupted, ScriptedDevice(), scripted_strategy(10, seed=1), verify=False).run()
     assert len(result.trials) == 10
 
 
 def test_an_ask_that_was_answered_by_the_fallback_is_replayed_as_logged(
-    scripted_strategy, scripted_device, log, monkeypatch
+    log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     strategy = scripted_strategy(10)
     asked = strategy.ask
-    monkeypatch.setattr(strategy, "ask", lambda _=None: 1.0 if len(strategy.posterior.told) == 2 else asked())
+    monkeypatch.setattr(strategy, "ask", lambda _=None: 1.0 if len(told_to(strategy)) == 2 else asked())
     with pytest.raises(KeyboardInterrupt):
-        Session(scripted_device(), strategy, log=log, on_trial=stop_after(5)).run()
+        Session(ScriptedDevice(), strategy, log=log, on_trial=stop_after(5)).run()
     with pytest.raises(StrategyError, match="trial 2"):
-        resume(log, scripted_device(), scripted_strategy(10))
+        resume(log, ScriptedDevice(), scripted_strategy(10))
     with LogWriter.continuing(log, salvage(log), read_session(log).header) as writer:
         writer.append(Event(kind="fallback", trial=2, text="no time left"))
-    assert len(resume(log, scripted_device(), scripted_strategy(10)).run().trials) == 10
+    assert len(resume(log, ScriptedDevice(), scripted_strategy(10)).run().trials) == 10
 
 
 @pytest.mark.parametrize(
@@ -178,54 +181,63 @@ def test_an_ask_that_was_answered_by_the_fallback_is_replayed_as_logged(
     [({}, 7.0, 40.0), ({"timeout_s": 9.0, "ask_deadline_s": 50.0}, 9.0, 50.0)],
 )
 def test_the_times_allowed_are_those_of_the_log_or_of_the_call(
-    scripted_strategy, scripted_device, log, monkeypatch, overrides, timeout_s, ask_deadline_s
+    log: Path, monkeypatch: pytest.MonkeyPatch, overrides: dict[str, Any], timeout_s: float, ask_deadline_s: float
 ) -> None:
-    times = {"timeout_s": 7.0, "ask_deadline_s": 40.0}
+    times: dict[str, Any] = {"timeout_s": 7.0, "ask_deadline_s": 40.0}
     with pytest.raises(KeyboardInterrupt):
-        Session(scripted_device(), scripted_strategy(4), log=log, on_trial=stop_after(2), **times).run()
-    device, deadlines, timeouts = scripted_device(), [], []
+        Session(ScriptedDevice(), scripted_strategy(4), log=log, on_trial=stop_after(2), **times).run()
+    device = ScriptedDevice()
+    deadlines: list[float | None] = []
+    timeouts: list[float] = []
     session = resume(log, device, scripted_strategy(4), **overrides)
     ask, deliver = session.strategy.ask, device.deliver
-    monkeypatch.setattr(session.strategy, "ask", lambda s=None: deadlines.append(s) or ask(s))
-    monkeypatch.setattr(device, "deliver", lambda stimulus, s: timeouts.append(s) or deliver(stimulus, s))
+
+    def timed_ask(deadline_s: float | None = None) -> float:
+        deadlines.append(deadline_s)
+        return ask(deadline_s)
+
+    def timed_deliver(stimulus: Stimulus, timeout_s: float) -> Any:
+        timeouts.append(timeout_s)
+        return deliver(stimulus, timeout_s)
+
+    monkeypatch.setattr(session.strategy, "ask", timed_ask)
+    monkeypatch.setattr(device, "deliver", timed_deliver)
     session.run()
     assert (set(timeouts), set(deadlines)) == ({timeout_s}, {ask_deadline_s})
 
 
-def test_a_strategy_of_own_objects_must_be_handed_over(interrupted, scripted_device) -> None:
+def test_a_strategy_of_own_objects_must_be_handed_over(interrupted: Path) -> None:
     with pytest.raises(StrategyError, match="own objects"):
-        resume(interrupted, scripted_device())
+        resume(interrupted, ScriptedDevice())
 
 
-def test_an_exclusion_counts_from_where_it_stands(
-    interrupted, scripted_strategy, scripted_device, uninterrupted
-) -> None:
+def test_an_exclusion_counts_from_where_it_stands(interrupted: Path, uninterrupted: list[float | None]) -> None:
     exclude(interrupted, 1, "sneezed")
-    device = scripted_device()
+    device = ScriptedDevice()
     session = resume(interrupted, device, scripted_strategy(10))
     session.run()
-    assert len(session.strategy.posterior.told) == 9
+    assert len(told_to(session.strategy)) == 9
     expected = scripted_strategy(10)
     for trial in session.trials.told[:3]:
         expected.tell(trial.isi_ms, trial.mep_mv)
     assert device.delivered[0].isi_ms == expected.ask() != uninterrupted[4]
-    again = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+    again = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert again.trials == session.trials
 
 
 @pytest.mark.parametrize("trial", [-1, 4, 99])
-def test_only_a_trial_that_counts_can_be_excluded(interrupted, trial) -> None:
+def test_only_a_trial_that_counts_can_be_excluded(interrupted: Path, trial: int) -> None:
     with pytest.raises(InvalidValueError, match="no such trial"):
         exclude(interrupted, trial, "because")
 
 
-def test_a_trial_is_excluded_once(interrupted) -> None:
+def test_a_trial_is_excluded_once(interrupted: Path) -> None:
     exclude(interrupted, 1, "sneezed")
     with pytest.raises(InvalidValueError, match="no such trial"):
         exclude(interrupted, 1, "sneezed")
 
 
-def lose_trial_1(log) -> None:
+def lose_trial_1(log: Path) -> None:
     whole = bytearray(log.read_bytes())
     blocks = [at for at in range(len(whole)) if whole.startswith(b"\x04\x00\x00\x00zstd", at)]
     whole[blocks[5] + 40] ^= 0xFF  # header, then intent, trial, estimate of each trial: the trial of number 1
@@ -233,80 +245,78 @@ def lose_trial_1(log) -> None:
     assert [intent.trial for intent in read_session(log).unknown] == [1]
 
 
-def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted, scripted_strategy, scripted_device) -> None:
+def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted: Path) -> None:
     lose_trial_1(interrupted)
-    result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+    result = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert result.trials[1].reason is MistrialReason.OUTCOME_UNKNOWN
     assert len(result.trials) == 10
     assert "fails its checksum" in read_session(interrupted).events[-1].text
-    again = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+    again = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert again.trials == result.trials
 
 
-def test_a_log_with_a_lost_trial_goes_on_after_an_exclusion(interrupted, scripted_strategy, scripted_device) -> None:
+def test_a_log_with_a_lost_trial_goes_on_after_an_exclusion(interrupted: Path) -> None:
     lose_trial_1(interrupted)
     with pytest.raises(KeyboardInterrupt):
-        resume(interrupted, scripted_device(), scripted_strategy(10), on_trial=stop_after(6)).run()
+        resume(interrupted, ScriptedDevice(), scripted_strategy(10), on_trial=stop_after(6)).run()
     exclude(interrupted, 2, "sneezed")
-    session = resume(interrupted, scripted_device(), scripted_strategy(10))
+    session = resume(interrupted, ScriptedDevice(), scripted_strategy(10))
     result = session.run()
     assert [trial.index for trial in result.trials] == list(range(10))
     assert [trial.index for trial in result.trials if not trial.told] == [1, 2]
-    assert len(session.strategy.posterior.told) == 8
+    assert len(told_to(session.strategy)) == 8
 
 
 def test_what_was_asked_before_an_exclusion_is_compared_as_it_was_asked(
-    interrupted, scripted_strategy, scripted_device, uninterrupted
+    interrupted: Path, uninterrupted: list[float | None]
 ) -> None:
     kill_during_trial_4(interrupted, uninterrupted[4])
     exclude(interrupted, 1, "sneezed")
-    result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+    result = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert result.trials[4].reason is MistrialReason.OUTCOME_UNKNOWN
-    again = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+    again = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert again.trials == result.trials
 
 
 def test_a_stimulus_of_which_nothing_is_left_is_compared_with_nothing(
-    interrupted, scripted_strategy, scripted_device
+    interrupted: Path,
 ) -> None:
     with LogWriter.continuing(interrupted, salvage(interrupted), read_session(interrupted).header) as writer:
         writer.append(Intent(trial=5, isi_ms=77.0))  # intent and trial 4 are lost; what was told of it is not known
-    result = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
-    assert [trial.commanded_isi_ms for trial in result.trials[4:6]] == [None, 77.0]
-    again = resume(interrupted, scripted_device(), scripted_strategy(10)).run()
+    result = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
+    assert [trial.commanded_isi_ms for trial in list(result.trials)[4:6]] == [None, 77.0]
+    again = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert again.trials == result.trials
 
 
-def test_what_was_asked_and_never_answered_is_compared_as_well(interrupted, scripted_strategy, scripted_device) -> None:
+def test_what_was_asked_and_never_answered_is_compared_as_well(interrupted: Path) -> None:
     kill_during_trial_4(interrupted, 199.0)
     with pytest.raises(StrategyError, match="does not ask again what was asked in trial 4"):
-        resume(interrupted, scripted_device(), scripted_strategy(10))
+        resume(interrupted, ScriptedDevice(), scripted_strategy(10))
 
 
-def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(
-    scripted_strategy, scripted_device, log
-) -> None:
-    real, clock = scripted_device(simulated=False), VirtualClock()
+def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(log: Path) -> None:
+    real, clock = ScriptedDevice(simulated=False), VirtualClock()
     with pytest.raises(KeyboardInterrupt):
         Session(real, scripted_strategy(10), log=log, clock=clock, on_trial=stop_after(4)).run()
     before = log.read_bytes()
     with pytest.raises(DeviceError, match=r"run with a real device.*simulated=False"):
-        resume(log, scripted_device(), scripted_strategy(10))
+        resume(log, ScriptedDevice(), scripted_strategy(10))
     assert log.read_bytes() == before
     assert len(resume(log, real, scripted_strategy(10), clock=clock).run().trials) == 10
 
 
-def test_a_simulated_session_does_not_go_on_with_a_real_device(interrupted, scripted_strategy, scripted_device) -> None:
-    real, before = scripted_device(simulated=False), interrupted.read_bytes()
+def test_a_simulated_session_does_not_go_on_with_a_real_device(interrupted: Path) -> None:
+    real, before = ScriptedDevice(simulated=False), interrupted.read_bytes()
     with pytest.raises(DeviceError, match=r"run with a simulated device.*Start a session of its own"):
         resume(interrupted, real, scripted_strategy(10))
     assert interrupted.read_bytes() == before
     assert real.delivered == []
 
 
-def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted, scripted_strategy, scripted_device) -> None:
-    first = resume(interrupted, scripted_device(), scripted_strategy(10))
-    device = scripted_device()
+def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted: Path) -> None:
+    first = resume(interrupted, ScriptedDevice(), scripted_strategy(10))
+    device = ScriptedDevice()
     second = resume(interrupted, device, scripted_strategy(10))
     first.run()
     with pytest.raises(LogError, match="has changed since it was read"):
@@ -315,18 +325,18 @@ def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted, script
     assert len(read_session(interrupted).table) == 10
 
 
-def test_what_is_no_log_cannot_be_resumed(tmp_path, scripted_device) -> None:
+def test_what_is_no_log_cannot_be_resumed(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="no such log"):
-        resume(tmp_path / "nothing.mcap", scripted_device())
+        resume(tmp_path / "nothing.mcap", ScriptedDevice())
 
 
-def simulated_person():
+def simulated_person() -> SimulatedDevice:
     person = cohort("drift", 1, 3)[0].begin(3)
     return SimulatedDevice(SimulatedPerson(lambda isi_ms: person.respond(isi_ms, "valve"), "valve"))
 
 
-def test_a_default_session_with_a_drifting_person_goes_on_as_if_never_interrupted(tmp_path) -> None:
-    def strategy():
+def test_a_default_session_with_a_drifting_person_goes_on_as_if_never_interrupted(tmp_path: Path) -> None:
+    def strategy() -> Strategy:
         return make_strategy("default", space=VALVE_SPACE, seed=2, max_trials=7)
 
     whole = Session(simulated_person(), strategy(), log=tmp_path / "whole.mcap").run()
@@ -341,7 +351,7 @@ def test_a_default_session_with_a_drifting_person_goes_on_as_if_never_interrupte
 VICTIM = """
 import sys, time
 sys.path.insert(0, {tests!r})
-from conftest import ScriptedDevice, make_scripted_strategy
+from scripted import ScriptedDevice, scripted_strategy, told_to
 from isiw.devices.clock import VirtualClock
 from isiw.session.loop import Session
 
@@ -349,12 +359,12 @@ def hang(*_, **__):
     print("hanging", flush=True)
     time.sleep(600)
 
-device, strategy, clock, on_trial = ScriptedDevice(), make_scripted_strategy(10), VirtualClock(), None
+device, strategy, clock, on_trial = ScriptedDevice(), scripted_strategy(10), VirtualClock(), None
 point, answer, tell = {point!r}, device.answer, strategy.tell
 if point == "while the device delivers":
     device.answer = lambda stimulus: hang() if stimulus.trial == 4 else answer(stimulus)
 elif point == "before the trial is told":
-    strategy.tell = lambda *a, **k: hang() if len(strategy.posterior.told) == 3 else tell(*a, **k)
+    strategy.tell = lambda *a, **k: hang() if len(told_to(strategy)) == 3 else tell(*a, **k)
 elif point == "after the trial was reported":
     on_trial = lambda update: hang() if update.trial.index == 3 else None
 else:
@@ -374,18 +384,18 @@ Session(device, strategy, log={log!r}, clock=clock, on_trial=on_trial).run()
     ],
 )
 def test_a_killed_session_loses_nothing_and_asks_the_same_again(
-    log, scripted_strategy, scripted_device, uninterrupted, point, open_intents
+    log: Path, uninterrupted: list[float | None], point: str, open_intents: int
 ) -> None:
     script = VICTIM.format(tests=str(Path(__file__).parents[1]), point=point, log=str(log))
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as victim:  # noqa: S603
-        assert victim.stdout.readline() == "hanging\n"
+        assert known(victim.stdout).readline() == "hanging\n"
         victim.send_signal(signal.SIGKILL)
     assert victim.returncode == -signal.SIGKILL
     killed = read_session(log)
     assert killed.losses == ()
     assert [trial.commanded_isi_ms for trial in killed.table] == uninterrupted[:4]
     assert len(killed.unknown) == open_intents
-    device = scripted_device()
+    device = ScriptedDevice()
     result = resume(log, device, scripted_strategy(10)).run()
     assert [stimulus.isi_ms for stimulus in device.delivered] == uninterrupted[4 : 10 - open_intents]
     assert [t.reason for t in result.trials if t.reason] == [MistrialReason.OUTCOME_UNKNOWN] * open_intents
@@ -393,12 +403,12 @@ def test_a_killed_session_loses_nothing_and_asks_the_same_again(
     assert not log.with_name("s.mcap.part").exists()
 
 
-def test_a_measured_zero_and_its_uncertainty_are_replayed(scripted_strategy, scripted_device, log) -> None:
-    def answer(stimulus):
-        return Measurement(0.0, stimulus.isi_ms + 0.25, isi_sd_ms=2.0)
+def test_a_measured_zero_and_its_uncertainty_are_replayed(log: Path) -> None:
+    def answer(stimulus: Stimulus) -> Measurement:
+        return Measurement(0.0, known(stimulus.isi_ms) + 0.25, isi_sd_ms=2.0)
 
     with pytest.raises(KeyboardInterrupt):
-        Session(scripted_device(answer), scripted_strategy(10), log=log, on_trial=stop_after(2)).run()
-    session = resume(log, scripted_device(answer), scripted_strategy(10))
-    assert [mep for _, mep in session.strategy.posterior.told] == [0.0, 0.0]
+        Session(ScriptedDevice(answer), scripted_strategy(10), log=log, on_trial=stop_after(2)).run()
+    session = resume(log, ScriptedDevice(answer), scripted_strategy(10))
+    assert [mep for _, mep in told_to(session.strategy)] == [0.0, 0.0]
     assert [trial.isi_sd_ms for trial in session.trials] == [2.0, 2.0]

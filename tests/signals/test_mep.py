@@ -15,6 +15,7 @@ from isiw.signals import (
     mep_onsets,
     mep_present,
 )
+from isiw.types import FloatArray
 
 RATE_HZ = 5000.0
 TIME_MS = np.arange(1500) / 5
@@ -29,7 +30,7 @@ def emg_with_mep(amplitude_mv: float, n: int = 1, noise_mv: float = 0.001, seed:
 
 
 @pytest.mark.parametrize("amplitude_mv", [0.03, 0.1, 1.0])
-def test_the_amplitude_is_that_of_the_mep(amplitude_mv) -> None:
+def test_the_amplitude_is_that_of_the_mep(amplitude_mv: float) -> None:
     measured = mep_amplitudes(emg_with_mep(amplitude_mv, n=50, noise_mv=0.0005), RATE_HZ, 150.0)
     np.testing.assert_allclose(measured, amplitude_mv, atol=0.005)
 
@@ -39,7 +40,7 @@ def test_the_amplitude_is_that_of_the_mep(amplitude_mv) -> None:
     gain=st.floats(0.1, 10),
     sign=st.sampled_from((-1, 1)),
 )
-def test_offset_and_polarity_do_not_matter_and_gain_is_proportional(offset, gain, sign) -> None:
+def test_offset_and_polarity_do_not_matter_and_gain_is_proportional(offset: float, gain: float, sign: float) -> None:
     emg = emg_with_mep(0.1)[0]
     expected = gain * mep_amplitude(emg, RATE_HZ, 150.0)
     assert mep_amplitude(sign * gain * emg + offset, RATE_HZ, 150.0) == pytest.approx(expected, rel=1e-6)
@@ -77,7 +78,7 @@ def test_each_sweep_of_a_batch_has_its_own_pulse() -> None:
 
 
 @pytest.mark.parametrize("amplitude_mv", [0.1, 0.5, 2.0])
-def test_the_onset_of_a_forearm_mep_is_near_17_and_a_half_ms(amplitude_mv) -> None:
+def test_the_onset_of_a_forearm_mep_is_near_17_and_a_half_ms(amplitude_mv: float) -> None:
     onsets = mep_onsets(emg_with_mep(amplitude_mv, n=100), RATE_HZ, 150.0)
     assert np.mean(np.abs(onsets - 17.5) <= 1.5) >= 0.95
 
@@ -114,7 +115,7 @@ def test_too_little_rest_is_an_error() -> None:
 
 
 @pytest.mark.parametrize("pulse_ms", [1010.0, 1200.0, [500.0, 1200.0]])
-def test_a_pulse_beyond_the_sweep_has_no_background(pulse_ms) -> None:
+def test_a_pulse_beyond_the_sweep_has_no_background(pulse_ms: float) -> None:
     emg = 0.004 * np.random.default_rng(3).standard_normal((2, 5000))
     with pytest.raises(InvalidValueError, match="ends before the pulse"):
         background_rms(emg, 5000.0, pulse_ms)
@@ -133,7 +134,9 @@ def test_a_pulse_beyond_the_sweep_has_no_background(pulse_ms) -> None:
         (np.ones((2, 1500)), RATE_HZ, 150.0, "vector"),
     ],
 )
-def test_what_is_no_recording_is_an_error_and_never_a_number(emg, rate_hz, pulse_ms, what) -> None:
+def test_what_is_no_recording_is_an_error_and_never_a_number(
+    emg: FloatArray, rate_hz: float, pulse_ms: float, what: str
+) -> None:
     with pytest.raises(InvalidValueError, match=what):
         mep_amplitude(emg, rate_hz, pulse_ms)
     with pytest.raises(InvalidValueError, match=what):

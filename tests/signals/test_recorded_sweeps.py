@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TypeAlias
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from isiw.signals import MEP_WINDOWS_MS, background_rms, is_saturated, mep_amplitudes, mep_onsets, mep_present
+from isiw.types import FloatArray
 
 PULSE_MS, RATE_HZ = 50.0, 3000.0
 
+Recorded: TypeAlias = tuple[FloatArray, pd.DataFrame, tuple[float, float]]
+"""Sweeps of EMG [mV], what the toolbox found in them, and the window of their MEPs [ms]."""
+
 
 @pytest.fixture(params=[("ID10_1_ECR", "ID10_1", "forearm"), ("ID01_FDI", "ID01", "hand")], ids=["ECR", "FDI"])
-def recorded(request, recordings_folder):
+def recorded(request: pytest.FixtureRequest, recordings_folder: Path) -> Recorded:
     file, dataset, muscles = request.param
     sweeps = pd.read_csv(recordings_folder / f"uef_{file}_epochs_uV_3kHz.csv.gz", index_col="trial")
     trials = pd.read_csv(recordings_folder / "uef_trials.csv")
@@ -20,7 +27,7 @@ def recorded(request, recordings_folder):
     return sweeps.to_numpy() / 1000, reference, MEP_WINDOWS_MS[muscles]
 
 
-def test_amplitudes_agree_within_2_percent_in_95_of_100_sweeps_with_a_mep(recorded) -> None:
+def test_amplitudes_agree_within_2_percent_in_95_of_100_sweeps_with_a_mep(recorded: Recorded) -> None:
     emg_mv, reference, window_ms = recorded
     theirs = reference["feature_amp_uV"].to_numpy()
     held = theirs > 50
@@ -29,7 +36,7 @@ def test_amplitudes_agree_within_2_percent_in_95_of_100_sweeps_with_a_mep(record
     assert np.mean(np.abs(ours[held] / theirs[held] - 1) <= 0.02) >= 0.95
 
 
-def test_the_default_window_agrees_too(recorded) -> None:
+def test_the_default_window_agrees_too(recorded: Recorded) -> None:
     emg_mv, reference, _ = recorded
     theirs = reference["feature_amp_uV"].to_numpy()
     held = theirs > 50
@@ -37,7 +44,7 @@ def test_the_default_window_agrees_too(recorded) -> None:
     assert np.mean(np.abs(ours[held] / theirs[held] - 1) <= 0.02) >= 0.95
 
 
-def test_onsets_agree_within_1_and_a_half_ms_in_90_of_100(recorded) -> None:
+def test_onsets_agree_within_1_and_a_half_ms_in_90_of_100(recorded: Recorded) -> None:
     emg_mv, reference, window_ms = recorded
     theirs = reference["feature_latency_ms"].to_numpy()
     held = (reference["feature_amp_uV"].to_numpy() > 50) & (theirs > 0)
@@ -45,17 +52,17 @@ def test_onsets_agree_within_1_and_a_half_ms_in_90_of_100(recorded) -> None:
     assert np.mean(np.abs(ours[held] - theirs[held]) <= 1.5) >= 0.90
 
 
-def test_a_mep_is_present_exactly_where_the_reference_found_one(recorded) -> None:
+def test_a_mep_is_present_exactly_where_the_reference_found_one(recorded: Recorded) -> None:
     emg_mv, reference, window_ms = recorded
     present = mep_present(emg_mv, RATE_HZ, PULSE_MS, window_ms)
     assert np.mean(present == (reference["feature_amp_uV"].to_numpy() > 50)) >= 0.97
 
 
-def test_the_background_follows_the_reference(recorded) -> None:
+def test_the_background_follows_the_reference(recorded: Recorded) -> None:
     emg_mv, reference, _ = recorded
     ours = 1000 * background_rms(emg_mv, RATE_HZ, PULSE_MS)
     assert np.median(ours / reference["prestim_rms_uV"].to_numpy()) == pytest.approx(1.0, abs=0.1)
 
 
-def test_no_recorded_sweep_is_called_saturated(recorded) -> None:
+def test_no_recorded_sweep_is_called_saturated(recorded: Recorded) -> None:
     assert not any(is_saturated(emg, RATE_HZ) for emg in recorded[0])

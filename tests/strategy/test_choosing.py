@@ -12,10 +12,12 @@ import torch
 
 from isiw.acquisition.fixed import EvenSpacing, RandomIsi
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.models.dissertation.bootstrap import BootstrapPosterior
 from isiw.models.protocol import Observation, Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choosing import Choice, Course, Method, best_choices, candidate_isis, evenly_spaced
 from isiw.strategy.stopping import Budget, EdgeVariance
+from known import instance
 
 FIVE = DesignSpace(0, 4)
 
@@ -63,7 +65,8 @@ def test_scores_that_are_the_same_for_all_are_everybodys(three: Posterior) -> No
 
 
 def course(name: str, people: int = 3, **changes: Any) -> Course:
-    strategy = make_strategy(name, **({"particles": 4} if name == "pf" else {}))
+    settings: dict[str, Any] = {"particles": 4} if name == "pf" else {}
+    strategy = make_strategy(name, **settings)
     method = Method(strategy.space, strategy.model, (strategy.acquisition,), strategy.stopping)
     return replace(method, **changes).begin(0, people)
 
@@ -76,7 +79,7 @@ def test_initial_isis_come_before_a_methods_own_plan_and_that_before_scores() ->
     first = course("pf", initial_ms=(7.0,))
     assert first.choices == (Choice(7.0),) * 3
     planned = told(first)
-    wanted_ms = planned.posterior.proposed_isis_ms()[:, 0].tolist()
+    wanted_ms = instance(BootstrapPosterior, planned.posterior).proposed_isis_ms()[:, 0].tolist()
     assert [choice.isi_ms for choice in planned.choices] == wanted_ms
     scored = course("pf", acquisitions=(EvenSpacing(),))
     assert scored.planned is None

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +15,12 @@ from isiw.strategy.stopping import (
     Budget,
     CredibleWidth,
     EdgeVariance,
+    ExpectedF1,
     NoWindow,
     ParticleSpread,
     Progress,
+    SmallGain,
+    StopDecision,
     SweptPast,
     looks_back,
     stimuli_left,
@@ -80,7 +85,9 @@ def test_an_edge_that_may_lie_beyond_the_range_has_no_narrow_interval(start_ms: 
 def test_a_hypothesis_that_is_still_likely_must_agree(doubters: int, *, stop: bool) -> None:
     edges = np.array([(100.0, 200.0)] * (100 - doubters) + [(100.0, 240.0)] * doubters)
     hypotheses = np.where(edges[:, 1] == 240, 2, 0)
-    estimate = WindowEstimate(0.95, None, edge_samples_ms=edges, hypotheses=hypotheses)
+    estimate = WindowEstimate(
+        0.95, None, edge_samples_ms=edges, hypothesis_samples=hypotheses, hypothesis_names=("a", "b", "c")
+    )
     decision = CredibleWidth(30)(Progress(3, 3, estimate))
     assert decision.stop == stop
     assert f"span 0 and {0 if stop else 40} ms under every likely hypothesis" in decision.reason
@@ -93,6 +100,39 @@ def test_without_intervals_the_edges_are_not_known() -> None:
 @pytest.mark.parametrize(("probability", "stop"), [(0.05, True), (0.2, False), (None, False)])
 def test_no_window_stops_when_it_is_probable_enough(probability: float | None, *, stop: bool) -> None:
     assert NoWindow(0.9)(progress(probability=probability)).stop == stop
+
+
+def expecting(*f1s: float, told: int = 40, probability: float | None = 0.95) -> Progress:
+    past = tuple(WindowEstimate(probability, None, expected_f1=f1) for f1 in f1s)
+    return Progress(told, told, past[-1], past=past)
+
+
+@pytest.mark.parametrize(("f1", "probability", "stop"), [(0.9, 0.95, True), (0.89, 0.95, False), (0.95, 0.8, False)])
+def test_a_window_that_is_expected_to_be_right_stops(f1: float, probability: float, *, stop: bool) -> None:
+    decision = ExpectedF1(0.9)(expecting(f1, probability=probability))
+    assert decision.stop == stop
+    assert f"F1 of {f1:.2f}" in decision.reason
+
+
+def test_without_an_expected_f1_neither_rule_stops() -> None:
+    assert not ExpectedF1(0.0)(progress()).stop
+    assert not SmallGain(1.0)(progress(40)).stop
+
+
+@pytest.mark.parametrize(
+    ("first", "told", "probability", "stop"),
+    [(0.79, 40, 0.95, True), (0.7, 40, 0.95, False), (0.79, 29, 0.95, False), (0.79, 40, 0.8, False)],
+)
+def test_stimuli_that_added_little_are_the_last(first: float, told: int, probability: float, *, stop: bool) -> None:
+    f1s = np.linspace(first, 0.8, 11).tolist()
+    decision = SmallGain(0.02)(expecting(0.1, *f1s, told=told, probability=probability))
+    assert decision.stop == stop
+    assert f"added {0.8 - first:.2f}" in decision.reason
+
+
+def test_before_ten_stimuli_nothing_is_known_of_what_ten_add() -> None:
+    assert not SmallGain(0.02)(expecting(*[0.8] * 10)).stop
+    assert looks_back(AnyOf((SmallGain(), Budget(3)))) == 11
 
 
 def test_any_of_gives_the_reason_of_the_first_rule_that_stops() -> None:
@@ -128,7 +168,7 @@ def test_any_of_no_rules_would_never_stop_and_is_refused() -> None:
     ],
 )
 @pytest.mark.parametrize("edges_ms", [None, edges_with_width(5)])
-def test_every_reason_is_a_full_sentence(decide: object, edges_ms: object) -> None:
+def test_every_reason_is_a_full_sentence(decide: Callable[[Progress], StopDecision], edges_ms: Any) -> None:
     reason = decide(progress(edges_ms=edges_ms)).reason
     assert not reason[0].islower()
     assert reason.endswith(".")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,8 @@ from isiw.models.protocol import Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.stopping import Budget, EdgeVariance
 from isiw.strategy.strategy import Recipe, Strategy
+from known import known
+from scripted import scripted_strategy
 
 MakeStrategy = Callable[..., Strategy]
 MEPS_MV = [0.02, 0.0, 0.11, 0.05]
@@ -49,7 +52,7 @@ class Scores:
         return self.values[None]
 
 
-def test_ask_is_the_same_until_the_next_tell(scripted_strategy: MakeStrategy) -> None:
+def test_ask_is_the_same_until_the_next_tell() -> None:
     strategy = scripted_strategy()
     first = strategy.ask()
     assert [strategy.ask() for _ in range(3)] == [first] * 3
@@ -66,7 +69,7 @@ def test_the_same_seed_and_tells_give_the_same_asks() -> None:
     assert runs[0] == runs[1] != runs[2]
 
 
-def test_other_tells_give_other_asks(scripted_strategy: MakeStrategy) -> None:
+def test_other_tells_give_other_asks() -> None:
     assert play(scripted_strategy(), [0.02, 0.05]) != play(scripted_strategy(), [0.02, 0.06])
 
 
@@ -91,12 +94,25 @@ def test_a_restarted_strategy_replays_identically(particles: Strategy) -> None:
     assert particles.posterior.trials == len(MEPS_MV)
 
 
-def test_a_restarted_strategy_keeps_its_recipe_and_forgets_its_mistrials(scripted_strategy: MakeStrategy) -> None:
+def test_a_restarted_strategy_keeps_its_recipe_and_forgets_its_mistrials() -> None:
     strategy = scripted_strategy(max_trials=1)
     strategy.count_mistrial()
     again = strategy.restarted()
     assert again.recipe == strategy.recipe == Recipe(name="", seed=0)
     assert (strategy.decision().stop, again.decision().stop) == (True, False)
+
+
+def test_a_strategy_is_printed_with_what_it_is_made_of_and_what_it_knows() -> None:
+    strategy = make_strategy("even", particles=64, seed=3)
+    strategy.tell(250.0, 0.1)
+    strategy.count_mistrial()
+    assert str(strategy).splitlines() == [
+        "Strategy 'even', seed 3",
+        "Space: 0–500 ms after the valve command, every 1 ms",
+        "Model: ParticleModel, asked by EvenSpacing",
+        "Trials: 1 told, 1 mistrials",
+    ]
+    assert str(scripted_strategy()).startswith("Strategy, seed 0\n")
 
 
 REFUSED = [
@@ -120,7 +136,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(("told", "error", "what"), REFUSED)
 def test_what_cannot_be_is_refused_and_changes_nothing(
-    told: dict[str, object], error: type[Exception], what: str, particles: Strategy
+    told: dict[str, Any], error: type[Exception], what: str, particles: Strategy
 ) -> None:
     play(particles, [0.05])
     before = particles.ask(), particles.posterior, particles.estimate(), particles.decision()
@@ -129,9 +145,7 @@ def test_what_cannot_be_is_refused_and_changes_nothing(
     assert (particles.ask(), particles.posterior, particles.estimate(), particles.decision()) == before
 
 
-def test_a_model_that_fails_leaves_the_strategy_as_it_was(
-    scripted_strategy: MakeStrategy, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_model_that_fails_leaves_the_strategy_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     strategy = scripted_strategy()
     isi_ms, posterior = strategy.ask(), strategy.posterior
 
@@ -159,10 +173,10 @@ def test_a_model_that_fails_leaves_the_strategy_as_it_was(
         {"isi_ms": -10.0, "mep_mv": 0.05},
     ],
 )
-def test_every_legitimate_trial_is_learnt_from(told: dict[str, object], particles: Strategy) -> None:
-    untold = particles.estimate().profile_quantiles_mv
+def test_every_legitimate_trial_is_learnt_from(told: dict[str, Any], particles: Strategy) -> None:
+    untold = known(particles.estimate().profile_quantiles_mv)
     particles.tell(**told)
-    learnt = particles.estimate().profile_quantiles_mv
+    learnt = known(particles.estimate().profile_quantiles_mv)
     assert particles.posterior.trials == 1
     assert np.isfinite(learnt).all()
     assert not np.array_equal(learnt, untold)
@@ -174,7 +188,7 @@ def test_a_response_that_was_seen_raises_the_expected_mep_above_one_that_was_not
     for isi_ms in (240.0, 260.0, 280.0):
         particles.tell(isi_ms, response=True)
         unseen.tell(isi_ms, response=False)
-    seen_mv, unseen_mv = (s.estimate().profile([260.0]).median_mv[0] for s in (particles, unseen))
+    seen_mv, unseen_mv = (known(s.estimate().profile([260.0])).median_mv[0] for s in (particles, unseen))
     assert seen_mv > 1.5 * unseen_mv
 
 
@@ -188,7 +202,7 @@ def test_a_mistrial_moves_the_budget_and_nothing_else(particles: Strategy) -> No
     assert particles.decision().reason == reason.replace("79 stimuli", "78 stimuli")
 
 
-def test_told_trials_and_mistrials_use_up_one_budget(scripted_strategy: MakeStrategy) -> None:
+def test_told_trials_and_mistrials_use_up_one_budget() -> None:
     strategy = scripted_strategy(max_trials=3)
     strategy.tell(strategy.ask(), 0.1)
     strategy.count_mistrial()
@@ -199,7 +213,7 @@ def test_told_trials_and_mistrials_use_up_one_budget(scripted_strategy: MakeStra
 
 @pytest.mark.parametrize("acquisition", [WindowGain(), MutualInformation()])
 def test_an_acquisition_function_that_the_model_cannot_serve_is_refused_with_the_reason(
-    acquisition: WindowGain | MutualInformation, scripted_strategy: MakeStrategy
+    acquisition: WindowGain | MutualInformation,
 ) -> None:
     model = scripted_strategy().model
     with pytest.raises(StrategyError, match="cannot work with RememberingModel") as caught:
@@ -207,14 +221,14 @@ def test_an_acquisition_function_that_the_model_cannot_serve_is_refused_with_the
     assert all(need.__name__ in str(caught.value) for need in acquisition.needs)
 
 
-def test_a_tie_is_asked_at_the_first_isi_and_a_score_that_is_not_finite_never(scripted_strategy: MakeStrategy) -> None:
+def test_a_tie_is_asked_at_the_first_isi_and_a_score_that_is_not_finite_never() -> None:
     model = scripted_strategy().model
     space = DesignSpace(0, 4)
     tie = Scores(torch.tensor([math.inf, 0.0, math.nan, 2.0, 2.0]))
     assert Strategy(space, model, tie, Budget(3)).ask() == 3.0
 
 
-def test_where_no_score_is_finite_the_isi_is_evenly_spaced_and_says_why(scripted_strategy: MakeStrategy) -> None:
+def test_where_no_score_is_finite_the_isi_is_evenly_spaced_and_says_why() -> None:
     nothing = Scores(torch.full((5,), math.nan))
     strategy = Strategy(DesignSpace(0, 4), scripted_strategy().model, nothing, Budget(3))
     asked = []
@@ -225,7 +239,7 @@ def test_where_no_score_is_finite_the_isi_is_evenly_spaced_and_says_why(scripted
     assert len(set(asked)) == 3
 
 
-def test_the_initial_isis_come_first_and_a_mistrial_repeats_one(scripted_strategy: MakeStrategy) -> None:
+def test_the_initial_isis_come_first_and_a_mistrial_repeats_one() -> None:
     usual = scripted_strategy()
     strategy = Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, initial_ms=(0.0, 120.2, 200.0))
     assert strategy.ask() == 0.0
@@ -244,9 +258,7 @@ def settled_after(strategy: Strategy, trials: int) -> bool:
     return strategy.decision().stop
 
 
-def test_only_windows_after_the_initial_isis_tell_whether_the_edges_have_settled(
-    scripted_strategy: MakeStrategy,
-) -> None:
+def test_only_windows_after_the_initial_isis_tell_whether_the_edges_have_settled() -> None:
     usual = scripted_strategy()
     for initial_ms in ((), (0.0,), (0.0, 100.0, 200.0)):
         strategy = Strategy(usual.space, usual.model, usual.acquisition, EdgeVariance(), initial_ms=initial_ms)
@@ -255,7 +267,7 @@ def test_only_windows_after_the_initial_isis_tell_whether_the_edges_have_settled
         assert settled_after(strategy, 1)
 
 
-def test_tms_alone_does_not_settle_the_edges(scripted_strategy: MakeStrategy) -> None:
+def test_tms_alone_does_not_settle_the_edges() -> None:
     usual = scripted_strategy()
     strategy = Strategy(usual.space, usual.model, usual.acquisition, EdgeVariance())
     settled_after(strategy, 4)
@@ -265,7 +277,7 @@ def test_tms_alone_does_not_settle_the_edges(scripted_strategy: MakeStrategy) ->
     assert settled_after(strategy, 1)
 
 
-def test_a_cost_is_taken_off_the_scores(scripted_strategy: MakeStrategy) -> None:
+def test_a_cost_is_taken_off_the_scores() -> None:
     level = Scores(torch.tensor([1.0, 2.0, 3.0, 4.0, 5.0]))
     model = scripted_strategy().model
     assert Strategy(DesignSpace(0, 4), model, level, Budget(3)).ask() == 4.0
@@ -291,14 +303,14 @@ def test_a_batch_says_why_one_of_its_isis_is_not_the_acquisition_functions_choic
     assert "no ISI a finite score" in (first.fallback_reason or "")
 
 
-def test_a_batch_takes_up_the_initial_isis_first(scripted_strategy: MakeStrategy) -> None:
+def test_a_batch_takes_up_the_initial_isis_first() -> None:
     usual = scripted_strategy()
     strategy = Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, initial_ms=(0.0, 100.0, 200.0))
     assert strategy.ask_batch(3) == [0.0, 100.0, 200.0]
     assert strategy.ask_batch(2) == [0.0, 100.0]
 
 
-def test_a_batch_from_a_model_that_imagines_no_trials_is_refused(scripted_strategy: MakeStrategy) -> None:
+def test_a_batch_from_a_model_that_imagines_no_trials_is_refused() -> None:
     with pytest.raises(StrategyError, match="cannot imagine trials"):
         scripted_strategy().ask_batch(2)
     assert len(scripted_strategy().ask_batch(1)) == 1

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,25 +17,36 @@ from isiw.strategy.stopping import EdgeVariance
 from isiw.strategy.strategy import Strategy
 from isiw.studies import SimulatedSession, simulate
 from isiw.studies.batch import simulate_batch
-from isiw.subjects.subject import Responder
+from isiw.studies.sessions import Stopping
+from isiw.subjects.subject import Responder, Response
+from isiw.types import Reference
 from studies.tiny import FEW, timeless
 
 EVERY = ("default", "even", "random", "gp-straddle", "nr", "svmr", "gpr", "pf", "incremental")
 SETTINGS = {"default": FEW, "even": FEW, "random": FEW, "pf": {"particles": 4}}
 
 
-def sessions(strategy, people=3, *, first=0, trials=6, cohort="recruitment", stopping="noted", **settings):
+def sessions(
+    strategy: str,
+    people: int = 3,
+    *,
+    first: int = 0,
+    trials: int = 6,
+    cohort: str = "recruitment",
+    stopping: Stopping = "noted",
+    **settings: Any,
+) -> list[SimulatedSession]:
     chosen = tuple((SETTINGS.get(strategy, {}) | settings).items())
     one = SimulatedSession(strategy, cohort, first, 5, trials, (2, trials), settings=chosen, stopping=stopping)
     return [replace(one, person=first + number) for number in range(people)]
 
 
-def one_at_a_time(batch):
+def one_at_a_time(batch: Sequence[SimulatedSession]) -> pd.DataFrame:
     return pd.concat([simulate(session) for session in batch], ignore_index=True)
 
 
 @pytest.mark.parametrize("strategy", EVERY)
-def test_a_batch_of_one_is_that_session(strategy) -> None:
+def test_a_batch_of_one_is_that_session(strategy: str) -> None:
     batch = sessions(strategy, 1, first=2, trials=9)
     pd.testing.assert_frame_equal(timeless(simulate_batch(batch)), timeless(one_at_a_time(batch)))
 
@@ -43,7 +56,7 @@ def test_a_batch_of_one_is_that_session(strategy) -> None:
     # NR draws to choose what to ask after its six initial ISIs; PF when a generation is complete.
     [("incremental", 30), ("nr", 6)],
 )
-def test_where_nothing_is_drawn_a_batch_is_its_sessions(strategy, trials) -> None:
+def test_where_nothing_is_drawn_a_batch_is_its_sessions(strategy: str, trials: int) -> None:
     batch = sessions(strategy, 4, trials=trials, cohort="jitter")
     together, apart = (timeless(rows) for rows in (simulate_batch(batch), one_at_a_time(batch)))
     assert (together["mistrials"] == apart["mistrials"]).all()
@@ -52,10 +65,13 @@ def test_where_nothing_is_drawn_a_batch_is_its_sessions(strategy, trials) -> Non
     )
 
 
-def test_each_person_is_asked_by_a_draw_of_its_own_where_the_acquisition_function_draws(monkeypatch) -> None:
-    asked, usual = {}, Responder.respond
+def test_each_person_is_asked_by_a_draw_of_its_own_where_the_acquisition_function_draws(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: dict[float, list[float]] = {}
+    usual = Responder.respond
 
-    def respond(responder, isi_ms, reference):
+    def respond(responder: Responder, isi_ms: float, reference: Reference) -> Response:
         asked.setdefault(responder.subject.hit_delay_ms, []).append(isi_ms)
         return usual(responder, isi_ms, reference)
 
@@ -99,15 +115,15 @@ class NaNForOne:
 
     needs: tuple[type, ...] = ()
 
-    def __call__(self, posterior, isi_ms):
+    def __call__(self, posterior: Any, isi_ms: torch.Tensor) -> torch.Tensor:
         scores = torch.zeros((posterior.told.people, len(isi_ms)))
         scores[:, 7] = 1.0
         scores[1:2] = math.nan
         return scores
 
 
-def test_a_person_without_a_finite_score_falls_back_alone(monkeypatch) -> None:
-    def player(session):
+def test_a_person_without_a_finite_score_falls_back_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def player(session: SimulatedSession) -> Strategy:
         usual = make_strategy("nr", session.space, session.seed)
         return Strategy(session.space, usual.model, NaNForOne(), EdgeVariance(), seed=session.seed)
 
@@ -128,9 +144,9 @@ def test_a_batch_on_a_gpu_finds_windows_as_well() -> None:
     assert rows[rows["trial"] == 20]["f1"].mean() > 0.7
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("strategy", "trials"), [("default", 15), ("nr", 20), ("pf", 40)])
-def test_the_mean_f1_of_a_batch_is_that_of_one_at_a_time(strategy, trials) -> None:
+def test_the_mean_f1_of_a_batch_is_that_of_one_at_a_time(strategy: str, trials: int) -> None:
     # The same people with the same noise, other draws of the model: paired, so that people do not blur the difference.
     batch = sessions(strategy, 40, trials=trials, cohort="gaussian", stopping="ignored")
     together, apart = (

@@ -5,13 +5,16 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 from isiw.studies.plan import study_from
 
 TEXT = (Path(__file__).parents[2] / "docs" / "studies.md").read_text(encoding="utf-8")
 
 
-def blocks(language):
+def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
 
 
@@ -22,7 +25,9 @@ def test_the_study_is_valid() -> None:
     assert study.units()[1].key == "nr.recruitment.00000"
 
 
-def test_the_example_in_python_runs(tmp_path, monkeypatch, capsys) -> None:
+def test_the_example_in_python_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     exec(compile(blocks("python")[0], "studies.md", "exec"), {"__name__": "docs"})  # noqa: S102 - the point of the test
     printed = capsys.readouterr().out
@@ -30,8 +35,8 @@ def test_the_example_in_python_runs(tmp_path, monkeypatch, capsys) -> None:
     assert len(list((tmp_path / "small.study" / "parts").iterdir())) == 8
 
 
-def test_every_column_of_a_row_is_explained(tmp_path, monkeypatch) -> None:
+def test_every_column_of_a_row_is_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    names = {"__name__": "docs"}
+    names: dict[str, Any] = {"__name__": "docs"}
     exec(compile(blocks("python")[0], "studies.md", "exec"), names)  # noqa: S102 - as above
     assert [name for name in names["rows"].columns if f"`{name}`" not in TEXT] == []

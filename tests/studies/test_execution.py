@@ -5,21 +5,23 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from typing import Never
+from pathlib import Path
+from typing import Any, Never
 
 import pytest
 
 from isiw.errors import InvalidValueError, StudyError
 from isiw.studies.execution import DaskCluster, Failure, Processes, _attempt_alone
+from known import instance
 from studies.tiny import double, double_or_die, double_or_die_once, process_id
 
 posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_what_raises_is_a_failure_among_the_results(workers) -> None:
+def test_what_raises_is_a_failure_among_the_results(workers: int) -> None:
     results = dict(Processes(workers).results(double, range(6)))
-    failure = results.pop(3)
+    failure = instance(Failure, results.pop(3))
     assert results == {0: 0, 1: 2, 2: 4, 4: 8, 5: 10}
     assert failure.error == "ValueError: three is too many"
     assert "in double" in failure.details
@@ -28,14 +30,13 @@ def test_what_raises_is_a_failure_among_the_results(workers) -> None:
 @posix
 def test_what_takes_its_worker_down_again_and_again_is_given_up_and_the_others_finish() -> None:
     results = dict(Processes(2, attempts=2).results(double_or_die, range(6)))
-    failure = results.pop(3)
+    failure = instance(Failure, results.pop(3))
     assert results == {0: 0, 1: 2, 2: 4, 4: 8, 5: 10}
-    assert isinstance(failure, Failure)
     assert "Its worker died 2 times" in failure.error
 
 
 @posix
-def test_what_runs_while_a_worker_dies_is_run_again(tmp_path) -> None:
+def test_what_runs_while_a_worker_dies_is_run_again(tmp_path: Path) -> None:
     items = [(number, tmp_path / "witness") for number in range(6)]
     results = [(item[0], result) for item, result in Processes(2).results(double_or_die_once, items)]
     assert sorted(results) == [(number, 2 * number) for number in range(6)]
@@ -45,7 +46,7 @@ def test_what_runs_while_a_worker_dies_is_run_again(tmp_path) -> None:
 def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for() -> None:
     results = Processes(2).results(process_id, range(20))
     _, first = next(results)
-    os.kill(first, signal.SIGINT)
+    os.kill(instance(int, first), signal.SIGINT)
     rest = [result for _, result in results]
     assert len(rest) == 19
     assert first in rest
@@ -59,7 +60,7 @@ def test_stopping_early_leaves_the_rest_undone() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"workers": 0}, {"attempts": 0}])
-def test_no_worker_or_attempt_is_refused(wrong) -> None:
+def test_no_worker_or_attempt_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match="at least 1"):
         Processes(**wrong)
 
@@ -67,7 +68,7 @@ def test_no_worker_or_attempt_is_refused(wrong) -> None:
 def test_a_worker_of_many_threads_runs_one_session_at_a_time() -> None:
     inside, most = [], []
 
-    def run(item) -> None:
+    def run(item: int) -> None:
         inside.append(item)
         most.append(len(inside))
         threading.Event().wait(0.01)
@@ -81,8 +82,8 @@ def test_a_worker_of_many_threads_runs_one_session_at_a_time() -> None:
     assert most == [1] * 5
 
 
-def test_without_dask_the_message_says_how_to_get_it(monkeypatch) -> None:
-    def missing(name) -> Never:
+def test_without_dask_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> Never:
         raise ModuleNotFoundError(name)
 
     monkeypatch.setattr("isiw.studies.execution.importlib.import_module", missing)

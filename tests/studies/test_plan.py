@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import tomllib
+from pathlib import Path
+from typing import Any, cast
 
 import pytest
 import tomli_w
@@ -14,7 +16,7 @@ from isiw.studies.plan import study_from, study_values
 from studies.tiny import TOML, tiny
 
 
-def people_by_strategy(study):
+def people_by_strategy(study: Study) -> list[tuple[str, str, int]]:
     return [(session.label, session.cohort, session.person) for unit in study.units() for session in unit.sessions]
 
 
@@ -38,7 +40,7 @@ def test_more_people_leave_the_keys_of_the_others_alone() -> None:
     assert len(many) == 2 * 2 * 5
 
 
-def test_a_study_from_toml_has_defaults_and_short_forms(tmp_path) -> None:
+def test_a_study_from_toml_has_defaults_and_short_forms(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text(TOML + 'space = "impact"\n')
     study = load_study(tmp_path / "study.toml")
     assert study.strategies == (StudyStrategy("even", {"particles": 40}), StudyStrategy("incremental"))
@@ -81,13 +83,13 @@ def test_toml_values_make_the_same_study_again() -> None:
         (TOML.replace('name = "even"', 'label = "a/b", name = "even"'), r"a label is part of a file's name; got 'a/b'"),
     ],
 )
-def test_what_is_wrong_with_a_file_is_told_with_the_way_out(tmp_path, text, message) -> None:
+def test_what_is_wrong_with_a_file_is_told_with_the_way_out(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "study.toml").write_text(text)
     with pytest.raises(ConfigError, match=message):
         load_study(tmp_path / "study.toml")
 
 
-def test_an_unknown_strategy_is_told_with_the_known_ones(tmp_path) -> None:
+def test_an_unknown_strategy_is_told_with_the_known_ones(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text(TOML.replace("incremental", "incrementel"))
     with pytest.raises(ConfigError, match=r"study.toml: .*unknown strategy; got 'incrementel'; expected default"):
         load_study(tmp_path / "study.toml")
@@ -95,4 +97,4 @@ def test_an_unknown_strategy_is_told_with_the_known_ones(tmp_path) -> None:
 
 def test_from_python_what_cannot_be_is_refused_as_well() -> None:
     with pytest.raises(InvalidValueError, match="engine is unknown"):
-        Study((StudyStrategy("even"),), ("wide",), engine="fast")
+        Study((StudyStrategy("even"),), ("wide",), engine=cast("Any", "fast"))

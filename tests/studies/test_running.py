@@ -7,21 +7,25 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import psutil
 import pytest
 
 from isiw.errors import ConfigError, StudyError
-from isiw.studies import Processes, Study, begin_store, conduct, load_study, open_store, replay, unit_of_row
+from isiw.studies import Processes, Study, begin_store, conduct, load_study, open_store, replay, sessions, unit_of_row
 from isiw.studies import plan as plan_module
+from isiw.studies.plan import Engine, Unit
+from isiw.studies.sessions import SimulatedSession
 from studies.tiny import TOML, timeless, tiny
 
 posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 
 
-def keys_run(study: Study, folder: Path, **how: object) -> list[str]:
+def keys_run(study: Study, folder: Path, **how: Any) -> list[str]:
     """The keys of the units that a run of the study had to run."""
     keys: list[str] = []
     conduct(study, folder, on_done=lambda unit, _result: keys.append(unit.key), **how)
@@ -29,11 +33,11 @@ def keys_run(study: Study, folder: Path, **how: object) -> list[str]:
 
 
 @pytest.fixture
-def crash(monkeypatch):
+def crash(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Makes the sessions of one strategy raise."""
-    usual = plan_module.simulate
+    usual = sessions.simulate
 
-    def simulate(session):
+    def simulate(session: SimulatedSession) -> pd.DataFrame:
         if session.strategy == "incremental" and session.cohort == "nonresponder":
             raise RuntimeError("the sweep\nis stuck")
         return usual(session)
@@ -42,7 +46,7 @@ def crash(monkeypatch):
     return monkeypatch
 
 
-def test_a_study_has_one_row_a_mark_of_every_person_and_says_whose(tmp_path) -> None:
+def test_a_study_has_one_row_a_mark_of_every_person_and_says_whose(tmp_path: Path) -> None:
     rows = conduct(tiny(), tmp_path / "s").rows()
     assert len(rows) == 2 * 2 * 3 * 2
     assert rows["unit"].iloc[0] == "even.gaussian.00000"
@@ -50,12 +54,12 @@ def test_a_study_has_one_row_a_mark_of_every_person_and_says_whose(tmp_path) -> 
     assert open_store(tmp_path / "s").rows().equals(rows)
 
 
-def test_a_finished_study_has_nothing_left_to_run(tmp_path) -> None:
+def test_a_finished_study_has_nothing_left_to_run(tmp_path: Path) -> None:
     assert len(keys_run(tiny(), tmp_path)) == 12
     assert keys_run(tiny(), tmp_path) == []
 
 
-def test_a_study_goes_on_with_what_is_missing_and_writes_over_what_was_cut_off(tmp_path) -> None:
+def test_a_study_goes_on_with_what_is_missing_and_writes_over_what_was_cut_off(tmp_path: Path) -> None:
     whole = timeless(conduct(tiny(), tmp_path / "whole").rows())
     conduct(tiny(), tmp_path / "cut")
     lost = tmp_path / "cut" / "parts" / "even.gaussian.00001.parquet"
@@ -66,13 +70,13 @@ def test_a_study_goes_on_with_what_is_missing_and_writes_over_what_was_cut_off(t
     assert not list((tmp_path / "cut").rglob("*.part"))
 
 
-def test_a_folder_of_another_study_is_refused_with_what_differs(tmp_path) -> None:
+def test_a_folder_of_another_study_is_refused_with_what_differs(tmp_path: Path) -> None:
     begin_store(tiny(), tmp_path)
     with pytest.raises(StudyError, match=r"people was 3, now 4. Choose another folder, or .*isiw study run"):
         begin_store(tiny(people=4), tmp_path)
 
 
-def test_a_folder_of_another_version_is_refused(tmp_path) -> None:
+def test_a_folder_of_another_version_is_refused(tmp_path: Path) -> None:
     begin_store(tiny(), tmp_path)
     path = tmp_path / "study.toml"
     path.write_text(path.read_text().replace('isiw = "', 'isiw = "9.'))
@@ -80,12 +84,12 @@ def test_a_folder_of_another_version_is_refused(tmp_path) -> None:
         begin_store(tiny(), tmp_path)
 
 
-def test_a_folder_without_a_study_is_an_error(tmp_path) -> None:
+def test_a_folder_without_a_study_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot be read"):
         open_store(tmp_path)
 
 
-def test_a_strategy_that_crashes_is_reported_and_the_study_finishes(tmp_path, crash) -> None:
+def test_a_strategy_that_crashes_is_reported_and_the_study_finishes(tmp_path: Path, crash: pytest.MonkeyPatch) -> None:
     store = conduct(tiny(), tmp_path)
     errors = store.errors()
     assert errors["person"].tolist() == [0, 1, 2]
@@ -101,7 +105,7 @@ def test_a_strategy_that_crashes_is_reported_and_the_study_finishes(tmp_path, cr
 
 
 @pytest.mark.parametrize("engine", ["single", "batched"])
-def test_a_replay_gives_identical_rows(tmp_path, engine) -> None:
+def test_a_replay_gives_identical_rows(tmp_path: Path, engine: Engine) -> None:
     store = conduct(tiny(engine=engine, batch=2), tmp_path)
     for unit in store.study.units()[::3]:
         again = replay(store, unit.key)
@@ -109,7 +113,7 @@ def test_a_replay_gives_identical_rows(tmp_path, engine) -> None:
         assert len(again.kept) == len(again.again) == 2 * len(unit.sessions)
 
 
-def test_a_replay_of_one_person_of_a_batch_compares_that_person(tmp_path) -> None:
+def test_a_replay_of_one_person_of_a_batch_compares_that_person(tmp_path: Path) -> None:
     store = conduct(tiny(engine="batched", batch=2), tmp_path)
     key, person = unit_of_row(store, 3)
     assert (key, person) == ("even.gaussian.00000-00001", 1)
@@ -118,7 +122,7 @@ def test_a_replay_of_one_person_of_a_batch_compares_that_person(tmp_path) -> Non
         replay(store, key, 2)
 
 
-def test_a_replay_says_which_columns_differ(tmp_path) -> None:
+def test_a_replay_says_which_columns_differ(tmp_path: Path) -> None:
     store = conduct(tiny(), tmp_path)
     path = tmp_path / "parts" / "even.gaussian.00001.parquet"
     rows = pd.read_parquet(path)
@@ -127,7 +131,7 @@ def test_a_replay_says_which_columns_differ(tmp_path) -> None:
 
 
 @pytest.mark.usefixtures("crash")
-def test_what_cannot_be_replayed_is_told(tmp_path) -> None:
+def test_what_cannot_be_replayed_is_told(tmp_path: Path) -> None:
     store = conduct(tiny(), tmp_path)
     with pytest.raises(StudyError, match="no such unit; got 'odd'"):
         replay(store, "odd")
@@ -143,10 +147,11 @@ def workers_of(process: psutil.Process) -> list[psutil.Process]:
 
 
 @posix
-def test_the_death_of_a_worker_in_mid_study_loses_no_row(tmp_path) -> None:
-    study, killed, keys = tiny(people=6), [], []
+def test_the_death_of_a_worker_in_mid_study_loses_no_row(tmp_path: Path) -> None:
+    study, killed = tiny(people=6), list[int]()
+    keys: list[str] = []
 
-    def on_done(unit, _result) -> None:
+    def on_done(unit: Unit, _result: object) -> None:
         keys.append(unit.key)
         if len(keys) == 4:
             victim = workers_of(psutil.Process())[0]
@@ -166,9 +171,9 @@ COMMAND = [sys.executable, "-c", f"{LISTEN}; from isiw.cli import app; app()"]
 
 
 @pytest.fixture
-def started(tmp_path):
+def started(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     """A study that runs in another process, some of it finished; its workers must not outlive it."""
-    (tmp_path / "tiny.toml").write_text(TOML.replace("people = 12", "people = 80"))
+    (tmp_path / "tiny.toml").write_text(TOML.replace("people = 12", "people = 40"))
     parts = tmp_path / "tiny.study" / "parts"
     command = [*COMMAND, "study", "run", str(tmp_path / "tiny.toml"), "--workers", "2"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:  # noqa: S603
@@ -195,7 +200,9 @@ def finished_to_the_end(folder: Path) -> pd.DataFrame:
 
 
 @posix
-def test_the_death_of_the_main_process_in_mid_study_loses_no_row(tmp_path, started) -> None:
+def test_the_death_of_the_main_process_in_mid_study_loses_no_row(
+    tmp_path: Path, started: subprocess.Popen[str]
+) -> None:
     started.kill()
     started.wait(timeout=10)
     rows = finished_to_the_end(tmp_path / "tiny.study")
@@ -204,7 +211,7 @@ def test_the_death_of_the_main_process_in_mid_study_loses_no_row(tmp_path, start
 
 
 @posix
-def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path, started) -> None:
+def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path: Path, started: subprocess.Popen[str]) -> None:
     os.killpg(started.pid, signal.SIGINT)  # a terminal tells the workers, too
     _, errors = started.communicate(timeout=30)
     assert started.returncode == 130, errors
@@ -214,7 +221,7 @@ def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path, started) -> Non
 
 
 @pytest.mark.parametrize("damage", [lambda whole: whole[:-20], lambda whole: whole[:100] + bytes(800) + whole[900:]])
-def test_a_damaged_part_is_named_with_the_way_out(tmp_path, damage) -> None:
+def test_a_damaged_part_is_named_with_the_way_out(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
     conduct(tiny(people=1), tmp_path)
     part = next((tmp_path / "parts").glob("*.parquet"))
     part.write_bytes(damage(part.read_bytes()))

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -8,6 +9,7 @@ from isiw.design import IMPACT_SPACE
 from isiw.errors import InvalidValueError, StudyError
 from isiw.studies import SimulatedSession, paired_sessions, play, run_study, simulate
 from isiw.window import Window
+from known import known
 
 TIMES = ["ask_ms", "tell_ms"]
 SMALL = (("particles", 100),)
@@ -22,12 +24,12 @@ class Perfect:
 
     def __init__(self, session: SimulatedSession) -> None:
         self.window = session.subject().window(session.space)
-        self.told: list[tuple[float, float]] = []
+        self.told: list[tuple[float | None, float | None]] = []
 
     def ask(self) -> float:
         return 250.0
 
-    def tell(self, isi_ms: float, mep_mv: float, *, isi_sd_ms: float = 0.0) -> None:
+    def tell(self, isi_ms: float | None, mep_mv: float | None = None, *, isi_sd_ms: float = 0.0) -> None:
         assert isi_sd_ms == 0.0
         self.told.append((isi_ms, mep_mv))
 
@@ -62,7 +64,9 @@ def test_amplitudes_are_scaled_and_the_window_stays() -> None:
     usual, scaled = small(), replace(small(), amplitude=10.0)
     players = [Perfect(usual), Perfect(scaled)]
     rows = [play(session, player) for session, player in zip((usual, scaled), players, strict=True)]
-    np.testing.assert_allclose([10 * mep for _, mep in players[0].told], [mep for _, mep in players[1].told])
+    np.testing.assert_allclose(
+        [10 * known(mep) for _, mep in players[0].told], [known(mep) for _, mep in players[1].told]
+    )
     assert rows[0]["f1"].tolist() == rows[1]["f1"].tolist() == [1.0, 1.0]
 
 
@@ -97,8 +101,15 @@ def test_paired_sessions_cross_strategies_cohorts_and_people() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"trials": 0}, {"person": -1}])
-def test_a_session_that_cannot_be_is_refused(wrong) -> None:
-    values = {"strategy": "even", "cohort": "gaussian", "person": 0, "seed": 0, "trials": 3, "marks": (3,)}
+def test_a_session_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
+    values: dict[str, Any] = {
+        "strategy": "even",
+        "cohort": "gaussian",
+        "person": 0,
+        "seed": 0,
+        "trials": 3,
+        "marks": (3,),
+    }
     with pytest.raises(InvalidValueError):
         SimulatedSession(**(values | wrong))
 
@@ -114,7 +125,7 @@ def test_what_a_session_would_reject_is_delivered_again_and_not_told() -> None:
     player = Perfect(session)
     (row,) = play(session, player).to_dict("records")
     assert len(player.told) == 40
-    assert all(abs(isi_ms - 250.0) <= 2.0 for isi_ms, _ in player.told)
+    assert all(abs(known(isi_ms) - 250.0) <= 2.0 for isi_ms, _ in player.told)
     assert row["mistrials"] > 0
     assert row["delivered"] == 40 + row["mistrials"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import pandas as pd
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from isiw.studies import summarise
 
 
-def rows(strategy, cohort, f1s, **columns):
+def rows(strategy: str, cohort: str, f1s: Sequence[float], **columns: object) -> pd.DataFrame:
     usual = {
         "trial": 10,
         "start_covered": [1.0, 0.0, math.nan][: len(f1s)],

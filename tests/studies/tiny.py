@@ -6,6 +6,7 @@ import os
 import signal
 import time
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -24,9 +25,9 @@ stopping = "ignored"
 """
 
 
-def tiny(**changed: object) -> Study:
+def tiny(**changed: Any) -> Study:
     """Two strategies, two cohorts, three people."""
-    usual = {
+    usual: dict[str, Any] = {
         "strategies": (StudyStrategy("even", FEW), StudyStrategy("incremental")),
         "cohorts": ("gaussian", "nonresponder"),
         "people": 3,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from isiw.subjects.profiles import PeakProfile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
 from isiw.subjects.subject import Drift, SimulatedSubject
 from isiw.types import ArrayLike, FloatArray
+from known import instance, known
 
 PEOPLE = 400
 KS_LEVEL = 1e-5
@@ -85,7 +87,20 @@ def assert_log_normal(values: object, median: float, log_sd: float) -> None:
     assert stats.kstest(z, stats.norm.cdf).pvalue > KS_LEVEL
 
 
-def bare_subject(**changes: object) -> SimulatedSubject:
+def profile_of(subject: SimulatedSubject) -> PeakProfile | TwoPeakProfile:
+    assert isinstance(subject.profile, PeakProfile | TwoPeakProfile)
+    return subject.profile
+
+
+def gain_of(subject: SimulatedSubject) -> GainResponse:
+    return instance(GainResponse, subject.response)
+
+
+def recruitment_of(subject: SimulatedSubject) -> RecruitmentResponse:
+    return instance(RecruitmentResponse, subject.response)
+
+
+def bare_subject(**changes: Any) -> SimulatedSubject:
     """A person who answers with the facilitation itself, almost without noise."""
     return SimulatedSubject(
         LinearProfile(), GainResponse(NO_FLOOR, 1.0, 1e-6), hit_delay_ms=180.0, hit_delay_sd_ms=0.0, **changes
@@ -104,7 +119,7 @@ def sweep_of_meps(subject: SimulatedSubject, isi_ms: float | None, trials: int, 
 def test_person_3_of_seed_7_is_the_same_on_every_machine(name: str) -> None:
     subject = cohort(name, 4, 7)[3]
     mep_mv = subject.begin(11).respond(250.0, "valve").mep_mv
-    profile = subject.profile
+    profile = profile_of(subject)
     drawn = (profile.start_ms, profile.width_ms, subject.hit_delay_ms, 1e3 * subject.baseline_mv, 1e3 * mep_mv)
     assert drawn == pytest.approx(GOLDEN[name], rel=1e-7)
 
@@ -151,12 +166,12 @@ def test_nobody_is_a_cohort_too() -> None:
 
 @pytest.mark.parametrize("name", USUAL_START)
 def test_windows_start_as_stated(name: str) -> None:
-    assert_uniform([s.profile.start_ms for s in people(name)], 5, 110)
+    assert_uniform([profile_of(s).start_ms for s in people(name)], 5, 110)
 
 
 @pytest.mark.parametrize(("name", "low_ms", "high_ms"), [("late", 80, 200), ("very-wide", 0, 60)])
 def test_late_and_very_wide_windows_have_their_starts(name: str, low_ms: float, high_ms: float) -> None:
-    assert_uniform([s.profile.start_ms for s in people(name)], low_ms, high_ms)
+    assert_uniform([profile_of(s).start_ms for s in people(name)], low_ms, high_ms)
 
 
 @pytest.mark.parametrize("name", USUAL_DELAY)
@@ -189,22 +204,22 @@ def assert_clipped_log_normal(values: object, median: float, log_sd: float, ends
 
 @pytest.mark.parametrize("name", USUAL_WIDTH)
 def test_widths_are_log_normal_and_clipped(name: str) -> None:
-    assert_clipped_log_normal([s.profile.width_ms for s in people(name)], 100, 0.42, (40, 230))
+    assert_clipped_log_normal([profile_of(s).width_ms for s in people(name)], 100, 0.42, (40, 230))
 
 
 def test_very_wide_windows_have_their_widths() -> None:
-    assert_clipped_log_normal([s.profile.width_ms for s in people("very-wide")], 200, 0.25, (120, 320))
+    assert_clipped_log_normal([profile_of(s).width_ms for s in people("very-wide")], 200, 0.25, (120, 320))
 
 
 @pytest.mark.parametrize(("name", "low_ms", "high_ms"), [("narrow", 35, 50), ("wide", 180, 230)])
 def test_narrow_and_wide_windows_have_their_widths(name: str, low_ms: float, high_ms: float) -> None:
-    assert_uniform([s.profile.width_ms for s in people(name)], low_ms, high_ms)
+    assert_uniform([profile_of(s).width_ms for s in people(name)], low_ms, high_ms)
 
 
 @pytest.mark.parametrize("name", GAIN)
 def test_gains_and_floors_are_those_of_constant_cv_noise(name: str) -> None:
-    responses = [s.response for s in people(name)]
-    assert all(isinstance(r, GainResponse) and r.floor.log_sd == 0.35 for r in responses)
+    responses = [gain_of(s) for s in people(name)]
+    assert {r.floor.log_sd for r in responses} == {0.35}
     assert_log_normal([r.floor.median_mv for r in responses], 0.008, 0.3)
     assert_log_normal([r.gain_mv for r in responses], 0.06, 0.5)
     assert_uniform([r.cv for r in responses], 0.4, 0.9)
@@ -212,34 +227,36 @@ def test_gains_and_floors_are_those_of_constant_cv_noise(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in COHORTS if name not in {"skewed", "plateau", "two-peak"}])
 def test_profiles_are_gaussian_unless_stated(name: str) -> None:
-    assert all(s.profile == PeakProfile(s.profile.start_ms, s.profile.width_ms) for s in people(name))
+    profiles = [profile_of(s) for s in people(name)]
+    assert all(p == PeakProfile(p.start_ms, p.width_ms) for p in profiles)
 
 
 def test_skewed_profiles_peak_early_or_late_half_of_the_time() -> None:
-    peak_at = np.array([s.profile.peak_at for s in people("skewed")])
+    profiles = [instance(PeakProfile, s.profile) for s in people("skewed")]
+    peak_at = np.array([p.peak_at for p in profiles])
     late = peak_at > 0.5
     assert_uniform(np.where(late, 1 - peak_at, peak_at), 0.22, 0.40)
     assert late.mean() == pytest.approx(0.5, abs=4 * 0.5 / math.sqrt(PEOPLE))
-    assert {s.profile.exponent for s in people("skewed")} == {2.0}
+    assert {p.exponent for p in profiles} == {2.0}
 
 
 def test_plateaus_are_flat_topped_and_symmetric() -> None:
-    assert_uniform([s.profile.exponent for s in people("plateau")], 4, 8)
-    assert {s.profile.peak_at for s in people("plateau")} == {0.5}
+    profiles = [instance(PeakProfile, s.profile) for s in people("plateau")]
+    assert_uniform([p.exponent for p in profiles], 4, 8)
+    assert {p.peak_at for p in profiles} == {0.5}
 
 
 def test_two_peaks_have_one_of_height_1_and_a_lower_one_on_either_side() -> None:
-    profiles = [s.profile for s in people("two-peak")]
-    assert all(isinstance(p, TwoPeakProfile) for p in profiles)
+    profiles = [instance(TwoPeakProfile, s.profile) for s in people("two-peak")]
     assert_uniform([min(p.first, p.second) for p in profiles], 0.4, 1.0)
     first_higher = np.mean([p.first > p.second for p in profiles])
     assert first_higher == pytest.approx(0.5, abs=4 * 0.5 / math.sqrt(PEOPLE))
 
 
 def test_low_responders_have_a_response_probability_and_others_none() -> None:
-    assert_uniform([s.response.max_response_probability for s in people("low-response")], 0.4, 0.7)
+    assert_uniform([gain_of(s).max_response_probability for s in people("low-response")], 0.4, 0.7)
     others = [name for name in GAIN if name != "low-response"]
-    assert {s.response.max_response_probability for name in others for s in cohort(name, 20, 3)} == {None}
+    assert {gain_of(s).max_response_probability for name in others for s in cohort(name, 20, 3)} == {None}
 
 
 def test_only_the_cohorts_that_say_so_have_outliers_drift_or_jitter() -> None:
@@ -259,8 +276,7 @@ def test_jitter_has_an_sd_of_1_to_5_ms(name: str) -> None:
 
 def test_recruitment_has_the_parameters_of_the_physiology_table() -> None:
     drawn = people("recruitment")
-    responses = [s.response for s in drawn]
-    assert all(isinstance(r, RecruitmentResponse) for r in responses)
+    responses = [recruitment_of(s) for s in drawn]
     assert {(r.slope_per_pct, r.intensity_pct_rmt) for r in responses} == {(0.30, 90.0)}
     assert_log_normal([r.amplitude_mv for r in responses], 0.16, 0.35)
     assert_log_normal([r.floor.median_mv for r in responses], 0.010, 0.25)
@@ -284,7 +300,7 @@ SLOPES = {"steep": 0.6, "flat": 0.2, "hand": 0.23}
 @pytest.mark.parametrize("name", OFF_THE_MAP)
 def test_people_off_the_map_recruit_as_usual_but_for_what_is_stated(name: str) -> None:
     drawn = people(name)
-    responses = [s.response for s in drawn]
+    responses = [recruitment_of(s) for s in drawn]
     usual = {"x50_pct_rmt": (103, 107), "boost_pct_rmt": (6, 18), "sigma_x_pct_rmt": (5, 9), "sigma_y": (0.3, 0.5)}
     for field, (low, high) in {**usual, **OFF_RECRUITMENT.get(name, {})}.items():
         assert_uniform([getattr(r, field) for r in responses], low, high)
@@ -295,7 +311,7 @@ def test_people_off_the_map_recruit_as_usual_but_for_what_is_stated(name: str) -
 
 
 def test_intensities_are_90_percent_of_rmt_but_for_a_wrong_threshold_and_the_hand() -> None:
-    intensities = {name: np.array([s.response.intensity_pct_rmt for s in people(name)]) for name in OFF_THE_MAP}
+    intensities = {name: np.array([recruitment_of(s).intensity_pct_rmt for s in people(name)]) for name in OFF_THE_MAP}
     off, hand = intensities.pop("rmt-off"), intensities.pop("hand")
     assert {float(value) for values in intensities.values() for value in values} == {90.0}
     assert stats.kstest((off - 90.0) / 6.0, stats.norm.cdf).pvalue > KS_LEVEL
@@ -304,7 +320,7 @@ def test_intensities_are_90_percent_of_rmt_but_for_a_wrong_threshold_and_the_han
 
 def test_odd_people_are_of_each_other_cohort_off_the_map() -> None:
     drawn = people("odd")
-    response = [s.response for s in drawn]
+    response = [recruitment_of(s) for s in drawn]
     kinds = {
         "hand": np.array([r.slope_per_pct == 0.23 for r in response]),
         "steep or flat": np.array([r.slope_per_pct in (0.6, 0.2) for r in response]),
@@ -325,8 +341,9 @@ def test_half_of_the_nonresponders_are_of_either_kind() -> None:
 
 def test_kim11_has_the_eleven_widths_of_table_4_1_in_order() -> None:
     drawn = cohort("kim11", 11, 0)
-    assert [s.profile.width_ms for s in drawn] == [75, 65, 80, 70, 110, 120, 220, 145, 135, 110, 60]
-    assert all(20 <= s.profile.start_ms <= 100 and 6 <= s.response.boost_pct_rmt <= 14 for s in drawn)
+    assert [profile_of(s).width_ms for s in drawn] == [75, 65, 80, 70, 110, 120, 220, 145, 135, 110, 60]
+    assert all(20 <= profile_of(s).start_ms <= 100 for s in drawn)
+    assert all(6 <= recruitment_of(s).boost_pct_rmt <= 14 for s in drawn)
 
 
 def test_kim11_cycles_over_its_eleven_people_and_ignores_the_seed() -> None:
@@ -352,34 +369,34 @@ def test_all_others_have_one_or_nearly_all(name: str, space: DesignSpace) -> Non
 @pytest.mark.parametrize("name", ["gaussian", "skewed", "narrow", "wide", "outliers", "drift", "jitter"])
 def test_the_window_of_a_gain_is_the_span_of_its_profile(name: str) -> None:
     for subject in cohort(name, 60, 3):
-        window = subject.window(IMPACT_SPACE)
-        span = (subject.profile.start_ms, min(subject.profile.start_ms + subject.profile.width_ms, 320.0))
+        window, profile = known(subject.window(IMPACT_SPACE)), profile_of(subject)
+        span = (profile.start_ms, min(profile.start_ms + profile.width_ms, 320.0))
         # exp(-2) is 0.1353, a little above the rule's 0.135.
         assert (window.start_ms, window.end_ms) == pytest.approx(span, abs=1.0)
 
 
 def test_a_window_counts_from_the_valve_later_by_the_hit_delay() -> None:
     for subject in cohort("gaussian", 60, 3):
-        by_valve, by_impact = subject.window(VALVE_SPACE), subject.window(IMPACT_SPACE)
+        by_valve, by_impact = known(subject.window(VALVE_SPACE)), known(subject.window(IMPACT_SPACE))
         assert by_valve.start_ms - by_impact.start_ms == pytest.approx(subject.hit_delay_ms, abs=1.0)
 
 
 def test_a_low_responder_has_a_narrower_window_than_the_profile_alone() -> None:
     for subject in cohort("low-response", 60, 3):
-        whole = replace(subject, response=replace(subject.response, max_response_probability=None))
-        assert subject.window(VALVE_SPACE).width_ms < whole.window(VALVE_SPACE).width_ms
+        whole = replace(subject, response=replace(gain_of(subject), max_response_probability=None))
+        assert known(subject.window(VALVE_SPACE)).width_ms < known(whole.window(VALVE_SPACE)).width_ms
 
 
 @pytest.mark.parametrize("space", SPACES, ids=["valve", "impact"])
 def test_a_two_peaked_window_is_one_segment_where_its_valley_is_above_the_rule(space: DesignSpace) -> None:
     # No valley of this cohort is below: its peaks are 3.45 SDs apart, so each has 0.23 of its height half way.
-    drawn = [s for s in people("two-peak") if s.profile.start_ms + s.profile.width_ms < 300]
+    drawn = [s for s in people("two-peak") if profile_of(s).start_ms + profile_of(s).width_ms < 300]
     assert drawn
     for subject in drawn:
-        profile = subject.profile
+        profile = profile_of(subject)
         between = np.linspace(0.27, 0.73, 500) * profile.width_ms + profile.start_ms
         assert profile(between).min() > 0.135 * profile(between).max()
-        assert len(subject.window(space).segments) == 1
+        assert len(known(subject.window(space)).segments) == 1
 
 
 def test_a_person_with_two_peaks_far_apart_has_a_window_of_two_segments() -> None:
@@ -387,10 +404,10 @@ def test_a_person_with_two_peaks_far_apart_has_a_window_of_two_segments() -> Non
     class FarPeaks:
         def __call__(self, isi_ms: ArrayLike) -> FloatArray:
             isi = np.asarray(isi_ms, dtype=float)
-            return np.exp(-0.5 * ((isi - 60) / 10) ** 2) + 0.6 * np.exp(-0.5 * ((isi - 160) / 10) ** 2)
+            return np.asarray(np.exp(-0.5 * ((isi - 60) / 10) ** 2) + 0.6 * np.exp(-0.5 * ((isi - 160) / 10) ** 2))
 
     subject = SimulatedSubject(FarPeaks(), GainResponse(EmgFloor(0.008, 0.3), 0.06, 0.5), 180.0, 2.0)
-    first, second = subject.window(IMPACT_SPACE).segments
+    first, second = known(subject.window(IMPACT_SPACE)).segments
     assert first == pytest.approx((40, 80), abs=1)
     half_ms = 10 * math.sqrt(2 * math.log(0.6 / 0.135))
     assert second == pytest.approx((160 - half_ms, 160 + half_ms), abs=1)
@@ -416,7 +433,8 @@ def test_what_differs_from_trial_to_trial_leaves_the_truth_alone() -> None:
 @pytest.mark.parametrize("share", [None, 0.0, 0.5])
 def test_answers_have_the_expected_mep_as_their_mean(name: str, share: float | None) -> None:
     subject = replace(cohort(name, 1, 3)[0], hit_delay_sd_ms=0.0, input_correlation=0.0)
-    isi_ms = None if share is None else round(subject.profile.start_ms + share * subject.profile.width_ms)
+    profile = profile_of(subject)
+    isi_ms = None if share is None else round(profile.start_ms + share * profile.width_ms)
     meps = sweep_of_meps(subject, isi_ms, 8000, seed=21)
     expected = subject.baseline_mv if isi_ms is None else subject.expected_mep_mv(IMPACT_SPACE)[isi_ms]
     assert meps.mean() == pytest.approx(expected, abs=4 * meps.std() / math.sqrt(len(meps)))
@@ -482,7 +500,7 @@ def test_jitter_moves_the_realised_isi_and_is_told_or_not(*, told: bool) -> None
     realised_ms = 1e3 * np.array([a.mep_mv for a in answers])
     assert realised_ms.std() == pytest.approx(4.0, rel=4 / math.sqrt(2 * 4000))
     if told:
-        np.testing.assert_allclose([a.isi_ms for a in answers], realised_ms, rtol=1e-4)
+        np.testing.assert_allclose([known(a.isi_ms) for a in answers], realised_ms, rtol=1e-4)
     assert {a.isi_sd_ms for a in answers} == {0.0 if told else 4.0}
     assert ({a.isi_ms for a in answers} == {200.0}) == (not told)
 
@@ -497,7 +515,7 @@ def test_6_in_100_trials_are_artefacts_of_100_to_500_uv() -> None:
 
 def log_gains(trials: int, seed: int) -> np.ndarray:
     subject = replace(bare_subject(drift=Drift()), response=GainResponse(NO_FLOOR, 1.0, ALMOST_NO_NOISE))
-    return np.log(sweep_of_meps(subject, 1000.0, trials, seed))
+    return np.asarray(np.log(sweep_of_meps(subject, 1000.0, trials, seed)))
 
 
 def test_drift_is_an_ar_1_walk() -> None:
@@ -519,7 +537,7 @@ def input_noise(correlation: float, trials: int, seed: int) -> np.ndarray:
     curve = RecruitmentResponse(NO_FLOOR, 1.0, 0.30, 104.0, 0.0, 7.2, 0.0)
     subject = replace(bare_subject(input_correlation=correlation), response=curve)
     meps = sweep_of_meps(subject, None, trials, seed)
-    return (np.log(meps / (1 - meps)) / 0.30 + 14.0) / 7.2
+    return np.asarray((np.log(meps / (1 - meps)) / 0.30 + 14.0) / 7.2)
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.2])
@@ -536,6 +554,6 @@ def test_input_noise_has_its_full_spread_from_the_first_trial_on() -> None:
 
 
 @pytest.mark.parametrize("stimulus", [(100.0, "hit"), (100.0, "Valve"), (float("nan"), "valve")])
-def test_a_stimulus_that_means_nothing_is_refused(stimulus) -> None:
+def test_a_stimulus_that_means_nothing_is_refused(stimulus: tuple[float, Any]) -> None:
     with pytest.raises(InvalidValueError):
         cohort("gaussian", 1, 0)[0].begin(0).respond(*stimulus)

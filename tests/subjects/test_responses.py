@@ -7,6 +7,7 @@ fail on fewer than one seed in ten thousand.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -141,6 +142,6 @@ def test_forearm_meps_at_90_pct_rmt_are_those_of_the_physiology_table(
         lambda: RecruitmentResponse(EmgFloor(0.01, 0.2), 0.16, 0.3, 105.0, math.inf, 7.0, 0.4),
     ],
 )
-def test_a_response_that_cannot_be_is_refused(make) -> None:
+def test_a_response_that_cannot_be_is_refused(make: Callable[[], object]) -> None:
     with pytest.raises(InvalidValueError):
         make()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import pytest
@@ -12,10 +14,10 @@ import torch
 from isiw.acquisition.information import MutualInformation
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import ACQUISITIONS
-from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import StrategyError
 from isiw.models.particles import ParticleModel, ParticlePosterior
-from isiw.models.protocol import Observation, ProposesIsi, Tensor
+from isiw.models.protocol import Observation, Posterior, ProposesIsi, Tensor
 from isiw.strategy.catalogue import list_strategies, make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
@@ -28,10 +30,17 @@ NAMES = sorted(list_strategies())
 SCORING = sorted(name for name, make in ACQUISITIONS.items() if ProposesIsi not in make(0).needs)
 
 
+EFFORT: dict[str, Any] = {"scouts": 96, "starts": 4, "steps": 8, "draws": 150, "fits": 3, "enough": 100}
+
+
 def settings_of(name: str) -> dict[str, Any]:
+    """Settings with which a strategy is quick."""
+    if name.startswith("parametric"):
+        return {"samples": 64, "effort": EFFORT}
     return FEW if name in {"default", "even", "random"} or name.startswith("particles") else {}
 
 
+@cache  # a posterior never changes
 def particles_after(trials: Trials, people: int = 1) -> ParticlePosterior:
     model = ParticleModel(particles=100)
     posterior = model.begin(VALVE_SPACE, 1, people)
@@ -42,7 +51,7 @@ def particles_after(trials: Trials, people: int = 1) -> ParticlePosterior:
 
 
 @pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
-def test_the_particle_model_conforms(space) -> None:
+def test_the_particle_model_conforms(space: DesignSpace) -> None:
     # Particles are a sample: two orders of the same trials differ by its error.
     check_model(lambda: ParticleModel(particles=400), space, order_tolerance_ms=40.0)
 
@@ -64,7 +73,7 @@ def test_every_named_strategy_conforms(name: str) -> None:
     check_strategy(lambda: make_strategy(name, seed=1, **settings_of(name)))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_every_named_strategy_conforms_over_forty_trials(name: str) -> None:
     check_strategy(lambda: make_strategy(name, seed=1), trials=40)
@@ -94,10 +103,10 @@ class Broken:
     fault: str
     model: ParticleModel = field(default_factory=lambda: ParticleModel(particles=50))
 
-    def begin(self, space, seed, people=1):
+    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> Posterior:
         return self.model.begin(space, seed, people)
 
-    def update(self, posterior, observation):
+    def update(self, posterior: Any, observation: Observation) -> Posterior:
         after = self.model.update(posterior, observation)
         match self.fault:
             case "counts twice":
@@ -139,7 +148,7 @@ def moody(_posterior: object, isi_ms: Tensor) -> Tensor:
 class Scoring:
     """An acquisition function of a plain function."""
 
-    score: Any
+    score: Callable[[Any, Tensor], Tensor]
     needs: tuple[type, ...] = ()
 
     def __call__(self, posterior: object, isi_ms: Tensor) -> Tensor:
@@ -174,7 +183,7 @@ class Forgetful(Strategy):
 class Gullible(Strategy):
     """Accepts whatever it is told."""
 
-    def tell(self, isi_ms, mep_mv=None, **others) -> None:
+    def tell(self, isi_ms: float | None, mep_mv: float | None = None, **others: Any) -> None:
         if mep_mv is not None and mep_mv >= 0:
             super().tell(isi_ms, mep_mv, **others)
 

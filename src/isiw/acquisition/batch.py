@@ -14,7 +14,12 @@ __all__ = ["greedy_batch", "own_plan"]
 
 
 def own_plan(posterior: Posterior, acquisition: AcquisitionFunction) -> list[float]:
-    """The ISIs [ms] that the method itself wants next for one person; empty where it is not asked for them."""
+    """The ISIs [ms] that the method itself wants next for one person; empty where it is not asked for them.
+
+    Args:
+        posterior: what is believed.
+        acquisition: what chooses; only `OwnProposal` asks the method.
+    """
     if ProposesIsi in acquisition.needs and isinstance(posterior, ProposesIsi):
         return [float(isi_ms) for isi_ms in posterior.proposed_isis_ms()[0]]
     return []

@@ -8,10 +8,12 @@ from typing import Any
 
 import typer
 from rich.console import Console
+from rich.padding import Padding
+from rich.text import Text
 
 import isiw
 
-__all__ = ["DAMAGED", "INTERRUPTED", "NO_DEFAULT", "errors_reported", "show"]
+__all__ = ["DAMAGED", "INTERRUPTED", "NO_DEFAULT", "errors_reported", "show", "show_entry"]
 
 DAMAGED = 3
 INTERRUPTED = 130  # what shells report for Ctrl-C
@@ -20,8 +22,25 @@ NO_DEFAULT: dict[str, Any] = {"show_default": False}
 
 
 def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:
-    """Print, coloured where the output is a terminal."""
+    """Print, coloured where the output is a terminal.
+
+    Args:
+        text: what to print.
+        style: one of rich's.
+        stderr: on standard error instead.
+    """
     Console(stderr=stderr, highlight=False, soft_wrap=True).print(text, style=style, markup=False)
+
+
+def show_entry(heading: str, text: str) -> None:
+    """Print an entry of a list: its heading, and below it what there is to say, indented and as wide as the terminal.
+
+    Args:
+        heading: on a line of its own.
+        text: what there is to say.
+    """
+    show(heading, style="bold")
+    Console(highlight=False).print(Padding(Text(text), (0, 0, 0, 4)))
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,16 +11,16 @@ import typer
 
 import isiw
 from isiw.cli import study
-from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show
+from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show, show_entry
 
 if TYPE_CHECKING:
     from isiw.session.loop import Session, SessionUpdate
+    from isiw.strategy.settings.described import DescribedSetting
 
 __all__ = ["app"]
 
 app = typer.Typer(
     name="isiw",
-    help="Find the inter-stimulus intervals at which a tap enhances the MEP, with as few stimuli as possible.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -32,6 +33,23 @@ _INTERRUPTED = "Interrupted: the device is stopped and the log is closed."
 Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
 Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **NO_DEFAULT)]
 Seed = Annotated[int | None, typer.Option(help="Seed of the person, the trials and the strategy.", **NO_DEFAULT)]
+
+
+def _show_version(value: bool) -> None:  # noqa: FBT001 - as typer calls it
+    if value:
+        show(f"isiw {isiw.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    *,
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the version and exit.", callback=_show_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Find the inter-stimulus intervals at which a tap enhances the MEP, with as few stimuli as possible."""
+    del version  # shown by its callback
 
 
 @app.command()
@@ -106,10 +124,19 @@ def exclude(
 
 
 @app.command()
-def strategies() -> None:
-    """List the named strategies, and what each does."""
-    for name, summary in isiw.list_strategies().items():
-        show(f"{name:18}{summary}")
+def strategies(
+    name: Annotated[str | None, typer.Argument(help="List what can be set about this one.", **NO_DEFAULT)] = None,
+) -> None:
+    """List the named strategies and what each does, or the settings of one."""
+    if name is None:
+        for known, summary in isiw.list_strategies().items():
+            show(f"{known:18}{summary}")
+        return
+    with errors_reported():
+        settings = isiw.list_settings(name)
+        show(f"{isiw.list_strategies()[name]} Its settings:\n")
+        for setting in settings:
+            show_entry(_heading(setting), setting.meaning)
 
 
 @app.command()
@@ -129,6 +156,16 @@ def timing(
         show(isiw.repeatability.timing_report(study))
         if output is not None:
             show(f"picture: {isiw.plots.save_timing_plot(study, output)}")
+
+
+def _heading(setting: DescribedSetting) -> str:
+    """A setting with its value as a configuration has it, or the name of a group."""
+    if setting.group:
+        return setting.key
+    if setting.value is None:
+        return f"{setting.key}  # not set"
+    comment = "; ".join(filter(None, (setting.unit, ", ".join(setting.parts))))
+    return f"{setting.key} = {json.dumps(setting.value)}{f'  # {comment}' if comment else ''}"
 
 
 def _is_log(source: str) -> bool:

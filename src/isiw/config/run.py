@@ -137,7 +137,15 @@ class RunConfig(_Section):
         data: Path | None = None,
         strategy: str | None = None,
     ) -> RunConfig:
-        """The same, with what was given on the command line; another strategy keeps the settings that were given."""
+        """The same, with what was given on the command line; another strategy keeps the settings that were given.
+
+        Args:
+            seed: of the person, the trials and the strategy.
+            log: where to log.
+            subject: `"simulated"` or `"recorded"`.
+            data: the folder with the recorded EMG.
+            strategy: one of `list_strategies()`.
+        """
         values = self.model_dump()
         values |= {key: value for key, value in {"seed": seed, "log": log}.items() if value is not None}
         about = {"kind": subject, "data": data}
@@ -223,7 +231,12 @@ def device_for(config: RunConfig) -> Device:
 
 
 def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:
-    """The session that a configuration describes, ready to run."""
+    """The session that a configuration describes, ready to run.
+
+    Args:
+        config: the configuration.
+        on_trial: called after each trial.
+    """
     space = config.space.design()
     log = config.log or fresh_log_path(config)
     kept = config.model_dump(mode="json", exclude_none=True, exclude={"log"})

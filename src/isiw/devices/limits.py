@@ -43,7 +43,13 @@ class Limits:
 
     @classmethod
     def of_space(cls, space: DesignSpace, *, min_iti_s: float = 5.0, max_pulses: int = 200) -> Limits:
-        """Limits that allow exactly the ISIs of a design space."""
+        """Limits that allow exactly the ISIs of a design space.
+
+        Args:
+            space: the design space.
+            min_iti_s: least time between two stimuli [s].
+            max_pulses: most stimuli in the session.
+        """
         return cls(space.low_ms, space.high_ms, min_iti_s, max_pulses)
 
 

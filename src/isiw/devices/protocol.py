@@ -89,6 +89,11 @@ class HasMemory(Protocol):
 
 
 def require_staged(name: str, *, staged: bool) -> None:
-    """Raise a DeviceError where a device is told to deliver without being armed."""
+    """Raise a DeviceError where a device is told to deliver without being armed.
+
+    Args:
+        name: the device's, for the message.
+        staged: whether it is armed.
+    """
     if not staged:
         raise DeviceError(f"{name} is not staged, so it delivers nothing", remedy="Call stage() first.")

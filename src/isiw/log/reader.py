@@ -41,6 +41,18 @@ class SessionRecord:
     losses: tuple[str, ...]
     finished: bool
 
+    def __str__(self) -> str:
+        header, last = self.header, self.estimates[-1] if self.estimates else None
+        strategy = header.strategy.name or "of a user's own objects"
+        lines = [
+            f"Session of {header.subject or 'an unnamed subject'}, {header.created}",
+            f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space}",
+            f"Trials: {self.table}" + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
+        ]
+        if last is not None:
+            lines += [str(last), f"{'Ended' if last.stop else 'Not over'}: {last.reason}"]
+        return "\n".join([*lines, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
+
     @cached_property
     def table(self) -> TrialTable:
         """All trials whose outcome was logged, excluded ones marked."""

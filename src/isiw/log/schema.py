@@ -29,7 +29,7 @@ from isiw.signals.judgement import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window, WindowEstimate, finding
 
 __all__ = [
     "ANNOUNCEMENT",
@@ -114,7 +114,12 @@ class Waveform(_Record):
 
     @classmethod
     def of(cls, trial: int, channel: Channel) -> Self:
-        """The record of a channel."""
+        """The record of a channel.
+
+        Args:
+            trial: the number of the trial.
+            channel: what was recorded.
+        """
         return cls(
             trial=trial,
             t0_ms=channel.t0_ms,
@@ -164,7 +169,14 @@ class Estimate(_Record):
 
     @classmethod
     def of(cls, trial: int, estimate: WindowEstimate, decision: StopDecision, next_isi_ms: float | None) -> Self:
-        """The record of an estimate, with its 90 % intervals."""
+        """The record of an estimate, with its 90 % intervals.
+
+        Args:
+            trial: the number of the trial.
+            estimate: what is believed after it.
+            decision: whether to stop, and why.
+            next_isi_ms: what is asked next [ms]; None where the session stops.
+        """
         segments = () if estimate.window is None else tuple(itertools.chain(*estimate.window.segments))
         start, end = estimate.interval(0.9) or ((None, None), (None, None))
         beyond, excluded = estimate.beyond_probability or (None, None), estimate.largest_excluded
@@ -191,6 +203,10 @@ class Estimate(_Record):
             reason=decision.reason,
             **_profile(estimate),
         )
+
+    def __str__(self) -> str:
+        start = (self.start_ms, self.start_low_ms, self.start_high_ms)
+        return finding(self.probability, self.window, start, (self.end_ms, self.end_low_ms, self.end_high_ms))
 
     @property
     def window(self) -> Window | None:
@@ -266,7 +282,12 @@ ANNOUNCEMENT = "channel "
 
 
 def announcement(number: int, topic: str) -> tuple[str, dict[str, str]]:
-    """Name and content of the metadata that say which topic a further channel number has."""
+    """Name and content of the metadata that say which topic a further channel number has.
+
+    Args:
+        number: the channel's.
+        topic: what it carries.
+    """
     return f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic}
 
 
@@ -309,12 +330,21 @@ def waveform_topic(channel_name: str) -> str:
 
 
 def encode(topic: str, record: Record) -> bytes:
-    """A record as JSON."""
+    """A record as JSON.
+
+    Args:
+        topic: of the record.
+        record: what to write.
+    """
     return adapter(topic).dump_json(record)
 
 
 def decode(topic: str, data: bytes) -> Record:
     """The record that was encoded.
+
+    Args:
+        topic: of the record.
+        data: JSON.
 
     Raises:
         ValueError: not such a record.

@@ -50,6 +50,10 @@ class LogWriter:
     def create(cls, path: str | Path, header: Header) -> Self:
         """Start a new log with its header.
 
+        Args:
+            path: the log, without `.part`.
+            header: what the session is.
+
         Raises:
             LogError: there is one already, finished or not; it is never overwritten. Or it cannot have this name, or
                 the header cannot be written.

@@ -142,6 +142,10 @@ class Conditions(Protocol):
         """What would be believed after one more trial of each person at these ISIs [ms] with these MEPs [mV].
 
         It may be rougher than `ResponseModel.update`. Shapes (b,).
+
+        Args:
+            isi_ms: one ISI a person [ms], shape (b,).
+            mep_mv: one MEP a person [mV], shape (b,).
         """
 
 
@@ -187,10 +191,20 @@ class ResponseModel(Protocol):
     """A model: settings, from which posteriors are made."""
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> Posterior:
-        """The posterior before the first trial."""
+        """The posterior before the first trial.
+
+        Args:
+            space: the ISIs that may be asked.
+            seed: of all randomness.
+            people: how many, b.
+        """
 
     def update(self, posterior: Any, observation: Observation) -> Posterior:
         """The posterior after one more trial.
+
+        Args:
+            posterior: what is believed before it.
+            observation: the trial.
 
         Raises:
             StrategyError: an observation of a kind that the model cannot learn from.

@@ -16,7 +16,13 @@ SIMULATED: Final = 2**31
 
 
 def step_generator(device: str, seed: int, step: int) -> torch.Generator:
-    """A stream of its own for each step, so that a posterior depends on its seed and its trials alone."""
+    """A stream of its own for each step, so that a posterior depends on its seed and its trials alone.
+
+    Args:
+        device: torch device.
+        seed: the posterior's.
+        step: how many trials it was told.
+    """
     state = np.random.SeedSequence((seed, step)).generate_state(1, np.uint64)
     return torch.Generator(device=device).manual_seed(int(state[0] >> np.uint64(1)))
 

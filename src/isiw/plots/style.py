@@ -28,6 +28,10 @@ def tidied(*panels: Axes) -> None:
 def save_figure(figure: Figure, path: str | Path) -> Path:
     """Write a figure into a file, whose folder is made where it is missing; the suffix chooses the format.
 
+    Args:
+        figure: the figure.
+        path: the file.
+
     Raises:
         InvalidValueError: a format that matplotlib does not know.
     """

@@ -72,6 +72,9 @@ class SessionResult:
     trials: TrialTable
     log: Path
 
+    def __str__(self) -> str:
+        return f"{self.estimate}\nTrials: {self.trials}\nEnded: {self.decision.reason}\nLog: {self.log}"
+
 
 def versions() -> dict[str, str]:
     """The versions that what a strategy asks depends on, by package."""
@@ -80,7 +83,12 @@ def versions() -> dict[str, str]:
 
 
 def learn(strategy: Strategy, trial: Trial) -> None:
-    """Tell a strategy one trial, or count it where there is nothing to tell."""
+    """Tell a strategy one trial, or count it where there is nothing to tell.
+
+    Args:
+        strategy: the strategy.
+        trial: the trial.
+    """
     if trial.told:
         strategy.tell(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
     else:

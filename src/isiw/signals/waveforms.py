@@ -72,7 +72,12 @@ def is_recording(values: FloatArray) -> bool:
 
 
 def per_waveform(value: ArrayLike | None, waves: FloatArray) -> FloatArray:
-    """One number for each waveform, shape (n,); None becomes NaN."""
+    """One number for each waveform, shape (n,); None becomes NaN.
+
+    Args:
+        value: one number for all, one a waveform, or None.
+        waves: the waveforms, shape (n, w).
+    """
     number = np.asarray(math.nan if value is None else value, dtype=np.float64)
     return np.broadcast_to(number.reshape(-1) if number.ndim else number, waves.shape[:1]).astype(np.float64)
 
@@ -108,7 +113,13 @@ def rest_level(waves: FloatArray, stop: int, rate_hz: float) -> tuple[FloatArray
 
 
 def cut(waves: FloatArray, start: IntArray, count: int) -> FloatArray:
-    """`count` samples of each waveform from its own `start` on, shape (n, count); ends are held."""
+    """`count` samples of each waveform from its own `start` on, shape (n, count); ends are held.
+
+    Args:
+        waves: the waveforms, shape (n, w).
+        start: the first sample of each, shape (n,).
+        count: how many samples.
+    """
     columns = np.clip(start[:, None] + np.arange(count), 0, waves.shape[-1] - 1)
     return np.take_along_axis(waves, columns, axis=-1)
 

@@ -11,9 +11,10 @@ from isiw.checks import whole
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import StrategyError
 from isiw.strategy.settings.common import Settings, settings_from, settings_keys, settings_values
+from isiw.strategy.settings.described import DescribedSetting, described
 from isiw.strategy.strategy import Recipe, Strategy
 
-__all__ = ["known_settings", "list_strategies", "make_strategy", "settings_for"]
+__all__ = ["known_settings", "list_settings", "list_strategies", "make_strategy", "settings_for"]
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,18 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
 def list_strategies() -> dict[str, str]:
     """The named strategies and what each does in a sentence."""
     return {name: entry.summary for name, entry in _CATALOGUE.items()}
+
+
+def list_settings(name: str = "default") -> tuple[DescribedSetting, ...]:
+    """What can be set about a named strategy: key, value, unit and meaning.
+
+    Args:
+        name: one of `list_strategies()`.
+
+    Raises:
+        StrategyError: an unknown name.
+    """
+    return described(settings_for(name))
 
 
 def settings_for(name: str, **settings: Any) -> Settings:

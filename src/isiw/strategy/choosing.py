@@ -213,6 +213,11 @@ def best_choices(
 
 
 def evenly_spaced(space: DesignSpace, told: int) -> float:
-    """The ISI [ms] of this trial in an order that fills the range, whatever is believed."""
+    """The ISI [ms] of this trial in an order that fills the range, whatever is believed.
+
+    Args:
+        space: the ISIs that may be asked.
+        told: how many trials were told.
+    """
     candidates = candidate_isis(space)
     return space.snap(float(candidates[golden_index(told, len(candidates))]))

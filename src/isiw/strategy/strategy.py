@@ -92,6 +92,17 @@ class Strategy:
         self._choice: Choice | None = None
         self._fallback_reason: str | None = None
 
+    def __str__(self) -> str:
+        name = f"Strategy {self.recipe.name!r}" if self.recipe.name else "Strategy"
+        return "\n".join(
+            (
+                f"{name}, seed {self.seed}",
+                f"Space: {self.space}",
+                f"Model: {type(self.model).__name__}, asked by {type(self.acquisition).__name__}",
+                f"Trials: {self._course.told} told, {self._mistrials} mistrials",
+            )
+        )
+
     def restarted(self) -> Strategy:
         """The same strategy before its first trial."""
         return Strategy(

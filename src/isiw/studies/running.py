@@ -152,7 +152,17 @@ def paired_sessions(
     marks: tuple[int, ...],
     space: DesignSpace = VALVE_SPACE,
 ) -> list[SimulatedSession]:
-    """Every strategy with the same people of every cohort."""
+    """Every strategy with the same people of every cohort.
+
+    Args:
+        strategies: names of strategies.
+        cohorts: names of cohorts.
+        people: how many of each cohort.
+        seed: of the people and the trials.
+        trials: how many stimuli each session has.
+        marks: after which trials it is looked at.
+        space: the ISIs that may be asked.
+    """
     return [
         SimulatedSession(strategy, name, person, seed, trials, marks, space)
         for strategy, name, person in itertools.product(strategies, cohorts, range(people))

@@ -47,7 +47,13 @@ class Player(Protocol):
         """The next ISI [ms]."""
 
     def tell(self, isi_ms: float | None, mep_mv: float | None = None, *, isi_sd_ms: float = 0.0) -> None:
-        """Learn from one trial."""
+        """Learn from one trial.
+
+        Args:
+            isi_ms: the realised ISI [ms]; None for TMS alone.
+            mep_mv: amplitude of the MEP [mV].
+            isi_sd_ms: SD of the realised ISI [ms].
+        """
 
     def estimate(self) -> Judgement:
         """What is believed about the window now."""
@@ -143,7 +149,12 @@ def simulate(session: SimulatedSession) -> pd.DataFrame:
 
 
 def play(session: SimulatedSession, player: Player) -> pd.DataFrame:
-    """Run one session with any player; columns as in `examine`."""
+    """Run one session with any player; columns as in `examine`.
+
+    Args:
+        session: the session.
+        player: what proposes ISIs in it.
+    """
     return examine([session], _Alone(player))
 
 

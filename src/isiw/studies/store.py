@@ -58,7 +58,12 @@ class Store:
         return [unit for unit in self.study.units() if unit.key not in done]
 
     def keep(self, unit: Unit, result: pd.DataFrame | Failure) -> None:
-        """Put what a unit came to in its place, for good."""
+        """Put what a unit came to in its place, for good.
+
+        Args:
+            unit: the unit.
+            result: its rows, or why there are none.
+        """
         error = self._path("errors", unit.key)
         if isinstance(result, Failure):
             _write(error, _error_rows(unit, result))
@@ -101,6 +106,10 @@ class Store:
 
 def begin_store(study: Study, folder: str | Path) -> Store:
     """The folder of a study, made where it is missing, gone on with where it is there.
+
+    Args:
+        study: the study.
+        folder: where its results are.
 
     Raises:
         StudyError: the folder is another study's, or was made with another version of isiw.

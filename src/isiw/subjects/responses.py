@@ -71,7 +71,13 @@ class ResponseCurve(Protocol):
         """Expected MEP above the EMG floor [mV], without drift, by facilitation in 0–1; same shape."""
 
     def sample_evoked_mv(self, facilitation: float, noise: TrialNoise, rng: np.random.Generator) -> float:
-        """One trial's MEP above the EMG floor [mV]."""
+        """One trial's MEP above the EMG floor [mV].
+
+        Args:
+            facilitation: in 0–1.
+            noise: that of the trial.
+            rng: what else is drawn from.
+        """
 
 
 @dataclass(frozen=True)
@@ -146,7 +152,12 @@ class RecruitmentResponse:
         check_numbers(self, "boost_pct_rmt", "sigma_x_pct_rmt", "sigma_y", least=0)
 
     def evoked_mv(self, facilitation: ArrayLike, input_z: ArrayLike) -> FloatArray:
-        """MEP above the floor before output noise [mV], by facilitation and input noise; broadcast shape."""
+        """MEP above the floor before output noise [mV], by facilitation and input noise; broadcast shape.
+
+        Args:
+            facilitation: in 0–1.
+            input_z: input noise in SDs.
+        """
         x = self.intensity_pct_rmt + self.boost_pct_rmt * np.asarray(facilitation, dtype=np.float64)
         drive = self.slope_per_pct * (x + self.sigma_x_pct_rmt * np.asarray(input_z) - self.x50_pct_rmt)
         return np.asarray(self.amplitude_mv * expit(drive))

@@ -86,7 +86,12 @@ class SimulatedSubject:
     stated_hit_delay_ms: tuple[float, float] = (180.0, 6.0)
 
     def facilitation(self, isi_ms: FloatArray, reference: Reference) -> FloatArray:
-        """Facilitation in 0–1 at ISIs on a reference [ms], at the mean hit delay; same shape."""
+        """Facilitation in 0–1 at ISIs on a reference [ms], at the mean hit delay; same shape.
+
+        Args:
+            isi_ms: ISIs [ms], any shape.
+            reference: what they count from.
+        """
         return self.profile(isi_ms if reference == "impact" else isi_ms - self.hit_delay_ms)
 
     def expected_mep_mv(self, space: DesignSpace) -> FloatArray:

@@ -21,6 +21,10 @@ _USUAL_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0, 0.4, 0.6, 0.45, 0.55, 0.5, 0.
 def require(condition: object, promise: str) -> None:
     """Raise where a promise is broken.
 
+    Args:
+        condition: whether it is kept.
+        promise: what it is, for the message.
+
     Raises:
         AssertionError: it is; the message says which.
     """
@@ -61,6 +65,11 @@ def trials_that_break_things(space: DesignSpace, trials: int = 12) -> Mapping[st
 def check_estimate(estimate: object, space: DesignSpace, when: str) -> None:
     """Check that an estimate of the window can be used.
 
+    Args:
+        estimate: what is called an estimate.
+        space: the ISIs that may be asked.
+        when: when it was made, for the message.
+
     Raises:
         AssertionError: it cannot.
     """
@@ -80,7 +89,12 @@ def check_estimate(estimate: object, space: DesignSpace, when: str) -> None:
 
 
 def same_estimates(one: WindowEstimate, other: WindowEstimate) -> bool:
-    """Whether two estimates are the same to the last bit."""
+    """Whether two estimates are the same to the last bit.
+
+    Args:
+        one: an estimate.
+        other: another.
+    """
     arrays = ("grid_ms", "edge_samples_ms", "profile_quantiles_mv", "hypothesis_samples")
     plain = ("probability", "window", "start_ms", "end_ms", "spread_ms", "expected_f1", "best_isi", "largest_excluded")
     return all(getattr(one, name) == getattr(other, name) for name in plain) and all(

@@ -18,12 +18,12 @@ from benchmarks.reduction import dissertation as text
 
 def dissertations_own() -> pd.DataFrame:
     """A comparison with the dissertation's numbers as ours."""
-    rows = []
+    rows: list[dict[str, object]] = []
     for word in WORDS.values():
         for method, trials in text.TRIALS[word].items():
             scores = {"F1: true": text.F1[word][method], "r: measured": text.CORRELATION.get(method, 1.0)}
             names = {"method": NAMES[method], "accelerometer": word}
-            rows.append(names | {"trials": float(trials), "text: trials": float(trials)} | scores)
+            rows.append({**names, "trials": float(trials), "text: trials": float(trials), **scores})
     return pd.DataFrame(rows)
 
 
@@ -55,12 +55,12 @@ def test_trials_beyond_thirty_percent_are_named_with_the_readings_that_bring_the
 
 
 def test_the_dissertations_own_figures_have_no_distance_and_thirty_percent_more_trials_a_part_of_one() -> None:
-    rows = []
+    rows: list[dict[str, object]] = []
     for accelerometer, word in WORDS.items():
         for method in text.METHODS:
             scores = {"f1, true": text.F1[word][method], "correlation, true": text.CORRELATION[method]}
             fate = {"trials": text.TRIALS[word][method], "converged": text.CONVERGED[word][method]}
-            rows.append({"method": method, "accelerometer": accelerometer} | scores | fate)
+            rows.append({"method": method, "accelerometer": accelerometer, **scores, **fate})
     own = pd.DataFrame(rows)
     assert distance(own, "true") == pytest.approx(0.0)
     more = own.assign(trials=1.3 * own["trials"])
@@ -91,4 +91,4 @@ def test_curves_are_read_both_ways() -> None:
     reached = equal_f1(rows).iloc[0]
     # The mean touches .7 at the third trial, and leaves it again.
     assert [reached[level] for level in ("0.5", "0.6", "0.7", "0.9")] == ["3", "3", "5", "5"]
-    assert equal_f1(rows.assign(f1_by_trial=[[0.1], [0.1]])).iloc[0]["0.5"] == "–"
+    assert equal_f1(rows.assign(f1_by_trial=pd.Series([[0.1], [0.1]]))).iloc[0]["0.5"] == "–"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from benchmarks.reduction.dissertation import METHODS
 from benchmarks.reduction.readings import BASE, READINGS, Reading
@@ -33,7 +35,7 @@ def test_the_default_is_never_touched() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"observation": "median"}, {"outside": "noise"}, {"range_end": "never"}])
-def test_unknown_words_are_refused(wrong: dict[str, str]) -> None:
+def test_unknown_words_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match="is unknown"):
         Reading(**wrong)
 

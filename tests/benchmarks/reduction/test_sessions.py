@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ def test_without_accelerometer_500_ms_from_the_valve_command_are_searched() -> N
 
 
 @pytest.mark.parametrize(("end", "length_ms"), [("valve", 320.0), ("hit", 500.0)])
-def test_with_accelerometer_the_range_begins_at_the_impact(end: str, length_ms: float) -> None:
+def test_with_accelerometer_the_range_begins_at_the_impact(end: Literal["valve", "hit"], length_ms: float) -> None:
     where = searched(replace(HIT, reading=Reading(range_end=end)), 182.0)
     assert where.space.reference == "impact"
     assert (where.space.low_ms, where.space.high_ms, where.offset_ms) == (0.0, length_ms, 180.0)
@@ -48,12 +49,12 @@ def test_an_observation_is_one_of_the_ten_recorded_trials_there_or_their_mean() 
     drawn = {one(isi_ms)[1] for _ in range(60)}
     assert len(drawn) > 3
     assert drawn <= set(SWEEP.kept_mv[stop].tolist())
-    assert mean(isi_ms) == (isi_ms, pytest.approx(SWEEP.kept_mv[stop].mean()))
+    assert mean(isi_ms) == pytest.approx((isi_ms, SWEEP.kept_mv[stop].mean()))
 
 
 def test_with_accelerometer_the_same_trials_are_drawn_from_the_impact_on() -> None:
     mean = answers(replace(HIT, reading=Reading("mean")), SWEEP, 180.0)
-    assert mean(70.0) == (70.0, pytest.approx(SWEEP.kept_mv[SWEEP.index(250.0)].mean()))
+    assert mean(70.0) == pytest.approx((70.0, SWEEP.kept_mv[SWEEP.index(250.0)].mean()))
 
 
 def test_zero_outside_silences_all_but_the_measured_window() -> None:
@@ -103,7 +104,7 @@ def test_a_particle_filter_tells_its_spread_after_each_generation() -> None:
 def test_two_gaussians_tell_two_amplitudes() -> None:
     # Without noise; its stopping rule ends the session after eleven trials, and the lower peak is still 16 % off.
     peaks_mv = [mv * np.exp(-0.5 * ((SWEEP.isi_ms - at_ms) / 15) ** 2) for mv, at_ms in ((0.03, 330), (0.08, 230))]
-    clean = replace(SWEEP, trials_mv=np.repeat(0.01 + sum(peaks_mv)[:, None], 12, axis=1))
+    clean = replace(SWEEP, trials_mv=np.repeat(0.01 + np.sum(peaks_mv, axis=0)[:, None], 12, axis=1))
     assert play(replace(BARE, method="nr2"), clean)["amplitudes_mv"] == pytest.approx((0.08, 0.03), rel=0.2)
     assert len(play(BARE, clean)["amplitudes_mv"]) == 1
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from isiw.errors import InvalidValueError
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_taps_vary_as_the_geometry_says(name) -> None:
+def test_taps_vary_as_the_geometry_says(name: str) -> None:
     geometry = replace(preset(name), faults=Faults())
     taps = draw_taps(geometry, 4000, np.random.default_rng(0))
     assert taps.hit_ms.mean() == pytest.approx(geometry.hit.mean_ms, abs=0.3)
@@ -88,14 +89,14 @@ def test_faults_come_as_often_as_their_probability() -> None:
         {"hit": (183.0, 0.1)},
     ],
 )
-def test_an_impossible_geometry_is_an_error(wrong) -> None:
-    events = {"descent": (131.0, 5.0), "hit": (183.0, 4.0), "contact": (15.0, 1.0)} | wrong
+def test_an_impossible_geometry_is_an_error(wrong: dict[str, tuple[float, float]]) -> None:
+    times = {"descent": (131.0, 5.0), "hit": (183.0, 4.0), "contact": (15.0, 1.0)} | wrong
     with pytest.raises(InvalidValueError):
-        Geometry(**{name: Event(*times) for name, times in events.items()})
+        Geometry(Event(*times["descent"]), Event(*times["hit"]), Event(*times["contact"]))
 
 
 @pytest.mark.parametrize("wrong", [{"stuck_probability": 1.5}, {"late_probability": 0.1, "late_ms": (20.0, 10.0)}])
-def test_impossible_faults_are_an_error(wrong) -> None:
+def test_impossible_faults_are_an_error(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         Faults(**wrong)
 

@@ -1,22 +1,27 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Device, HasMemory
-from isiw.devices.robot.mechanism import Faults
+from isiw.devices.robot.mechanism import Faults, Geometry
 from isiw.devices.robot.presets import preset
-from isiw.devices.robot.tapper import HitDelay, Tapper, TapperSettings
+from isiw.devices.robot.tapper import Evoked, HitDelay, Tapper, TapperSettings, Trigger
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals import impact_time, judge
 from isiw.subjects.cohorts import cohort
+from isiw.subjects.subject import Response
 from isiw.testing import check_device
-from isiw.trials import MistrialReason, Stimulus
+from isiw.trials import MistrialReason, Stimulus, Sweep
+from isiw.types import Reference
+from known import instance, known
 
 IMPACT = DesignSpace(0, 320, reference="impact")
 VALVE = DesignSpace(0, 500, reference="valve")
@@ -27,14 +32,37 @@ class Answer:
     mep_mv: float = 0.1
 
 
-def tapper(geometry="subject2", *, respond=lambda _: Answer(), seed=0, **settings) -> SimulatedDevice:
-    device = SimulatedDevice(Tapper(respond, geometry, TapperSettings(**settings), seed=seed))
+@dataclass
+class Listener:
+    """Answers with one amplitude, and remembers the ISIs [ms] that came about."""
+
+    mep_mv: float = 0.1
+    heard_ms: list[float | None] = field(default_factory=list)
+
+    def __call__(self, isi_ms: float | None) -> Answer:
+        self.heard_ms.append(isi_ms)
+        return Answer(self.mep_mv)
+
+
+def realised_ms(sweep: Sweep) -> float:
+    """From the impact in the waveform to the pulse."""
+    return known(sweep.t_tms_ms) - known(impact_time(sweep.channels["acceleration"].values, 5000.0))
+
+
+def tapper(
+    geometry: str | Geometry = "subject2",
+    *,
+    respond: Callable[[float | None], Evoked] | None = None,
+    seed: int = 0,
+    **settings: Any,
+) -> SimulatedDevice:
+    device = SimulatedDevice(Tapper(respond or Listener(), geometry, TapperSettings(**settings), seed=seed))
     device.stage()
     return device
 
 
-def deliver(device, isi_ms, n=1):
-    return [device.deliver(Stimulus(trial, isi_ms), 1.0) for trial in range(n)]
+def deliver(device: SimulatedDevice, isi_ms: float | None, n: int = 1) -> list[Sweep]:
+    return [instance(Sweep, device.deliver(Stimulus(trial, isi_ms), 1.0)) for trial in range(n)]
 
 
 def test_it_is_a_device_with_a_memory() -> None:
@@ -45,8 +73,8 @@ def test_it_is_a_device_with_a_memory() -> None:
 
 
 @pytest.mark.parametrize(("trigger", "accelerometer"), [("open-loop", True), ("open-loop", False), ("impact", True)])
-def test_it_keeps_what_every_device_promises(trigger, accelerometer) -> None:
-    def made(reference):
+def test_it_keeps_what_every_device_promises(trigger: Trigger, *, accelerometer: bool) -> None:
+    def made(reference: Reference) -> SimulatedDevice:
         subject = cohort("recruitment", 1, 0)[0].begin(1)
         settings = TapperSettings(reference=reference, trigger=trigger, accelerometer=accelerometer)
         return SimulatedDevice(Tapper(lambda isi_ms: subject.respond(isi_ms, "impact"), "subject3", settings))
@@ -77,29 +105,29 @@ def test_a_late_pulse_makes_the_sweep_longer() -> None:
 
 @pytest.mark.parametrize("trigger", ["open-loop", "impact"])
 @pytest.mark.parametrize("reference", ["impact", "valve"])
-def test_the_person_answers_the_isi_that_truly_came_about(reference, trigger) -> None:
-    asked = []
-    device = tapper(reference=reference, trigger=trigger, respond=lambda isi: asked.append(isi) or Answer())
+def test_the_person_answers_the_isi_that_truly_came_about(reference: Reference, trigger: Trigger) -> None:
+    person = Listener()
+    device = tapper(reference=reference, trigger=trigger, respond=person)
     sweeps = deliver(device, 60.0 if reference == "impact" else 240.0, n=10)
-    realised = [s.t_tms_ms - impact_time(s.channels["acceleration"].values, 5000.0) for s in sweeps]
-    np.testing.assert_allclose(asked, realised, atol=0.2)
+    assert person.heard_ms == pytest.approx([realised_ms(sweep) for sweep in sweeps], abs=0.2)
 
 
 def test_open_loop_the_isi_varies_with_the_hit_and_triggered_it_does_not() -> None:
-    def errors(trigger):
+    def errors(trigger: Trigger) -> list[float]:
         sweeps = deliver(tapper("subject1", trigger=trigger), 60.0, n=60)
-        return [s.t_tms_ms - impact_time(s.channels["acceleration"].values, 5000.0) - 60.0 for s in sweeps]
+        return [realised_ms(sweep) - 60.0 for sweep in sweeps]
 
     assert np.std(errors("open-loop")[5:]) == pytest.approx(4.0, rel=0.3)
     assert np.max(np.abs(errors("impact"))) <= 0.2
 
 
 def test_the_command_is_corrected_by_the_measured_hits() -> None:
-    device = tapper("subject2", expected_hit_ms=190.0)
-    deliver(device, 60.0, n=30)
-    assert device.simulation.hit_delay.mean_ms == pytest.approx(172.0, abs=1.0)
-    later = [device.deliver(Stimulus(trial, 60.0), 1.0) for trial in range(30, 90)]
-    error = [judge(sweep, Stimulus(0, 60.0), IMPACT).isi_ms - 60.0 for sweep in later]
+    robot = Tapper(Listener(), "subject2", TapperSettings(expected_hit_ms=190.0))
+    for trial in range(30):
+        robot.answer(Stimulus(trial, 60.0))
+    assert robot.hit_delay.mean_ms == pytest.approx(172.0, abs=1.0)
+    later = [robot.answer(Stimulus(trial, 60.0)) for trial in range(30, 90)]
+    error = [known(judge(sweep, Stimulus(0, 60.0), IMPACT).isi_ms) - 60.0 for sweep in later]
     assert np.mean(error) == pytest.approx(0.0, abs=0.8)
 
 
@@ -111,11 +139,11 @@ def test_a_few_late_valves_do_not_move_the_expected_hit_delay() -> None:
 
 
 def test_an_isi_shorter_than_the_detection_is_refused_before_anything_happens() -> None:
-    asked = []
-    device = tapper(trigger="impact", respond=lambda isi: asked.append(isi) or Answer())
+    person = Listener()
+    device = tapper(trigger="impact", respond=person)
     with pytest.raises(DeviceError, match="so soon"):
         deliver(device, 3.0)
-    assert asked == []
+    assert person.heard_ms == []
     deliver(device, 5.0)
     from_valve = tapper(reference="valve", trigger="impact")
     with pytest.raises(DeviceError, match="so soon"):
@@ -132,29 +160,29 @@ def test_without_an_accelerometer_the_uncertainty_of_the_isi_is_stated() -> None
 
 
 def test_the_stated_uncertainty_covers_the_people_of_the_dissertation() -> None:
-    asked = []
+    person = Listener()
     for name in ("subject1", "subject2", "subject3", "subject4"):
-        deliver(tapper(name, accelerometer=False, respond=lambda isi: asked.append(isi) or Answer()), 60.0, n=50)
-    z = (np.array(asked) - 60.0) / 6.5
+        deliver(tapper(name, accelerometer=False, respond=person), 60.0, n=50)
+    z = (np.array(person.heard_ms, dtype=float) - 60.0) / 6.5
     assert np.mean(np.abs(z) <= 2) >= 0.95
 
 
 def test_a_hammer_that_sticks_gives_no_impact_open_loop_and_no_pulse_triggered() -> None:
     stuck = replace(preset("subject1"), faults=Faults(stuck_probability=1.0))
-    asked = []
-    open_loop = deliver(tapper(stuck, respond=lambda isi: asked.append(isi) or Answer()), 60.0)[0]
+    person = Listener()
+    open_loop = deliver(tapper(stuck, respond=person), 60.0)[0]
     assert judge(open_loop, Stimulus(0, 60.0), IMPACT).reason is MistrialReason.NO_IMPACT
-    assert asked == [None]
+    assert person.heard_ms == [None]
     triggered = deliver(tapper(stuck, trigger="impact"), 60.0)[0]
     assert judge(triggered, Stimulus(0, 60.0), IMPACT).reason is MistrialReason.NO_PULSE
 
 
 @pytest.mark.parametrize("reference", ["impact", "valve"])
-def test_tms_alone_taps_nobody(reference) -> None:
-    asked = []
-    device = tapper(reference=reference, respond=lambda isi: asked.append(isi) or Answer(0.05))
+def test_tms_alone_taps_nobody(reference: Reference) -> None:
+    person = Listener(0.05)
+    device = tapper(reference=reference, respond=person)
     sweep = deliver(device, None)[0]
-    assert asked == [None]
+    assert person.heard_ms == [None]
     assert impact_time(sweep.channels["acceleration"].values, 5000.0) is None
     judged = judge(sweep, Stimulus(0, None), IMPACT if reference == "impact" else VALVE)
     assert judged.isi_ms is None
@@ -162,8 +190,8 @@ def test_tms_alone_taps_nobody(reference) -> None:
 
 
 @pytest.mark.parametrize("mep_mv", [0.0, 0.02, 0.1, 1.0])
-def test_the_judged_amplitude_is_the_one_that_the_person_gave(mep_mv) -> None:
-    device = tapper("subject2", respond=lambda _: Answer(mep_mv))
+def test_the_judged_amplitude_is_the_one_that_the_person_gave(mep_mv: float) -> None:
+    device = tapper("subject2", respond=Listener(mep_mv))
     judged = [judge(sweep, Stimulus(0, 80.0), IMPACT) for sweep in deliver(device, 80.0, n=40)]
     measured = [each.mep_mv for each in judged if each.mep_mv is not None]
     assert len(measured) >= 35
@@ -175,13 +203,14 @@ def test_the_judged_amplitude_is_the_one_that_the_person_gave(mep_mv) -> None:
 
 @pytest.mark.parametrize("trigger", ["open-loop", "impact"])
 @pytest.mark.parametrize("reference", ["impact", "valve"])
-def test_the_emg_floor_of_a_person_counts_once(reference, trigger) -> None:
-    person, answers = cohort("nonresponder", 2, 0)[1].begin(1), []
-    device = tapper(
-        reference=reference,
-        trigger=trigger,
-        respond=lambda isi_ms: answers.append(person.respond(isi_ms, "impact")) or answers[-1],
-    )
+def test_the_emg_floor_of_a_person_counts_once(reference: Reference, trigger: Trigger) -> None:
+    person, answers = cohort("nonresponder", 2, 0)[1].begin(1), list[Response]()
+
+    def respond(isi_ms: float | None) -> Response:
+        answers.append(person.respond(isi_ms, "impact"))
+        return answers[-1]
+
+    device = tapper(reference=reference, trigger=trigger, respond=respond)
     isi_ms, space = (100.0, IMPACT) if reference == "impact" else (280.0, VALVE)
     judged = [judge(sweep, Stimulus(0, isi_ms), space) for sweep in deliver(device, isi_ms, n=60)]
     told, given = np.array([(j.mep_mv, a.mep_mv) for j, a in zip(judged, answers, strict=True) if j.mep_mv]).T
@@ -203,7 +232,7 @@ def test_it_comes_into_the_state_after_stimuli_of_an_earlier_run() -> None:
         through.deliver(stimulus, 1.0)
     resumed.resume_after(stimuli)
     last = Stimulus(8, 60.0)
-    assert resumed.deliver(last, 1.0).t_tms_ms == through.deliver(last, 1.0).t_tms_ms
+    assert instance(Sweep, resumed.deliver(last, 1.0)).t_tms_ms == instance(Sweep, through.deliver(last, 1.0)).t_tms_ms
 
 
 @pytest.mark.parametrize(
@@ -215,6 +244,6 @@ def test_it_comes_into_the_state_after_stimuli_of_an_earlier_run() -> None:
         {"trigger": "impact", "accelerometer": False},
     ],
 )
-def test_settings_that_cannot_be_are_errors(wrong) -> None:
+def test_settings_that_cannot_be_are_errors(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         TapperSettings(**wrong)

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 
-from isiw.devices.robot.mechanism import draw_taps
+from isiw.devices.robot.mechanism import Taps, draw_taps
 from isiw.devices.robot.presets import preset
 from isiw.devices.robot.waveforms import (
     acceleration_m_s2,
@@ -21,17 +23,17 @@ TIMES_MS = sample_times_ms(5000.0, 1000.0, valve_ms=500.0)
 
 
 @pytest.fixture
-def bench():
+def bench() -> Taps:
     return draw_taps(preset("bench"), 20, np.random.default_rng(0))
 
 
-def test_the_bench_records_a_force_and_people_do_not(bench) -> None:
+def test_the_bench_records_a_force_and_people_do_not(bench: Taps) -> None:
     rng = np.random.default_rng(1)
     assert sorted(record_robot(TIMES_MS, bench, rng)) == ["acceleration", "force", "pressure", "valve"]
     assert "force" not in record_robot(TIMES_MS, draw_taps(preset("subject1"), 1, rng), rng)
 
 
-def test_the_load_cell_shows_an_impact_and_then_the_resting_hammer(bench) -> None:
+def test_the_load_cell_shows_an_impact_and_then_the_resting_hammer(bench: Taps) -> None:
     force = force_n(np.broadcast_to(TIMES_MS, (20, 5000)), bench)
     before = bench.hit_ms[:, None] > TIMES_MS
     assert not force[before].any()
@@ -53,7 +55,7 @@ def test_the_hammer_rests_at_the_end_of_the_trial() -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [2000.0, 5000.0, 10000.0])
-def test_the_emg_at_rest_has_the_rms_that_the_preset_states(rate_hz) -> None:
+def test_the_emg_at_rest_has_the_rms_that_the_preset_states(rate_hz: float) -> None:
     noise = emg_noise_uv(40, 5000, rate_hz, 1.5, np.random.default_rng(4))
     assert noise.std() == pytest.approx(1.5, rel=0.03)
 
@@ -76,7 +78,7 @@ def test_the_mep_has_unit_height_and_the_turns_of_a_forearm_mep() -> None:
     assert time_ms[shape.argmax()] == pytest.approx(29.9, abs=0.3)
 
 
-def test_the_mep_resembles_the_recorded_mean_mep(recordings_folder) -> None:
+def test_the_mep_resembles_the_recorded_mean_mep(recordings_folder: Path) -> None:
     recorded = pd.read_csv(recordings_folder / "uef_ECR_template_norm.csv").query("t_ms >= 5 and t_ms <= 60")
     ours = mep_shape(recorded["t_ms"].to_numpy())
     assert np.corrcoef(ours, recorded["mean_norm"])[0, 1] >= 0.95

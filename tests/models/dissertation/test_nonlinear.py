@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.models.dissertation.curves import FittedCurve
 from isiw.models.dissertation.nonlinear import NonlinearRegression, gaussians_mv, gradient_mv
 from isiw.models.dissertation.regression import RegressionModel
 from isiw.models.shared.floor import FloorTreatment
 from isiw.testing import check_model
+from isiw.types import FloatArray
 from isiw.window import Window
 from models.told_trials import bell_mv, told, trials_of
 
@@ -21,7 +24,7 @@ NR = RegressionModel(NonlinearRegression())
 FLOOR_MV = 0.02
 
 
-def fit(isi_ms, mep_mv, **settings):
+def fit(isi_ms: FloatArray, mep_mv: FloatArray, **settings: Any) -> FittedCurve:
     return NonlinearRegression(**settings).fit(isi_ms, mep_mv, VALVE_SPACE, np.random.default_rng(0))
 
 
@@ -44,8 +47,8 @@ def test_a_floor_above_the_edges_level_hides_them_unless_it_is_subtracted() -> N
 
 
 def test_two_gaussians_are_recovered_with_both_segments() -> None:
-    def profile(isi_ms):
-        return bell_mv(isi_ms, mean_ms=210.0, sd_ms=15.0) + bell_mv(isi_ms, 0.06, mean_ms=320.0, sd_ms=20.0)
+    def profile(isi_ms: FloatArray) -> FloatArray:
+        return np.asarray(bell_mv(isi_ms, mean_ms=210.0, sd_ms=15.0) + bell_mv(isi_ms, 0.06, mean_ms=320.0, sd_ms=20.0))
 
     two = RegressionModel(NonlinearRegression(peaks=2), segments="all")
     window = told(two, trials_of(profile, every_ms=10.0)).estimate().window
@@ -133,7 +136,7 @@ def test_a_search_that_gives_up_says_so_and_its_best_curve_stands_in() -> None:
 
 @pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
 @pytest.mark.parametrize("peaks", [1, 2])
-def test_the_model_conforms(space, peaks: int) -> None:
+def test_the_model_conforms(space: DesignSpace, peaks: int) -> None:
     check_model(lambda: RegressionModel(NonlinearRegression(peaks=peaks)), space, order_tolerance_ms=1.0)
 
 
@@ -156,7 +159,7 @@ def test_where_no_amplitude_is_known_beforehand_it_starts_from_the_largest_mep(s
         {"samples": 1},
     ],
 )
-def test_a_setting_that_cannot_be_is_refused(settings: dict[str, float]) -> None:
+def test_a_setting_that_cannot_be_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"peaks|width_ms|amplitude_mv|evaluations|samples"):
         NonlinearRegression(**settings)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 import pytest
 import torch
 
 from isiw.acquisition.variance import profile_variance
-from isiw.design import VALVE_SPACE
+from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.dissertation.curves import FittedCurve
 from isiw.models.dissertation.nonlinear import NonlinearRegression
@@ -22,6 +23,8 @@ from isiw.models.protocol import (
     SamplesProfiles,
     SamplesWindows,
 )
+from isiw.types import FloatArray
+from known import known
 from models.told_trials import bell_mv, observation, told, trials_of
 
 NR = RegressionModel(NonlinearRegression())
@@ -34,7 +37,9 @@ class TwoHumps:
 
     noise_mv: float = 0.01
 
-    def fit(self, isi_ms, excess_mv, space, rng) -> FittedCurve:
+    def fit(
+        self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
+    ) -> FittedCurve:
         del isi_ms, excess_mv, rng
         grid = space.grid_ms
         mean = bell_mv(grid, mean_ms=150.0) + bell_mv(grid, 0.05, mean_ms=400.0)
@@ -68,7 +73,7 @@ def test_the_less_noise_the_better_an_outcome_tells_samples_apart() -> None:
 
 
 def test_the_next_isi_is_where_the_curve_is_least_known() -> None:
-    trials = [trial for trial in NOISY if not 215.0 <= trial[0] <= 255.0]
+    trials = [trial for trial in NOISY if not 215.0 <= known(trial[0]) <= 255.0]
     isi_ms = torch.tensor(VALVE_SPACE.grid_ms)
     scores = profile_variance(told(NR, trials), isi_ms)[0]
     assert 205.0 <= float(isi_ms[scores.argmax()]) <= 265.0
@@ -78,11 +83,11 @@ def test_people_are_fitted_apart() -> None:
     posterior = NR.begin(VALVE_SPACE, 1, people=2)
     alone = NR.begin(VALVE_SPACE, 1)
     for isi_ms, mep_mv in trials_of(bell_mv):
-        posterior = NR.update(posterior, observation([isi_ms, 500.0 - isi_ms], [mep_mv, mep_mv]))
+        posterior = NR.update(posterior, observation([isi_ms, 500.0 - known(isi_ms)], [mep_mv, mep_mv]))
         alone = NR.update(alone, observation([isi_ms], [mep_mv]))
     assert posterior.estimate(0).window == alone.estimate().window
     mirrored = posterior.estimate(1).window
-    assert (mirrored.start_ms, mirrored.end_ms) == (500.0 - 313.0, 500.0 - 213.0)
+    assert (known(mirrored).start_ms, known(mirrored).end_ms) == (500.0 - 313.0, 500.0 - 213.0)
 
 
 def test_a_fantasy_is_what_telling_it_would_have_been() -> None:
@@ -95,8 +100,8 @@ def test_a_fantasy_is_what_telling_it_would_have_been() -> None:
 
 def test_the_segment_of_the_peak_is_reported_or_all_of_them() -> None:
     peak, every = (RegressionModel(TwoHumps(), segments=which).begin(VALVE_SPACE, 0) for which in ("peak", "all"))
-    assert peak.estimate().window.segments == ((100.0, 200.0),)
-    assert len(every.estimate().window.segments) == 2
+    assert known(peak.estimate().window).segments == ((100.0, 200.0),)
+    assert len(known(every.estimate().window).segments) == 2
     assert (peak.window_masks(torch.tensor([400.0])) <= every.window_masks(torch.tensor([400.0]))).all()
 
 
@@ -123,4 +128,4 @@ def test_a_response_without_its_amplitude_is_refused() -> None:
 
 def test_an_unknown_word_for_the_segments_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="peak or all"):
-        RegressionModel(NonlinearRegression(), segments="some")
+        RegressionModel(NonlinearRegression(), segments=cast("Any", "some"))

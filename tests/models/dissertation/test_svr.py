@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from sklearn.svm import SVR
 
-from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.models.dissertation.curves import FittedCurve
 from isiw.models.dissertation.regression import RegressionModel
 from isiw.models.dissertation.svr import SupportVectorRegression
 from isiw.testing import check_model
+from known import known
 from models.told_trials import bell_mv, told, trials_of
 
 ISI_MS = np.linspace(0.0, 500.0, 25)
 MEP_MV = bell_mv(ISI_MS) + 0.01 * np.random.default_rng(5).standard_normal(25)
 
 
-def fit(seed: int = 0, **settings):
+def fit(seed: int = 0, **settings: Any) -> FittedCurve:
     return SupportVectorRegression(**settings).fit(ISI_MS, MEP_MV, VALVE_SPACE, np.random.default_rng(seed))
 
 
@@ -45,12 +49,12 @@ def test_the_window_is_near_the_true_one() -> None:
 
 def test_without_trials_a_flat_curve_stands_in() -> None:
     posterior = RegressionModel(SupportVectorRegression()).begin(VALVE_SPACE, 1)
-    assert "no trials" in posterior.trouble
+    assert "no trials" in known(posterior.trouble)
     assert posterior.estimate().window is None
 
 
 @pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
-def test_the_model_conforms(space) -> None:
+def test_the_model_conforms(space: DesignSpace) -> None:
     check_model(lambda: RegressionModel(SupportVectorRegression()), space, order_tolerance_ms=1.0)
 
 
@@ -58,6 +62,6 @@ def test_the_model_conforms(space) -> None:
     "settings",
     [{"c": 0.0}, {"length_ms": 0.0}, {"epsilon": -0.1}, {"committee": 1}, {"committee": 2.5}],
 )
-def test_a_setting_that_cannot_be_is_refused(settings: dict[str, float]) -> None:
+def test_a_setting_that_cannot_be_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"c must|length_ms|epsilon|committee"):
         SupportVectorRegression(**settings)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from isiw.models.gp.fit import Fit, fit, fixed_fit
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, Hyperparameters
 from isiw.models.gp.scale import Scale, Transform, scale_of
 from isiw.models.shared.history import PersonTrials
+from known import known
 
 PRIOR = HyperparameterPrior()
 FIXED = FixedProcess(length_ms=40.0, amplitude=1.1, noise=0.6, centre=-3.8, unit=0.9)
@@ -29,7 +31,7 @@ def trials(n: int = 30, seed: int = 0, alone: int = 0) -> PersonTrials:
     return PersonTrials(isis_ms, expected_mv * rng.lognormal(0, 0.5, n), 0.01 * rng.lognormal(0, 0.5, alone))
 
 
-def fitted(told: PersonTrials, **options: bool) -> Fit:
+def fitted(told: PersonTrials, **options: Any) -> Fit:
     return fit(PRIOR, "rbf", scale_of(told.mep_mv, "log", 0.005), told, **options)
 
 
@@ -106,13 +108,13 @@ def test_a_singular_covariance_is_told_and_answered_by_the_medians() -> None:
     assert sound.trouble is None
     noiseless = Hyperparameters(*(torch.tensor([value], dtype=torch.float64) for value in (40.0, 1.0, 0.0)))
     singular = replace(sound, processes=noiseless, log_prior=torch.zeros(1)).conditioned(told)
-    assert "singular" in singular.trouble
-    assert "medians" in singular.trouble
+    assert "singular" in known(singular.trouble)
+    assert "medians" in known(singular.trouble)
     assert singular.processes.noise.tolist() == [PRIOR.noise[0]] * 2
     assert torch.isfinite(singular.log_joint).all()
 
 
 def test_a_search_that_does_not_end_is_told() -> None:
     got = fitted(trials(), max_evaluations=5)
-    assert "has not ended after 5 evaluations" in got.trouble
+    assert "has not ended after 5 evaluations" in known(got.trouble)
     assert torch.isfinite(got.log_joint).all()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 import torch
@@ -43,7 +44,7 @@ def test_hyperparameters_there_and_back() -> None:
         ({"p_window": 1.1}, "p_window"),
     ],
 )
-def test_a_prior_that_cannot_be_is_refused(settings: dict[str, object], what: str) -> None:
+def test_a_prior_that_cannot_be_is_refused(settings: dict[str, Any], what: str) -> None:
     with pytest.raises(InvalidValueError, match=what):
         HyperparameterPrior(**settings)
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import torch
 
 from isiw.models.gp.scale import Scale, Transform, expected_mep_mv, scale_of, transformed
+from isiw.types import FloatArray
 
 MEPS_MV = np.random.default_rng(1).lognormal(np.log(0.03), 0.8, 200)
 TRANSFORMS: list[Transform] = ["log", "sqrt", "none"]
@@ -35,9 +38,9 @@ def test_zero_is_taken_for_the_detection_limit() -> None:
 def test_the_expected_mep_is_the_mean_of_simulated_ones(transform: Transform) -> None:
     level, noise_sd = float(transformed(np.array([0.08]), transform, 0.005)[0]), 0.02
     values = level + noise_sd * np.random.default_rng(2).standard_normal(1_000_000)
-    back = {"log": np.exp, "sqrt": np.square, "none": np.asarray}[transform]
+    inverses: dict[str, Callable[[FloatArray], FloatArray]] = {"log": np.exp, "sqrt": np.square, "none": np.asarray}
     expected = expected_mep_mv(torch.tensor(level), torch.tensor(noise_sd), transform).item()
-    assert expected == pytest.approx(back(values).mean(), rel=1e-3)
+    assert expected == pytest.approx(inverses[transform](values).mean(), rel=1e-3)
 
 
 @pytest.mark.parametrize("transform", TRANSFORMS)

@@ -8,11 +8,12 @@ from scipy.stats import multivariate_normal, multivariate_t
 from isiw.models.parametric.ascent import Modes
 from isiw.models.parametric.importance import T_DEGREES, Effort, Mixture, WeightedDraws, importance_sample, worth
 from isiw.models.protocol import Tensor
+from isiw.types import ArrayLike
 
 DIMENSIONS = 4
 
 
-def tensor(values) -> Tensor:
+def tensor(values: ArrayLike) -> Tensor:
     return torch.as_tensor(np.asarray(values), dtype=torch.double)
 
 
@@ -30,7 +31,7 @@ def exact() -> tuple[float, float]:
         height + math.log(2 * math.pi * 0.04) + multivariate_normal(np.zeros(2), 1.04 * np.eye(2)).logpdf(place)
         for height, place in ((1.0, (2.0, 1.0)), (0.0, (-1.5, 0.0)))
     ]
-    return float(np.logaddexp(*parts)), float(1.0 / (1.0 + math.exp(parts[1] - parts[0])))
+    return float(np.logaddexp(parts[0], parts[1])), float(1.0 / (1.0 + math.exp(parts[1] - parts[0])))
 
 
 def sample(seed: int, effort: Effort = Effort()) -> WeightedDraws:  # noqa: B008 - a frozen value
@@ -45,7 +46,7 @@ def test_the_density_of_a_mixture_is_that_of_its_parts() -> None:
     expected = np.stack(
         [
             math.log(0.3) + multivariate_normal(np.zeros(2), np.eye(2)).logpdf(points),
-            math.log(0.7) + multivariate_t([1.0, -1.0], scale, df=T_DEGREES).logpdf(points),
+            math.log(0.7) + multivariate_t([1.0, -1.0], scale, df=int(T_DEGREES)).logpdf(points),
         ]
     )
     np.testing.assert_allclose(mixture.log_parts(tensor(points)).numpy(), expected)

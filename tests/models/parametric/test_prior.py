@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import pytest
 import torch
@@ -6,6 +7,7 @@ import torch
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.parametric.prior import FloorPrior, InputNoisePrior, Likelihood, Unknowns, WindowPrior, latent_names
+from isiw.models.shared.scales import Scale
 
 
 def drawn(likelihood: Likelihood, space: DesignSpace, prior: WindowPrior | None = None) -> Unknowns:
@@ -27,7 +29,7 @@ def test_windows_start_up_to_an_eighth_of_a_second_after_the_impact_or_rarely_an
 
 
 def test_widths_and_floors_have_the_medians_and_spreads_that_are_set() -> None:
-    prior = WindowPrior(width_ms=(80.0, 0.3), floor=FloorPrior(mean_mv=(0.02, 0.5)))
+    prior = WindowPrior(width_ms=Scale(80.0, 0.3), floor=FloorPrior(mean_mv=Scale(0.02, 0.5)))
     unknowns = drawn("log-normal", VALVE_SPACE, prior)
     for values, (median, log_sd) in ((unknowns.width_ms, (80.0, 0.3)), (unknowns.floor_mv, (0.02, 0.5))):
         assert values.median().item() == pytest.approx(median, rel=0.03)
@@ -52,7 +54,7 @@ def test_with_noise_on_the_input_the_expected_mep_saturates_and_tms_alone_evokes
         {"outliers": (-3.5, 0.0)},
     ],
 )
-def test_a_prior_that_cannot_be_is_refused(wrong) -> None:
+def test_a_prior_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         WindowPrior(**wrong)
 
@@ -60,6 +62,6 @@ def test_a_prior_that_cannot_be_is_refused(wrong) -> None:
 @pytest.mark.parametrize(
     ("part", "wrong"), [(FloorPrior, {"mean_mv": (math.nan, 0.4)}), (InputNoisePrior, {"rest": (-2.7, 0.0)})]
 )
-def test_an_impossible_part_is_refused(part, wrong) -> None:
+def test_an_impossible_part_is_refused(part: type, wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
         part(**wrong)

@@ -11,6 +11,7 @@ from isiw.models.parametric.law import levels, log_likelihood
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
 from isiw.models.parametric.program import WindowProgram
 from isiw.models.shared.history import History
+from known import known
 
 LIKELIHOODS: tuple[Likelihood, ...] = ("gamma", "log-normal", "input-noise")
 
@@ -79,7 +80,7 @@ def test_the_program_draws_meps_of_its_own_where_none_are_told() -> None:
     trials = History(*(torch.full((1, 4000), value, dtype=torch.double) for value in (250.0, 0.0, 0.0, 0.0, 0.0)))
     conditioned = pyro.poutine.condition(model, data={"latents": latent})
     trace = pyro.poutine.trace(conditioned).get_trace(trials, told=False)
-    drawn = trace.nodes["log_mep"]["value"]
+    drawn = known(trace.nodes["log_mep"]["value"])
     assert drawn.shape == (4000, 2)
     assert torch.equal(drawn[:, 0], drawn[:, 1])
     unknowns = model.unknowns(latent)

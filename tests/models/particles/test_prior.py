@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import astuple, fields, replace
+from typing import Any
 
 import pytest
 import torch
@@ -72,7 +73,7 @@ def test_an_invalid_part_is_refused(part: type, wrong: dict[str, object]) -> Non
 @pytest.mark.parametrize(
     "wrong", [{"boost_pct": Scale(3.0, 0.0)}, {"rest_pct": Scale(-4.5, -0.4)}, {"ratio": Scale(-1.0, 0.9)}]
 )
-def test_an_invalid_muscle_is_refused(wrong: dict[str, Scale]) -> None:
+def test_an_invalid_muscle_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
         replace(HAND, **wrong)
 

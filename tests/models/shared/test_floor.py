@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.models.shared.floor import FloorTreatment
+from isiw.models.shared.floor import FloorKind, FloorTreatment
 from isiw.models.shared.history import PersonTrials
 
 
@@ -24,7 +26,7 @@ def test_without_tms_alone_the_floor_is_the_median_of_all_meps() -> None:
 
 
 @pytest.mark.parametrize("kind", ["zeroed", "raw"])
-def test_only_a_subtracted_floor_is_above_zero(kind: str) -> None:
+def test_only_a_subtracted_floor_is_above_zero(kind: FloorKind) -> None:
     assert FloorTreatment(kind).level_mv(trials([0.1, 0.2], [0.01])) == 0.0
 
 
@@ -36,6 +38,6 @@ def test_what_is_above_the_floor_depends_on_its_kind() -> None:
 
 
 @pytest.mark.parametrize("settings", [{"floor": "cut"}, {"threshold_mv": 0.0}, {"threshold_mv": float("nan")}])
-def test_an_unknown_treatment_is_refused(settings: dict[str, object]) -> None:
+def test_an_unknown_treatment_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"floor|threshold_mv"):
         FloorTreatment(**settings)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 import torch
 
@@ -92,7 +94,7 @@ def test_the_density_is_that_of_the_starts_drawn() -> None:
         ({"spans": (Span(0.5, 0.0, 115.0),)}, "sum to 1"),
     ],
 )
-def test_an_invalid_prior_is_refused(wrong: dict[str, object], said: str) -> None:
+def test_an_invalid_prior_is_refused(wrong: dict[str, Any], said: str) -> None:
     with pytest.raises(InvalidValueError, match=said):
         StartPrior(**wrong)
 

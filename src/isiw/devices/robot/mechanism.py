@@ -229,7 +229,13 @@ class Taps:
 
 
 def draw_taps(geometry: Geometry, n: int, rng: np.random.Generator) -> Taps:
-    """Taps with the variation of a geometry, n of them."""
+    """Taps with the variation of a geometry, n of them.
+
+    Args:
+        geometry: the robot and where it stands.
+        n: how many taps.
+        rng: what they are drawn from.
+    """
     z = rng.standard_normal((4, n))
     fault = rng.uniform(size=(3, n))
     stuck = np.where(fault[2] < geometry.faults.stuck_probability, math.nan, 0.0)
@@ -269,7 +275,12 @@ def pressure_kpa(time_ms: ArrayLike) -> FloatArray:
 
 
 def drive(time_ms: ArrayLike, kinetic_share: float) -> FloatArray:
-    """Acceleration of the moving hammer by the chamber's pressure [m/s²]."""
+    """Acceleration of the moving hammer by the chamber's pressure [m/s²].
+
+    Args:
+        time_ms: time after the valve command [ms], any shape.
+        kinetic_share: kinetic friction, as a share of the supply pressure.
+    """
     return DRIVE_M_S2 * (_pressure_share(time_ms) - kinetic_share)
 
 

@@ -58,7 +58,13 @@ MEP_TURNS = ((-0.60, 21.3, 1.5), (-0.16, 25.3, 1.2), (0.33, 29.9, 1.7), (0.10, 3
 
 
 def sample_times_ms(rate_hz: float, duration_ms: float, valve_ms: float) -> FloatArray:
-    """Times of a sweep's samples after its valve command [ms], shape (w,)."""
+    """Times of a sweep's samples after its valve command [ms], shape (w,).
+
+    Args:
+        rate_hz: sampling rate [Hz].
+        duration_ms: length of the sweep [ms].
+        valve_ms: when the valve command comes, after the first sample [ms].
+    """
     return np.arange(round(duration_ms * rate_hz / 1000), dtype=np.float64) * (1000 / rate_hz) - valve_ms
 
 
@@ -139,17 +145,32 @@ def scale_of_mep(resting_mv: FloatArray, mep_mv: FloatArray, amplitude_mv: float
 
 
 def valve_v(since_valve_ms: FloatArray, late_ms: FloatArray) -> FloatArray:
-    """Voltage of the valve command [V]."""
+    """Voltage of the valve command [V].
+
+    Args:
+        since_valve_ms: times after the valve command [ms], shape (n, w).
+        late_ms: by how much each valve is late [ms], shape (n,).
+    """
     return np.where(since_valve_ms >= late_ms[:, None], VALVE_V, 0.0)
 
 
 def chamber_kpa(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
-    """Pressure of the chamber above the room's [kPa]."""
+    """Pressure of the chamber above the room's [kPa].
+
+    Args:
+        since_valve_ms: times after the valve command [ms], shape (n, w).
+        taps: the taps.
+    """
     return pressure_kpa(since_valve_ms - taps.late_ms[:, None])
 
 
 def acceleration_m_s2(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
-    """Acceleration of the hammer, positive towards the tendon, before its sensor's limits [m/s²]."""
+    """Acceleration of the hammer, positive towards the tendon, before its sensor's limits [m/s²].
+
+    Args:
+        since_valve_ms: times after the valve command [ms], shape (n, w).
+        taps: the taps.
+    """
     late, kinetic = taps.late_ms[:, None], taps.geometry.kinetic_share
     moving = (since_valve_ms >= taps.descent_ms[:, None]) & ~(since_valve_ms >= _rest_ms(taps)[:, None])
     driven = np.where(moving, drive(since_valve_ms - late, kinetic), 0.0)
@@ -157,7 +178,12 @@ def acceleration_m_s2(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
 
 
 def force_n(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
-    """Force on the load cell under the hammer [N]."""
+    """Force on the load cell under the hammer [N].
+
+    Args:
+        since_valve_ms: times after the valve command [ms], shape (n, w).
+        taps: the taps.
+    """
     settled = np.maximum(since_valve_ms - _rest_ms(taps)[:, None], 0.0)
     resting = -REST_FORCE_N * np.expm1(-settled / SETTLING_MS)
     return np.where(np.isnan(resting), 0.0, resting) - MOVING_KG * _by_the_tendon(since_valve_ms, taps)
@@ -191,7 +217,15 @@ def _by_the_tendon(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
 
 
 def emg_noise_uv(n: int, samples: int, rate_hz: float, rms_uv: float, rng: np.random.Generator) -> FloatArray:
-    """EMG at rest: Gaussian noise in the amplifier's band [µV], shape (n, w)."""
+    """EMG at rest: Gaussian noise in the amplifier's band [µV], shape (n, w).
+
+    Args:
+        n: how many sweeps.
+        samples: samples of each, w.
+        rate_hz: sampling rate [Hz].
+        rms_uv: its RMS [µV].
+        rng: what it is drawn from.
+    """
     settle = round(rate_hz / 10)  # the filter starts from zero
     high_hz = min(EMG_BAND_HZ[1], 0.45 * rate_hz)
     band = butter(2, (EMG_BAND_HZ[0], high_hz), btype="bandpass", fs=rate_hz, output="sos")
@@ -203,7 +237,12 @@ def emg_noise_uv(n: int, samples: int, rate_hz: float, rms_uv: float, rng: np.ra
 
 
 def tap_artefact_mv(since_memg_ms: FloatArray, amplitude_mv: float) -> FloatArray:
-    """The tap in the EMG: a burst that begins at once and has died away after some 8 ms [mV]."""
+    """The tap in the EMG: a burst that begins at once and has died away after some 8 ms [mV].
+
+    Args:
+        since_memg_ms: times after the begin of the artefact [ms], any shape.
+        amplitude_mv: its amplitude [mV].
+    """
     since = np.maximum(since_memg_ms, 0.0)
     burst: FloatArray = np.exp(-since / TAP_ARTEFACT_DECAY_MS) * np.sin(2 * math.pi * TAP_ARTEFACT_HZ * since / 1000)
     return amplitude_mv * np.nan_to_num(burst)

@@ -133,7 +133,12 @@ class BootstrapFilter:
         )
 
     def on_lattice(self, space: DesignSpace, isi_ms: FloatArray) -> FloatArray:
-        """The nearest ISIs [ms] of the lattice, inside the range; same shape."""
+        """The nearest ISIs [ms] of the lattice, inside the range; same shape.
+
+        Args:
+            space: the range.
+            isi_ms: ISIs [ms], any shape.
+        """
         last = math.floor((space.high_ms - space.low_ms) / self.lattice_ms + 1e-9)
         return space.low_ms + self.lattice_ms * ((isi_ms - space.low_ms) / self.lattice_ms).round().clip(0, last)
 

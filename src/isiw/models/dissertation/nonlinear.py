@@ -42,7 +42,12 @@ def gaussians_mv(isi_ms: FloatArray, parameters: FloatArray) -> FloatArray:
 
 
 def gradient_mv(isi_ms: FloatArray, parameters: FloatArray) -> FloatArray:
-    """Derivatives of a sum of Gaussians with respect to its parameters, shape (t, 3 k)."""
+    """Derivatives of a sum of Gaussians with respect to its parameters, shape (t, 3 k).
+
+    Args:
+        isi_ms: ISIs [ms], shape (t,).
+        parameters: amplitude [mV], mean [ms] and SD [ms] of each, shape (3 k,).
+    """
     amplitude, mean, sd = (parameters[i::3] for i in range(3))
     z = (isi_ms[:, None] - mean) / sd
     bell = np.exp(-0.5 * z**2)

@@ -184,7 +184,15 @@ def fit(
 def fixed_fit(
     prior: HyperparameterPrior, kernel: KernelName, scale: Scale, told: PersonTrials, fixed: FixedProcess
 ) -> Fit:
-    """One process of given hyperparameters, and the same without an amplitude."""
+    """One process of given hyperparameters, and the same without an amplitude.
+
+    Args:
+        prior: of the hyperparameters.
+        kernel: the covariance.
+        scale: what the process is of.
+        told: the trials of one person.
+        fixed: the hyperparameters.
+    """
     present = torch.tensor([[fixed.length_ms, fixed.amplitude, fixed.noise]], dtype=torch.float64)
     both = torch.cat((present, present * torch.tensor([1.0, 0.0, 1.0])))
     return _sound(Fit(prior, kernel, scale, told, Hyperparameters(*both.unbind(-1)), prior.log_hypotheses))

@@ -136,7 +136,12 @@ class Mixture:
         return Mixture(shares, torch.cat((self.means, other.means)), torch.cat((self.factors, other.factors)))
 
     def draw(self, size: int, generator: torch.Generator) -> Tensor:
-        """Draws, each part in proportion to its share, shape (size, d)."""
+        """Draws, each part in proportion to its share, shape (size, d).
+
+        Args:
+            size: how many.
+            generator: what they are drawn from.
+        """
         d = self.means.shape[-1]
         ends = (self.shares.cumsum(0) / self.shares.sum() * size).round().long()
         part = torch.searchsorted(ends, torch.arange(size), right=True).clamp_max(len(self.means))
@@ -148,7 +153,12 @@ class Mixture:
         return torch.where((part == 0).unsqueeze(-1), normal, student)
 
     def fitted(self, points: Tensor, log_weights: Tensor) -> Mixture:
-        """The mixture after one step towards the weighted points, its scatter held to what they can tell."""
+        """The mixture after one step towards the weighted points, its scatter held to what they can tell.
+
+        Args:
+            points: draws, shape (m, d).
+            log_weights: their log importance weights, shape (m,).
+        """
         d = points.shape[-1]
         belongs = torch.softmax(self.log_parts(points), dim=0) * log_weights.exp()
         shares = belongs.sum(-1)

@@ -80,14 +80,24 @@ class ParametricModel:
         return self.update_by_all(posterior, (observation,))
 
     def update_by_all(self, posterior: ParametricPosterior, observations: Sequence[Observation]) -> ParametricPosterior:
-        """The posterior after several more trials: the same as after one by one, at the cost of one."""
+        """The posterior after several more trials: the same as after one by one, at the cost of one.
+
+        Args:
+            posterior: what is believed before them.
+            observations: the trials, in order.
+        """
         history = posterior.history
         for observation in observations:
             history = history.appended(self.observed(observation, history.isi_ms.shape[-1]))
         return self._after(posterior.space, posterior.seed, history)
 
     def observed(self, observation: Observation, order: int) -> History:
-        """One trial of each person as a history."""
+        """One trial of each person as a history.
+
+        Args:
+            observation: the trial.
+            order: its place among the trials, from 0.
+        """
         known = self.detection_limit_mv, self.response_threshold_mv
         return observed(observation, *known, order=order).to("cpu", torch.double)
 

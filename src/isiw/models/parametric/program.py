@@ -113,12 +113,24 @@ class WindowProgram:
         return unknowns
 
     def log_density(self, latents: Tensor, trials: History, *, present: bool = True) -> Tensor:
-        """What the trace of the program sums to for each of many latents (m, d), shape (m,)."""
+        """What the trace of the program sums to for each of many latents (m, d), shape (m,).
+
+        Args:
+            latents: the latents, shape (m, d).
+            trials: of one person.
+            present: whether there is a window.
+        """
         prior: Tensor = self._latents().log_prob(latents)
         return prior + self.log_likelihood(latents, trials, present=present)
 
     def log_likelihood(self, latents: Tensor, trials: History, *, present: bool = True) -> Tensor:
-        """Log likelihood of the trials under each of many latents (m, d), shape (m,)."""
+        """Log likelihood of the trials under each of many latents (m, d), shape (m,).
+
+        Args:
+            latents: the latents, shape (m, d).
+            trials: of one person.
+            present: whether there is a window.
+        """
         return self._meps(self.unknowns(latents), trials, present=present).log_prob(_ends(trials)).sum(-1)
 
     def unknowns(self, latents: Tensor) -> Unknowns:

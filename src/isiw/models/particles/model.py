@@ -132,7 +132,12 @@ class ParticleModel:
         return SimulatedPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
 
     def reweighted(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
-        """The same particles, weighted by one more trial as well."""
+        """The same particles, weighted by one more trial as well.
+
+        Args:
+            posterior: what is believed before it.
+            observation: the trial.
+        """
         known = self.detection_limit_mv, self.response_threshold_mv
         trial = observed(observation, *known, order=posterior.trials).to(self.device, torch.float32)
         gain = total_log_likelihood(posterior.person, trial)

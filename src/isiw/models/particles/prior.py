@@ -81,7 +81,12 @@ _WITHOUT_CURVE: Final = {
 
 
 def latents_of(*blocks: str, device: torch.device) -> Tensor:
-    """Which latents belong to some blocks, shape (d,)."""
+    """Which latents belong to some of `BLOCKS`, shape (d,).
+
+    Args:
+        *blocks: names of the blocks.
+        device: torch device.
+    """
     chosen = {latent for block in blocks for latent in BLOCKS[block]}
     return torch.tensor([latent in chosen for latent in LATENTS], device=device)
 

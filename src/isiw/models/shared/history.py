@@ -35,7 +35,12 @@ class History:
 
     @classmethod
     def empty(cls, people: int, device: torch.device) -> History:
-        """No trials."""
+        """No trials.
+
+        Args:
+            people: how many, b.
+            device: torch device.
+        """
         return cls(*(torch.empty((people, 0), device=device) for _ in range(5)))
 
     @property
@@ -44,7 +49,12 @@ class History:
         return self.isi_ms, self.isi_sd_ms, self.log_mep, self.log_mep_high, self.order
 
     def to(self, device: torch.device | str, dtype: torch.dtype) -> History:
-        """The same on another device, or in another precision."""
+        """The same on another device, or in another precision.
+
+        Args:
+            device: torch device.
+            dtype: the precision.
+        """
         return History(*(column.to(device, dtype) for column in self.columns))
 
     def appended(self, trial: History) -> History:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from functools import reduce
 from typing import Any, Final, Protocol, TypeVar, get_args, get_type_hints
 
 import numpy as np
@@ -150,6 +151,10 @@ class Setting:
     kind: Any
     default: Any
 
+    def of(self, settings: Settings) -> Any:
+        """Its value in some settings of the family."""
+        return reduce(getattr, self.path, settings)
+
 
 def settings_keys(kind: type[Settings]) -> dict[str, Setting]:
     """What can be set about a family of strategies, by key.
@@ -187,9 +192,7 @@ def settings_values(settings: Settings) -> dict[str, Any]:
     """All settings by key, as TOML values; those of `KNOWN` where they are given."""
     values = {}
     for key, setting in settings_keys(type(settings)).items():
-        value: Any = settings
-        for name in setting.path:
-            value = getattr(value, name)
+        value = setting.of(settings)
         if value is not None:  # which TOML does not have
             values[key] = _plain(value)
     return values
