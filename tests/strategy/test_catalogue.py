@@ -81,7 +81,7 @@ def test_designs_that_do_not_look_at_the_responses_do_not() -> None:
 
 @pytest.mark.parametrize("name", PARTICLES)
 def test_a_named_strategy_is_rebuilt_from_its_recipe(name: str) -> None:
-    strategy = make_strategy(name, seed=2, prior={"profile": {"p_window": 0.6, "width_ms": (90.0, 0.4, 0.0)}}, **FEW)
+    strategy = make_strategy(name, seed=2, prior={"profile": {"p_window": 0.6, "start": {"p_robot": 0.3}}}, **FEW)
     assert isinstance(strategy.model, ResponseModel)
     assert isinstance(strategy.acquisition, AcquisitionFunction)
     again = make_strategy(strategy.recipe.name, seed=strategy.recipe.seed, **strategy.recipe.settings)

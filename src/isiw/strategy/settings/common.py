@@ -253,7 +253,7 @@ def _merged(default: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, A
 def _plain(value: Any) -> Any:
     """As TOML has it: tables, lists, and plain values."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {key: _plain(inner) for key, inner in asdict(value).items() if inner is not None}
+        value = asdict(value)
     if isinstance(value, Mapping):
-        return {key: _plain(inner) for key, inner in value.items()}
+        return {key: _plain(inner) for key, inner in value.items() if inner is not None}
     return [_plain(inner) for inner in value] if isinstance(value, tuple) else value

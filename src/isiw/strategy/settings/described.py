@@ -59,12 +59,14 @@ def described(settings: Settings) -> tuple[DescribedSetting, ...]:
 def _entries(key: str, value: Any, meaning: str) -> Iterator[DescribedSetting]:
     unit = _UNITS.get(key.rpartition("_")[2], "")
     plain = re.sub(rf"\s*\[{re.escape(unit)}\]", "", meaning) if unit else meaning
-    group = is_dataclass(value)
+    several = isinstance(value, tuple) and any(is_dataclass(each) for each in value)
+    group = is_dataclass(value) or several
     yield DescribedSetting(key, None if group else value, unit, plain, group)
-    if group:
-        meanings = _meanings(type(value))
-        for f in fields(value):
-            yield from _entries(f"{key}.{f.name}", getattr(value, f.name), meanings[f.name])
+    for member in value if several else [value] if group else []:
+        meanings = _meanings(type(member))
+        within = f"{key}[{value.index(member)}]" if several else key
+        for f in fields(member):
+            yield from _entries(f"{within}.{f.name}", getattr(member, f.name), meanings[f.name])
 
 
 def _meanings(owner: type) -> dict[str, str]:
