@@ -58,13 +58,17 @@ def run(
 def resume(
     log: Log,
     data: Data = None,
+    lost_pulses: Annotated[
+        int | None,
+        typer.Option(help="Where the log's end is missing: the pulses given that are not in it.", **NO_DEFAULT),
+    ] = None,
     verify: Annotated[bool, typer.Option(help="Check that the strategy asks again what it asked then.")] = True,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Go on with a session that was interrupted."""
     with errors_reported(_INTERRUPTED):
         settings = isiw.config.config_of_log(isiw.read_session(log)).with_overrides(data=data)
         device = isiw.config.device_for(settings)
-        _run_to_the_end(isiw.resume(log, device, on_trial=_show_progress, verify=verify))
+        _run_to_the_end(isiw.resume(log, device, on_trial=_show_progress, lost_pulses=lost_pulses, verify=verify))
 
 
 @app.command("show")

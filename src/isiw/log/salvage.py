@@ -5,6 +5,7 @@ A log may come from anywhere, so what it unpacks to is limited by its own size, 
 
 from __future__ import annotations
 
+import io
 import itertools
 import re
 import struct
@@ -179,7 +180,9 @@ def _read_file(file: IO[bytes], found: Salvage) -> None:
     file.seek(0)
     reading = _Reading(file, found)
     reading.read()
-    counted = reading.counted if found.finished and _index_is_whole(file, found) else None
+    counted = _counted(file)
+    if counted is None and found.finished and not found.losses:
+        found.losses.append("The index at the end of the file fails its checksum. No record is affected.")
     _put_in_order(found)
     _report_gaps(found, 0 if counted is None else counted.message_count)
     if counted is not None:
@@ -192,7 +195,6 @@ class _Reading:
 
     def __init__(self, file: IO[bytes], found: Salvage) -> None:
         self.file, self.found = file, found
-        self.counted: mcap.Statistics | None = None
         self.sealed = False
         """Whether the end of the records was reached."""
         self.whole = False
@@ -237,8 +239,6 @@ class _Reading:
             _keep_attachment(record, self.file, self._readable_to, found)
         elif isinstance(record, mcap.Metadata) and record.name.startswith(ANNOUNCEMENT):
             found.topics[int(record.metadata["id"])] = record.metadata["topic"]
-        elif isinstance(record, mcap.Statistics):
-            self.counted = record
         self.sealed = self.sealed or isinstance(record, mcap.DataEnd)
         found.finished = found.finished or isinstance(record, mcap.Footer)
 
@@ -356,19 +356,22 @@ def _honest_size(chunk: mcap.Chunk) -> int:
     return chunk.uncompressed_size
 
 
-def _index_is_whole(file: IO[bytes], found: Salvage) -> bool:
-    """Whether the index agrees with its checksum, which the library leaves unchecked.
-
-    It holds no record, but damage is damage.
-    """
+def _counted(file: IO[bytes]) -> mcap.Statistics | None:
+    """What the index at the end of a log counts, if it agrees with its checksum, which the library leaves unchecked."""
     file.seek(0)
     data = file.read()
     footer_at = len(data) - len(_MAGIC) - _FOOTER_BYTES
-    summary_at, _, checksum = struct.unpack("<QQI", data[footer_at + 9 : footer_at + _FOOTER_BYTES])
-    whole: bool = zlib.crc32(data[summary_at : footer_at + _FOOTER_BYTES - 4]) == checksum
-    if not whole and not found.losses:
-        found.losses.append("The index at the end of the file fails its checksum. No record is affected.")
-    return whole
+    if footer_at < 0 or not data.endswith(_MAGIC):
+        return None
+    index_at, _, checksum = struct.unpack_from("<QQI", data, footer_at + _RECORD_HEAD_BYTES)
+    index = data[index_at : len(data) - len(_MAGIC)]
+    if zlib.crc32(index[:-4]) != checksum:
+        return None
+    try:
+        records = list(StreamReader(io.BytesIO(index + _MAGIC), skip_magic=True).records)
+    except _UNREADABLE:
+        return None
+    return next((record for record in records if isinstance(record, mcap.Statistics)), None)
 
 
 def _put_in_order(found: Salvage) -> None:

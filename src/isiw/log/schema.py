@@ -34,6 +34,7 @@ from isiw.window import Window, WindowEstimate
 __all__ = [
     "ANNOUNCEMENT",
     "CHANNEL_IDS",
+    "MOST_TRIALS",
     "SCHEMA_VERSION",
     "Estimate",
     "Event",
@@ -54,8 +55,12 @@ __all__ = [
 SCHEMA_VERSION = 2
 """2 since 0.1.0: other settings of the strategies, hypotheses by name. Versions before the first release wrote 1."""
 
+MOST_TRIALS: Final = 100_000
+"""More than any session delivers; a record of a later trial makes no sense."""
+
 PROFILE_DECIMALS = 6  # a nanovolt; the profile is a picture of the posterior, not a measurement
 
+TrialNumber: TypeAlias = Annotated[int, Field(ge=0, lt=MOST_TRIALS)]
 Number: TypeAlias = Annotated[float, WithJsonSchema({"type": ["number", "string"]})]
 Numbers: TypeAlias = Annotated[
     tuple[float, ...], WithJsonSchema({"type": "array", "items": {"type": ["number", "string"]}})
@@ -98,7 +103,7 @@ class Header(_Record):
 class Intent(_Record):
     """A pair of stimuli that is about to be delivered."""
 
-    trial: int
+    trial: TrialNumber
     isi_ms: float | None
     t_s: float = 0.0
 
@@ -106,7 +111,7 @@ class Intent(_Record):
 class Waveform(_Record):
     """One waveform of one trial."""
 
-    trial: int
+    trial: TrialNumber
     t0_ms: float
     rate_hz: float
     unit: str
@@ -135,7 +140,7 @@ class Estimate(_Record):
     that there is more than one segment.
     """
 
-    trial: int
+    trial: TrialNumber
     probability: float | None
     segments_ms: tuple[float, ...] = ()
     start_ms: Number | None = None
@@ -216,7 +221,7 @@ class Event(_Record):
     """Something that happened to a session; `trial` is the excluded trial, or else the last one before it."""
 
     kind: EventKind
-    trial: int | None = None
+    trial: TrialNumber | None = None
     text: str = ""
 
 
@@ -308,6 +313,8 @@ def decode(topic: str, data: bytes) -> Record:
         ValueError: not such a record.
     """
     record: Record = adapter(topic).validate_json(data)
+    if isinstance(record, Trial) and record.index >= MOST_TRIALS:
+        raise InvalidValueError("no session has so many trials", got=record.index, expected=f"below {MOST_TRIALS}")
     return record
 
 
