@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 
 import isiw
+from isiw.texts import plain
 
 __all__ = ["DAMAGED", "INTERRUPTED", "NO_DEFAULT", "errors_reported", "show"]
 
@@ -20,8 +21,8 @@ NO_DEFAULT: dict[str, Any] = {"show_default": False}
 
 
 def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:
-    """Print, coloured where the output is a terminal."""
-    Console(stderr=stderr, highlight=False, soft_wrap=True).print(text, style=style, markup=False)
+    """Print, coloured where the output is a terminal; what the terminal would obey is left out."""
+    Console(stderr=stderr, highlight=False, soft_wrap=True, emoji=False).print(plain(text), style=style, markup=False)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -24,6 +25,7 @@ __all__ = [
     "disk_errors",
     "log_of",
     "part_of",
+    "put",
     "sync_folder",
     "take_free_place",
 ]
@@ -117,6 +119,36 @@ _writing = partial(
     what="the log cannot be written",
     remedy="What was synced before is safe. Make room, then resume the session.",
 )
+
+
+def put(path: Path, content: bytes, *, replacing: bool, through: Path | None = None) -> None:
+    """Put a whole file in its place in one step, for good.
+
+    Args:
+        path: its place.
+        content: what is in it.
+        replacing: whether a file that is there is replaced.
+        through: where it is written first; by default under a name of its own, which is gone where this fails.
+
+    Raises:
+        FileExistsError: there is a file, which is not to be replaced.
+        OSError: it cannot be written.
+    """
+    beside = through or path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    try:
+        with beside.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        if replacing:
+            beside.replace(path)
+            sync_folder(path.parent)
+        else:
+            take_free_place(beside, path)
+    except BaseException:
+        with suppress(OSError):
+            beside.unlink(missing_ok=True)
+        raise
 
 
 class DurableFile:

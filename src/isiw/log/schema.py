@@ -15,6 +15,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Mapping
+from functools import cache
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
@@ -320,5 +321,9 @@ def decode(topic: str, data: bytes) -> Record:
 
 def json_schema(topic: str) -> tuple[str, bytes]:
     """Name and JSON schema of a topic's records; the root is an object."""
-    kind = _KINDS.get(topic, Waveform)
-    return f"isiw.{kind.__name__}", json.dumps(adapter(topic).json_schema(mode="serialization")).encode()
+    return _schema_of(_KINDS.get(topic, Waveform))
+
+
+@cache
+def _schema_of(kind: type[Any]) -> tuple[str, bytes]:
+    return f"isiw.{kind.__name__}", json.dumps(TypeAdapter(kind).json_schema(mode="serialization")).encode()

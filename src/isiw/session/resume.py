@@ -20,6 +20,7 @@ from isiw.log.writer import LogWriter
 from isiw.session.loop import Session, SessionUpdate, learn, versions
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
+from isiw.texts import plain
 from isiw.trials import Stimulus, Trial, TrialTable
 
 __all__ = ["Replayed", "exclude", "replay", "resume"]
@@ -253,7 +254,8 @@ def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> 
 
 
 def _versions_text(header: Header) -> str:
-    return ", ".join(f"{name} {version}" for name, version in {"isiw": header.isiw_version, **header.versions}.items())
+    logged = {"isiw": header.isiw_version, **header.versions}
+    return plain(", ".join(f"{name} {version}" for name, version in logged.items()))
 
 
 def _differing_text(replayed: Replayed, header: Header) -> str:
