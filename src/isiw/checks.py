@@ -15,7 +15,10 @@ from typing import Any, TypedDict, Unpack
 from isiw.errors import InvalidValueError
 
 __all__ = [
+    "MOST_MEP_MV",
+    "amplitude",
     "ascending",
+    "check_amplitude",
     "check_choice",
     "check_numbers",
     "check_probabilities",
@@ -25,6 +28,10 @@ __all__ = [
     "number",
     "whole",
 ]
+
+
+MOST_MEP_MV = 1000.0
+"""More than any amplifier of EMG gives [mV]: their inputs take some hundred millivolts to either side at most."""
 
 
 class Bounds(TypedDict, total=False):
@@ -47,10 +54,47 @@ def number(what: str, value: object, **bounds: Unpack[Bounds]) -> float:
     Raises:
         InvalidValueError: anything else.
     """
-    plain = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    plain = _as_float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     if not (math.isfinite(plain) and _within(plain, bounds)):
         raise InvalidValueError(f"{what} must be {_described('a finite number', bounds)}", got=value)
     return plain
+
+
+def amplitude(what: str, value: object) -> float:
+    """The amplitude of an MEP, from 0 to what an amplifier can give [mV].
+
+    Args:
+        what: its name, for the message.
+        value: what was given.
+
+    Raises:
+        InvalidValueError: anything else.
+    """
+    plain = number(what, value, least=0)
+    if plain > MOST_MEP_MV:
+        raise InvalidValueError(
+            f"{what} is more than any amplifier gives",
+            got=value,
+            expected=f"an amplitude in mV, at most {MOST_MEP_MV:g}",
+            remedy="Is it in µV? Then divide it by 1000.",
+        )
+    return plain
+
+
+def check_amplitude(owner: object, name: str, *, optional: bool = False) -> None:
+    """Check a field of a frozen dataclass that is the amplitude of an MEP [mV].
+
+    Args:
+        owner: the instance.
+        name: its field.
+        optional: whether None is allowed.
+
+    Raises:
+        InvalidValueError: a field that is not such an amplitude.
+    """
+    value = getattr(owner, name)
+    if not (optional and value is None):
+        _put(owner, name, amplitude(f"{type(owner).__name__}.{name}", value))
 
 
 def deadline(what: str, value: object) -> float | None:
@@ -63,7 +107,7 @@ def deadline(what: str, value: object) -> float | None:
     Raises:
         InvalidValueError: anything else.
     """
-    return None if value is None or value == math.inf else number(what, value, least=0)
+    return None if value is None or (isinstance(value, Real) and value == math.inf) else number(what, value, least=0)
 
 
 def whole(what: str, value: object, **bounds: Unpack[Bounds]) -> int:
@@ -95,7 +139,7 @@ def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
         InvalidValueError: an unknown value.
     """
     values = tuple(known)
-    if not any(value == each and type(value) is type(each) for each in values):
+    if not any(type(value) is type(each) and value == each for each in values):
         raise InvalidValueError(f"{what} is unknown", got=value, expected=" or ".join(map(str, values)))
     return value
 
@@ -179,6 +223,13 @@ def check_choice(owner: object, name: str, known: Iterable[Any]) -> None:
         InvalidValueError: an unknown value.
     """
     choice(f"{type(owner).__name__}.{name}", getattr(owner, name), known)
+
+
+def _as_float(value: Real) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # a whole number that no float can hold
+        return math.inf
 
 
 def _put(owner: object, name: str, value: object) -> None:

@@ -15,6 +15,10 @@ from isiw.types import FloatArray, Reference
 __all__ = ["IMPACT_SPACE", "VALVE_SPACE", "DesignSpace"]
 
 
+MOST_ISIS = 10_001
+"""Of a design space: a second in steps of 0.1 ms."""
+
+
 @dataclass(frozen=True)
 class DesignSpace:
     """The ISIs that may be asked: a grid from `low_ms` to `high_ms`, both included.
@@ -28,7 +32,8 @@ class DesignSpace:
             one before it is a mistrial [ms].
 
     Raises:
-        InvalidValueError: a bound that is not finite, an empty range, a step that does not fit, an unknown reference.
+        InvalidValueError: a bound that is not finite, an empty range, a step that does not fit, too many ISIs, an
+            unknown reference.
     """
 
     low_ms: float
@@ -47,6 +52,13 @@ class DesignSpace:
                 "the design space is empty", got=(self.low_ms, self.high_ms), expected="low_ms < high_ms"
             )
         steps = (self.high_ms - self.low_ms) / self.step_ms
+        if steps >= MOST_ISIS:
+            raise InvalidValueError(
+                "the design space has too many ISIs",
+                got=steps,
+                expected=f"at most {MOST_ISIS}",
+                remedy="Choose a narrower range, or a larger step_ms.",
+            )
         if abs(steps - round(steps)) > 1e-6:
             raise InvalidValueError(
                 "the range is not a whole number of steps",

@@ -33,7 +33,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise ConfigError(
             f"the configuration cannot be read: {error.strerror}", got=str(path), remedy="Check the path."
         ) from error
-    except ValueError as error:  # not TOML, or not UTF-8
+    except (ValueError, RecursionError) as error:  # not TOML, not UTF-8, or nested without end
         raise ConfigError(f"{path} is not valid TOML: {error}", remedy="Correct the line that it names.") from error
 
 

@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 import pandas as pd
 
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import check_amplitude, check_numbers, check_wholes
 from isiw.errors import InvalidValueError
 from isiw.types import FloatArray
 
@@ -126,7 +126,7 @@ class Measurement:
         t_tms_ms: time of the magnetic pulse [ms], where known.
 
     Raises:
-        InvalidValueError: a value that is not finite, or a negative amplitude.
+        InvalidValueError: a value that is not finite, or an amplitude that no amplifier gives.
     """
 
     mep_mv: float
@@ -139,7 +139,8 @@ class Measurement:
 
     def __post_init__(self) -> None:
         check_numbers(self, "isi_ms", "t_valve_ms", "t_hit_ms", "t_tms_ms", optional=True)
-        check_numbers(self, "mep_mv", "isi_sd_ms", least=0)
+        check_amplitude(self, "mep_mv")
+        check_numbers(self, "isi_sd_ms", least=0)
         check_numbers(self, "background_rms_uv", least=0, optional=True)
 
 
@@ -163,7 +164,7 @@ class Trial:
 
     Raises:
         InvalidValueError: a mistrial without a reason, an accepted trial with one or without an amplitude, or a value
-            that is not finite.
+            that is not finite or that no amplifier gives.
     """
 
     index: int
@@ -189,7 +190,8 @@ class Trial:
             raise InvalidValueError("an accepted trial needs its MEP", got=self.index)
         check_wholes(self, "index", least=0)
         check_numbers(self, "commanded_isi_ms", "isi_ms", "t_valve_ms", "t_hit_ms", "t_tms_ms", optional=True)
-        check_numbers(self, "mep_mv", "background_rms_uv", least=0, optional=True)
+        check_amplitude(self, "mep_mv", optional=True)
+        check_numbers(self, "background_rms_uv", least=0, optional=True)
         check_numbers(self, "isi_sd_ms", least=0)
 
     @classmethod

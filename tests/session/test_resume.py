@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
-from isiw.errors import DeviceError, InvalidValueError, LogError, StrategyError
+from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, LogError, StrategyError
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, decode
@@ -412,3 +413,62 @@ def test_a_measured_zero_and_its_uncertainty_are_replayed(log: Path) -> None:
     session = resume(log, ScriptedDevice(answer), scripted_strategy(10))
     assert [mep for _, mep in told_to(session.strategy)] == [0.0, 0.0]
     assert [trial.isi_sd_ms for trial in session.trials] == [2.0, 2.0]
+
+
+def cut_at_a_records_end(log, trials) -> None:
+    """What is left of a closed log that was copied in part: so many trials, and no end."""
+    whole = log.read_bytes()
+    blocks = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
+    log.write_bytes(whole[: blocks[3 * trials + 1]])  # a header, then intent, trial and estimate of each
+
+
+@pytest.fixture
+def cut(scripted_strategy, scripted_device, log):
+    """A closed log of six trials, of which the last two were cut off."""
+    Session(scripted_device(), scripted_strategy(6), log=log).run()
+    cut_at_a_records_end(log, 4)
+    assert len(read_session(log).table) == 4
+    return log
+
+
+def test_a_log_without_its_end_does_not_go_on_before_somebody_says_how_many_stimuli_it_lost(
+    cut, scripted_strategy, scripted_device
+) -> None:
+    before = cut.read_bytes()
+    with pytest.raises(DamagedLogError, match=r"end is missing.*stimulator's counter.*--lost-pulses"):
+        resume(cut, scripted_device(), scripted_strategy(10))
+    with pytest.raises(DamagedLogError, match="end is missing"):
+        exclude(cut, 1, "sneezed")
+    assert cut.read_bytes() == before
+
+
+def test_the_stimuli_of_a_lost_end_are_counted_and_their_numbers_not_used_again(
+    cut, scripted_strategy, scripted_device
+) -> None:
+    device = scripted_device()
+    result = resume(cut, device, scripted_strategy(10), lost_pulses=2).run()
+    assert [trial.reason for trial in result.trials[4:6]] == [MistrialReason.OUTCOME_UNKNOWN] * 2
+    assert [stimulus.trial for stimulus in device.delivered] == [6, 7, 8, 9]
+    after = read_session(cut)
+    assert (len(after.table), after.losses, after.end_lost) == (10, (), False)
+    assert "cut off" in next(event.text for event in after.events if event.kind == "resume")
+
+
+@pytest.mark.parametrize("pulses", [-1, 1.5, "2", True, 10**9])
+def test_lost_pulses_are_a_number_of_stimuli(cut, scripted_strategy, scripted_device, pulses) -> None:
+    with pytest.raises(InvalidValueError, match="lost_pulses"):
+        resume(cut, scripted_device(), scripted_strategy(10), lost_pulses=pulses)
+
+
+def test_a_log_with_its_end_has_lost_no_pulses(interrupted, scripted_strategy, scripted_device) -> None:
+    with pytest.raises(InvalidValueError, match="this one's is there"):
+        resume(interrupted, scripted_device(), scripted_strategy(10), lost_pulses=1)
+
+
+def test_excluding_a_trial_of_a_damaged_log_says_in_the_log_what_was_lost(interrupted) -> None:
+    whole = bytearray(interrupted.read_bytes())
+    block = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)][6]
+    whole[block + 30] ^= 1
+    interrupted.write_bytes(whole)
+    exclude(interrupted, 0, "sneezed")
+    assert "fails its checksum" in next(e.text for e in read_session(interrupted).events if "checksum" in e.text)

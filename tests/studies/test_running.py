@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -9,15 +10,28 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Never
 
+import numpy as np
 import pandas as pd
 import psutil
 import pytest
 
 from isiw.errors import ConfigError, StudyError
-from isiw.studies import Processes, Study, begin_store, conduct, load_study, open_store, replay, sessions, unit_of_row
+from isiw.studies import (
+    Processes,
+    Study,
+    StudyStrategy,
+    begin_store,
+    conduct,
+    load_study,
+    open_store,
+    replay,
+    sessions,
+    unit_of_row,
+)
 from isiw.studies import plan as plan_module
+from isiw.studies import store as store_module
 from isiw.studies.plan import Engine, Unit
 from isiw.studies.sessions import SimulatedSession
 from studies.tiny import TOML, timeless, tiny
@@ -62,8 +76,8 @@ def test_a_finished_study_has_nothing_left_to_run(tmp_path: Path) -> None:
 def test_a_study_goes_on_with_what_is_missing_and_writes_over_what_was_cut_off(tmp_path: Path) -> None:
     whole = timeless(conduct(tiny(), tmp_path / "whole").rows())
     conduct(tiny(), tmp_path / "cut")
-    lost = tmp_path / "cut" / "parts" / "even.gaussian.00001.parquet"
-    lost.rename(lost.with_name(f"{lost.name}.part")).write_bytes(b"half of a pa")
+    (lost,) = (tmp_path / "cut" / "parts").glob("even.gaussian.00001.*")
+    lost.rename(lost.with_name("even.gaussian.00001.part")).write_bytes(b"half of a pa")
     assert len(open_store(tmp_path / "cut").rows()) == len(whole) - 2
     assert keys_run(tiny(), tmp_path / "cut") == ["even.gaussian.00001"]
     pd.testing.assert_frame_equal(timeless(open_store(tmp_path / "cut").rows()), whole)
@@ -124,9 +138,9 @@ def test_a_replay_of_one_person_of_a_batch_compares_that_person(tmp_path: Path) 
 
 def test_a_replay_says_which_columns_differ(tmp_path: Path) -> None:
     store = conduct(tiny(), tmp_path)
-    path = tmp_path / "parts" / "even.gaussian.00001.parquet"
-    rows = pd.read_parquet(path)
-    rows.assign(f1=rows["f1"] + 0.1, ask_ms=0.0).to_parquet(path)
+    unit, rows = store.unit("even.gaussian.00001"), store.rows()
+    rows = rows[rows["unit"] == unit.key]
+    store.keep(unit, rows.assign(f1=rows["f1"] + 0.1, ask_ms=0.0))
     assert replay(store, "even.gaussian.00001").differing == ("f1",)
 
 
@@ -227,3 +241,82 @@ def test_a_damaged_part_is_named_with_the_way_out(tmp_path: Path, damage: Callab
     part.write_bytes(damage(part.read_bytes()))
     with pytest.raises(StudyError, match=rf"damaged.*{part.name}.*run the study again"):
         open_store(tmp_path).rows()
+
+
+def swept(people: int = 2) -> Study:
+    """A study of the conventional search, which takes a moment."""
+    return tiny(strategies=(StudyStrategy("incremental"),), cohorts=("gaussian",), people=people)
+
+
+def test_no_flipped_bit_of_a_part_gives_other_values_silently(tmp_path) -> None:
+    store = conduct(swept(people=1), tmp_path)
+    part = next((tmp_path / "parts").glob("*.parquet"))
+    whole, usual = part.read_bytes(), store.rows()
+    for bit in np.random.default_rng(3).choice(8 * len(whole), 300, replace=False).tolist():
+        flipped = bytearray(whole)
+        flipped[bit // 8] ^= 1 << bit % 8
+        part.write_bytes(flipped)
+        with pytest.raises(StudyError, match=r"damaged.*checksum fails"):
+            store.rows()
+    part.write_bytes(whole)
+    pd.testing.assert_frame_equal(store.rows(), usual)
+
+
+def test_a_part_without_a_checksum_in_its_name_is_no_part(tmp_path) -> None:
+    store = conduct(swept(people=1), tmp_path)
+    part = next((tmp_path / "parts").glob("*.parquet"))
+    part.rename(part.with_name("even.gaussian.00000.parquet"))
+    with pytest.raises(StudyError, match="damaged"):
+        store.rows()
+
+
+def test_a_folder_that_is_being_written_takes_no_second_writer_and_is_still_read(tmp_path) -> None:
+    refused: list[str] = []
+
+    def try_it_too(unit, _result) -> None:
+        with pytest.raises(StudyError, match=r"run by another process.*Wait for it") as caught:
+            conduct(swept(), tmp_path)
+        refused.append(str(caught.value))
+        assert unit.key not in {left.key for left in open_store(tmp_path).left()}
+
+    assert len(conduct(swept(), tmp_path, on_done=try_it_too).rows()) == 2 * 2
+    assert len(refused) == 2
+    assert keys_run(swept(), tmp_path) == []
+
+
+def test_who_begins_a_folder_at_the_same_moment_goes_on_with_the_same_study_only(tmp_path, monkeypatch) -> None:
+    usual = store_module.put
+
+    def put_late(path, content, **how) -> None:
+        monkeypatch.setattr(store_module, "put", usual)
+        begin_store(tiny(people=4), tmp_path)
+        usual(path, content, **how)
+
+    monkeypatch.setattr(store_module, "put", put_late)
+    with pytest.raises(StudyError, match="people was 4, now 3"):
+        begin_store(tiny(), tmp_path)
+    assert open_store(tmp_path).study.people == 4
+
+
+def no_room(_) -> Never:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_a_full_disk_is_an_error_of_the_study_and_all_that_is_finished_is_kept(tmp_path, monkeypatch) -> None:
+    def fill(_unit, _result) -> None:
+        monkeypatch.setattr(os, "fsync", no_room)
+
+    with pytest.raises(StudyError, match=r"No space left.*make room"):
+        conduct(swept(), tmp_path, on_done=fill)
+    assert len(open_store(tmp_path).rows()) == 2
+    assert not list(tmp_path.rglob("*.part"))
+    with pytest.raises(StudyError, match="No space left"):
+        begin_store(swept(), tmp_path / "new")
+    monkeypatch.undo()
+    assert len(keys_run(swept(), tmp_path)) == 1
+
+
+def test_a_folder_that_cannot_be_made_is_an_error_of_the_study(tmp_path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StudyError, match="cannot be written"):
+        begin_store(tiny(), tmp_path / "file")

@@ -12,6 +12,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 import isiw
+from isiw.texts import plain
 
 __all__ = ["DAMAGED", "INTERRUPTED", "NO_DEFAULT", "errors_reported", "show", "show_entry"]
 
@@ -22,14 +23,14 @@ NO_DEFAULT: dict[str, Any] = {"show_default": False}
 
 
 def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:
-    """Print, coloured where the output is a terminal.
+    """Print, coloured where the output is a terminal; what the terminal would obey is left out.
 
     Args:
         text: what to print.
         style: one of rich's.
         stderr: on standard error instead.
     """
-    Console(stderr=stderr, highlight=False, soft_wrap=True).print(text, style=style, markup=False)
+    Console(stderr=stderr, highlight=False, soft_wrap=True, emoji=False).print(plain(text), style=style, markup=False)
 
 
 def show_entry(heading: str, text: str) -> None:

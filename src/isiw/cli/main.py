@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -32,6 +33,7 @@ _INTERRUPTED = "Interrupted: the device is stopped and the log is closed."
 
 Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
 Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **NO_DEFAULT)]
+Overwrite = Annotated[bool, typer.Option(help="Replace a picture that is there; a log never is.")]
 Seed = Annotated[int | None, typer.Option(help="Seed of the person, the trials and the strategy.", **NO_DEFAULT)]
 
 
@@ -76,13 +78,17 @@ def run(
 def resume(
     log: Log,
     data: Data = None,
+    lost_pulses: Annotated[
+        int | None,
+        typer.Option(help="Where the log's end is missing: the pulses given that are not in it.", **NO_DEFAULT),
+    ] = None,
     verify: Annotated[bool, typer.Option(help="Check that the strategy asks again what the log says it asked.")] = True,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Go on with a session that was interrupted."""
     with errors_reported(_INTERRUPTED):
         settings = isiw.config.config_of_log(isiw.read_session(log)).with_overrides(data=data)
         device = isiw.config.device_for(settings)
-        _run_to_the_end(isiw.resume(log, device, on_trial=_show_progress, verify=verify))
+        _run_to_the_end(isiw.resume(log, device, on_trial=_show_progress, lost_pulses=lost_pulses, verify=verify))
 
 
 @app.command("show")
@@ -102,12 +108,13 @@ def show_log(log: Log) -> None:
 def plot(
     log: Log,
     output: Annotated[Path, typer.Option("--output", "-o", help="The picture's file: .png, .pdf, .svg …")],
+    overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Draw a session: profile, trials, window, and how the edges developed."""
     with errors_reported(_INTERRUPTED):
         record = isiw.read_session(log)
         truth = isiw.config.true_window(record)
-        show(f"picture: {isiw.plots.save_session_plot(record, output, truth=truth)}")
+        show(f"picture: {isiw.plots.save_session_plot(record, output, truth=truth, overwrite=overwrite)}")
         _exit_if_damaged(record.losses)
 
 
@@ -145,6 +152,7 @@ def timing(
     taps: Annotated[int, typer.Option(help="Taps for each ISI, of a preset.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of a preset's taps.")] = 0,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
+    overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Report how repeatable the taps are: events, ISI errors, mistrials."""
     with errors_reported(_INTERRUPTED):
@@ -155,7 +163,7 @@ def timing(
         )
         show(isiw.repeatability.timing_report(study))
         if output is not None:
-            show(f"picture: {isiw.plots.save_timing_plot(study, output)}")
+            show(f"picture: {isiw.plots.save_timing_plot(study, output, overwrite=overwrite)}")
 
 
 def _heading(setting: DescribedSetting) -> str:
@@ -192,8 +200,14 @@ def _run_to_the_end(session: Session) -> None:
     truth = isiw.config.true_window(record)
     show(f"\n{isiw.report.final_statement(record)}", style="bold")
     show(isiw.report.truth_sentence(record, truth))
-    picture = isiw.plots.save_session_plot(record, result.log.with_suffix(".png"), truth=truth)
+    picture = isiw.plots.save_session_plot(record, _picture_beside(result.log), truth=truth)
     show(f"log:     {result.log}\npicture: {picture}")
+
+
+def _picture_beside(log: Path) -> Path:
+    """Where a session's picture goes that nobody gave a place: beside its log, under a name that is free."""
+    names = itertools.chain([log.stem], (f"{log.stem}_{number}" for number in itertools.count(2)))
+    return next(path for path in (log.with_name(f"{name}.png") for name in names) if not path.exists())
 
 
 def _show_progress(update: SessionUpdate) -> None:

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, errors_reported, show
+from isiw.texts import plain
 
 if TYPE_CHECKING:
     from isiw.studies import Store, Unit
@@ -79,7 +80,7 @@ def summary(folder: Folder) -> None:
         table = isiw.studies.summarise(store.rows(), store.errors())
         show(table.to_string(index=False, float_format=lambda value: f"{value:.3f}"))
         table.to_csv(folder / "summary.csv", index=False)
-        picture = isiw.plots.save_study_plot(table, folder / "summary.png")
+        picture = isiw.plots.save_study_plot(table, folder / "summary.png", overwrite=True)
         _say_what_is_there(store)
         show(f"table:   {folder / 'summary.csv'}\npicture: {picture}")
 
@@ -97,7 +98,7 @@ def _bar(left: list[Unit]) -> Iterator[Callable[[Unit, Any], None]]:
             state = progress.tasks[0]
             progress.update(task, rate=f"{state.completed / max(state.elapsed or 0.0, 1e-9):.2f}/s")
             if isinstance(result, isiw.studies.Failure):
-                progress.console.print(f"{unit.key} failed: {result.error}", style="red", markup=False)
+                progress.console.print(plain(f"{unit.key} failed: {result.error}"), style="red", markup=False)
 
         yield on_done
 

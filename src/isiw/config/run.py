@@ -64,7 +64,7 @@ class SubjectConfig(_Section):
 
     kind: Literal["simulated", "recorded"] = "simulated"
     cohort: str = "recruitment"
-    number: int = Field(default=0, ge=0)
+    number: int = Field(default=0, ge=0, lt=10_000)
     data: Path | None = None
 
     @field_validator("cohort")

@@ -1,21 +1,49 @@
-"""Files that survive a crash: synced, locked while they are written, and renamed in one step."""
+"""Files that survive a crash: synced, locked while they are written, and renamed in one step over nothing else.
+
+On Windows an open file can neither be renamed nor replaced, so files are let go of for that moment. That branch has
+been type-checked, and has not been run.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
+import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import IO
+from typing import IO, NamedTuple, Self
 
 from isiw.errors import LogError
+from isiw.log.locks import lock
 
-if sys.platform != "win32":
-    import fcntl
+__all__ = [
+    "DurableFile",
+    "Fingerprint",
+    "begun",
+    "disk_errors",
+    "log_of",
+    "part_of",
+    "put",
+    "sync_folder",
+    "take_free_place",
+]
 
-__all__ = ["DurableFile", "begun", "disk_errors", "log_of", "part_of", "refuse_if_locked", "sync_folder"]
+
+class Fingerprint(NamedTuple):
+    """Which file it is, and in which state: it differs where a file was written to, or another is in its place."""
+
+    device: int
+    inode: int
+    size: int
+    changed_ns: int
+
+    @classmethod
+    def of(cls, file: IO[bytes] | Path) -> Self:
+        """The fingerprint of an open file, or of the file at a path."""
+        found = file.stat() if isinstance(file, Path) else os.fstat(file.fileno())
+        return cls(found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns)
 
 
 def part_of(path: Path) -> Path:
@@ -45,30 +73,30 @@ def sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
-def _lock(file: IO[bytes], path: Path) -> None:
-    """Claim a file until it is closed; Windows does not let an open file be replaced anyway.
+def take_free_place(file: Path, place: Path) -> None:
+    """Rename a file to a name that nothing has, in one step that replaces nothing.
+
+    Args:
+        file: the file.
+        place: its new name.
 
     Raises:
-        LogError: another process has it.
+        FileExistsError: there is something of this name.
     """
     if sys.platform == "win32":
+        file.rename(place)  # which Windows itself refuses where the name is taken
         return
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        raise LogError(
-            "the log is being written by a running session", got=str(path), remedy="End that session first."
-        ) from error
-
-
-def refuse_if_locked(path: Path) -> None:
-    """Raise where another process writes to a file.
-
-    Raises:
-        LogError: it does.
-    """
-    with path.open("rb") as file:
-        _lock(file, path)
+        place.hardlink_to(file)
+    except FileExistsError:
+        raise
+    except OSError:  # a disk without hard links
+        if os.path.lexists(place):
+            raise FileExistsError(place) from None
+        file.rename(place)
+    else:
+        file.unlink()
+    sync_folder(place.parent)
 
 
 @contextmanager
@@ -93,6 +121,36 @@ _writing = partial(
 )
 
 
+def put(path: Path, content: bytes, *, replacing: bool, through: Path | None = None) -> None:
+    """Put a whole file in its place in one step, for good.
+
+    Args:
+        path: its place.
+        content: what is in it.
+        replacing: whether a file that is there is replaced.
+        through: where it is written first; by default under a name of its own, which is gone where this fails.
+
+    Raises:
+        FileExistsError: there is a file, which is not to be replaced.
+        OSError: it cannot be written.
+    """
+    beside = through or path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    try:
+        with beside.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        if replacing:
+            beside.replace(path)
+            sync_folder(path.parent)
+        else:
+            take_free_place(beside, path)
+    except BaseException:
+        with suppress(OSError):
+            beside.unlink(missing_ok=True)
+        raise
+
+
 class DurableFile:
     """A new binary file that can be renamed while it is written.
 
@@ -108,7 +166,12 @@ class DurableFile:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file: IO[bytes] = path.open("xb")
         self.path = path
-        _lock(self._file, path)
+        try:
+            lock(self._file, path)
+        except LogError:
+            self.abandon()
+            path.unlink()
+            raise
 
     def write(self, data: bytes) -> int:
         """Append."""
@@ -130,15 +193,33 @@ class DurableFile:
             self._file.flush()
             os.fsync(self._file.fileno())
 
-    def move_to(self, path: Path) -> None:
-        """Take another file's place in one step, and go on there."""
-        self.close()
-        self.path.replace(path)
-        sync_folder(path.parent)
-        self.path = path
-        self._file = path.open("r+b")
-        self._file.seek(0, os.SEEK_END)
-        _lock(self._file, path)
+    def move_to(self, place: Path, *, replacing: bool, source: IO[bytes] | None = None) -> None:
+        """Take another name in one step, and go on there; the lock goes along.
+
+        Args:
+            place: the new name.
+            replacing: whether the file that has the name is replaced.
+            source: the open file that this one goes on from, which may be the one that is replaced.
+
+        Raises:
+            FileExistsError: there is a file of this name, which is not to be replaced.
+            OSError: the file cannot be renamed.
+        """
+        self.sync()
+        if sys.platform == "win32":
+            self._file.close()
+            if source is not None:
+                source.close()
+        if replacing:
+            self.path.replace(place)
+            sync_folder(place.parent)
+        else:
+            take_free_place(self.path, place)
+        self.path = place
+        if sys.platform == "win32":
+            self._file = place.open("r+b")
+            self._file.seek(0, os.SEEK_END)
+            lock(self._file, place)
 
     def close(self) -> None:
         """Make everything durable and close."""

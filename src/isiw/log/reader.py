@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import itertools
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Final
 
 import pandas as pd
+from pydantic import ValidationError
 
 from isiw.errors import DamagedLogError, LogError
-from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import SCHEMA_VERSION, Estimate, Event, Header, Intent, Record, Waveform, decode
+from isiw.log.salvage import Message, Salvage, salvage
+from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Estimate, Event, Header, Intent, Record, Waveform, decode
 from isiw.log.writer import CONFIGURATION
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, Trial, TrialTable
 
 __all__ = ["SessionRecord", "read_salvaged", "read_session"]
+
+MOST_CONFIGURATION: Final = 2**20
+"""Of a configuration as TOML [bytes]; the default's is 2 kB."""
+
+MOST_LOSSES: Final = 50
+"""Losses that are listed one by one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +40,8 @@ class SessionRecord:
         waveforms: the recorded channels, by trial and name.
         losses: what could not be read, a sentence each; empty where the log is whole.
         finished: whether the session closed its log.
+        end_lost: whether its end is missing, so that nobody knows how many stimuli it told of.
+        delivered: how many stimuli its index counts; 0 where it has none.
     """
 
     path: Path
@@ -40,6 +50,8 @@ class SessionRecord:
     waveforms: Mapping[tuple[int, str], Channel] = field(repr=False)
     losses: tuple[str, ...]
     finished: bool
+    end_lost: bool = False
+    delivered: int = 0
 
     def __str__(self) -> str:
         header, last = self.header, self.estimates[-1] if self.estimates else None
@@ -90,7 +102,7 @@ class SessionRecord:
         """Stimuli that were delivered, or may have been, and whose outcome is not in the log."""
         known = {trial.index for trial in self.table}
         intents = {intent.trial: intent for intent in self.intents}
-        last = max(itertools.chain(known, intents), default=-1)
+        last = max(itertools.chain(known, intents, [min(self.delivered, MOST_TRIALS) - 1]))
         return tuple(
             intents.get(number, Intent(trial=number, isi_ms=None)) for number in range(last + 1) if number not in known
         )
@@ -115,31 +127,73 @@ def read_session(path: str | Path) -> SessionRecord:
 
 def read_salvaged(salvaged: Salvage) -> SessionRecord:
     """The session in what was salvaged from a log."""
-    losses, waveforms, history = list(salvaged.losses), {}, []
-    header: Header | None = None
+    records = _Records()
     for message in salvaged.messages:
-        try:
-            record = decode(message.topic, message.data)
-        except ValueError as error:
-            losses.append(f"A record on {message.topic} is not valid and is left out: {error}")
-            continue
-        if isinstance(record, Header):
-            header = record
-        elif isinstance(record, Waveform):
-            waveforms[record.trial, message.topic.removeprefix("/")] = record.channel()
-        else:
-            history.append(record)
+        records.take(message)
+    header, losses = records.header, (*salvaged.losses, *records.losses)
     if header is None or (losses and CONFIGURATION in salvaged.attachments):
         header = _header_from_attachment(salvaged)  # what is lost may have been the last header
     header = _checked_version(header, salvaged.path)
-    return SessionRecord(salvaged.path, header, tuple(history), waveforms, tuple(losses), salvaged.finished)
+    return SessionRecord(
+        salvaged.path,
+        header,
+        tuple(records.history),
+        records.waveforms,
+        _shortened(losses),
+        salvaged.finished,
+        salvaged.end_lost,
+        salvaged.delivered,
+    )
+
+
+@dataclass
+class _Records:
+    """The records of a log by their kind, and what makes no sense."""
+
+    header: Header | None = None
+    history: list[Record] = field(default_factory=list)
+    waveforms: dict[tuple[int, str], Channel] = field(default_factory=dict)
+    losses: list[str] = field(default_factory=list)
+    _trials: set[int] = field(default_factory=set)
+
+    def take(self, message: Message) -> None:
+        """Take one more record."""
+        try:
+            record = decode(message.topic, message.data)
+            if isinstance(record, Waveform):
+                self.waveforms[record.trial, message.topic.removeprefix("/")] = record.channel()
+        except ValueError as error:
+            self.losses.append(f"A record on {message.topic} makes no sense and is left out: {_first_line(error)}")
+            return
+        if isinstance(record, Header):
+            self.header = record
+        elif isinstance(record, Trial) and record.index in self._trials:
+            self.losses.append(f"A second record of trial {record.index} is left out.")
+        elif not isinstance(record, Waveform):
+            self.history.append(record)
+            if isinstance(record, Trial):
+                self._trials.add(record.index)
+
+
+def _first_line(error: ValueError) -> str:
+    """What is wrong with a record, without what pydantic says of where to read more."""
+    if isinstance(error, ValidationError):
+        first = error.errors(include_url=False, include_input=False)[0]
+        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    return str(error)
+
+
+def _shortened(losses: Sequence[str]) -> tuple[str, ...]:
+    """The losses, as many as somebody will read."""
+    left = len(losses) - MOST_LOSSES
+    return tuple(losses) if left <= 0 else (*losses[:MOST_LOSSES], f"{left} more losses are not listed.")
 
 
 def _header_from_attachment(salvaged: Salvage) -> Header:
-    text = salvaged.attachments.get(CONFIGURATION, b"")
+    text = salvaged.attachments.get(CONFIGURATION, b"")[:MOST_CONFIGURATION]
     try:
         return Header.model_validate(tomllib.loads(text.decode()))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise DamagedLogError(
             "the log's header is lost",
             got=str(salvaged.path),

@@ -15,6 +15,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Mapping
+from functools import cache
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
@@ -34,6 +35,7 @@ from isiw.window import Window, WindowEstimate, finding
 __all__ = [
     "ANNOUNCEMENT",
     "CHANNEL_IDS",
+    "MOST_TRIALS",
     "SCHEMA_VERSION",
     "Estimate",
     "Event",
@@ -54,8 +56,12 @@ __all__ = [
 SCHEMA_VERSION = 2
 """2 since 0.1.0: other settings of the strategies, hypotheses by name. Versions before the first release wrote 1."""
 
+MOST_TRIALS: Final = 100_000
+"""More than any session delivers; a record of a later trial makes no sense."""
+
 PROFILE_DECIMALS = 6  # a nanovolt; the profile is a picture of the posterior, not a measurement
 
+TrialNumber: TypeAlias = Annotated[int, Field(ge=0, lt=MOST_TRIALS)]
 Number: TypeAlias = Annotated[float, WithJsonSchema({"type": ["number", "string"]})]
 Numbers: TypeAlias = Annotated[
     tuple[float, ...], WithJsonSchema({"type": "array", "items": {"type": ["number", "string"]}})
@@ -98,7 +104,7 @@ class Header(_Record):
 class Intent(_Record):
     """A pair of stimuli that is about to be delivered."""
 
-    trial: int
+    trial: TrialNumber
     isi_ms: float | None
     t_s: float = 0.0
 
@@ -106,7 +112,7 @@ class Intent(_Record):
 class Waveform(_Record):
     """One waveform of one trial."""
 
-    trial: int
+    trial: TrialNumber
     t0_ms: float
     rate_hz: float
     unit: str
@@ -142,7 +148,7 @@ class Estimate(_Record):
     90 % probability.
     """
 
-    trial: int
+    trial: TrialNumber
     probability: float | None
     segments_ms: tuple[float, ...] = ()
     start_ms: Number | None = None
@@ -244,7 +250,7 @@ class Event(_Record):
     """Something that happened to a session; `trial` is the excluded trial, or else the last one before it."""
 
     kind: EventKind
-    trial: int | None = None
+    trial: TrialNumber | None = None
     text: str = ""
 
 
@@ -350,10 +356,16 @@ def decode(topic: str, data: bytes) -> Record:
         ValueError: not such a record.
     """
     record: Record = adapter(topic).validate_json(data)
+    if isinstance(record, Trial) and record.index >= MOST_TRIALS:
+        raise InvalidValueError("no session has so many trials", got=record.index, expected=f"below {MOST_TRIALS}")
     return record
 
 
 def json_schema(topic: str) -> tuple[str, bytes]:
     """Name and JSON schema of a topic's records; the root is an object."""
-    kind = _KINDS.get(topic, Waveform)
-    return f"isiw.{kind.__name__}", json.dumps(adapter(topic).json_schema(mode="serialization")).encode()
+    return _schema_of(_KINDS.get(topic, Waveform))
+
+
+@cache
+def _schema_of(kind: type[Any]) -> tuple[str, bytes]:
+    return f"isiw.{kind.__name__}", json.dumps(TypeAdapter(kind).json_schema(mode="serialization")).encode()

@@ -13,14 +13,26 @@ import tomli_w
 from mcap.writer import Writer
 
 from isiw.errors import LogError
-from isiw.log.durable import DurableFile, begun, disk_errors, log_of, part_of, refuse_if_locked, sync_folder
-from isiw.log.salvage import Message, Salvage, current_file
+from isiw.log.durable import (
+    DurableFile,
+    Fingerprint,
+    begun,
+    disk_errors,
+    log_of,
+    part_of,
+    sync_folder,
+)
+from isiw.log.locks import claimed, refuse_if_locked
+from isiw.log.salvage import Message, Salvage, holds, salvage_file
 from isiw.log.schema import CHANNEL_IDS, Header, Record, announcement, encode, json_schema, topic_of
 
 __all__ = ["CONFIGURATION", "LogWriter"]
 
 CONFIGURATION = "configuration.toml"
 """The attachment that holds the header once more, as TOML."""
+
+_COPYING = ".resuming"
+"""What a log's copy is called until it takes the log's place."""
 
 
 class LogWriter:
@@ -41,7 +53,7 @@ class LogWriter:
         self._channels: dict[str, int] = {}
         self._records = 0
         self._log_time_ns = 0
-        self._replaces = False
+        self._replaces: Fingerprint | None = None
         self._writer.start(profile="isiw", library="isiw")
         for topic in CHANNEL_IDS:
             self._register(topic)
@@ -83,31 +95,33 @@ class LogWriter:
             as_resumed: the header that holds from here on, where it is another.
 
         Raises:
-            LogError: it is still being written, or has changed since it was read, or a header cannot be written.
+            LogError: it is still being written, or has changed since it was read, another session's file is at one of
+                its two names, or a header cannot be written.
         """
         target = log_of(Path(path))
-        refuse_if_locked(salvage.path)
-        if current_file(path) != salvage.path or salvage.path.stat().st_size != salvage.size:
-            raise LogError("the log has changed since it was read", got=str(path), remedy="Read it again.")
-        copy = target.with_name(f"{target.name}.resuming")
-        if copy.exists():  # an earlier attempt was killed before it took over; its source is still whole
-            refuse_if_locked(copy)
-            copy.unlink()
-        with begun(copy) as file:
-            log = cls(target, file)
-            log._replaces = True
-            log.begin(as_resumed or header)
-            if not any(message.topic == "/header" for message in salvage.messages):
-                log.append(header)
-            for message in salvage.messages:
-                log._copy(message)
-            if as_resumed is not None:
-                log.append(as_resumed)
-            log.sync()
-            if salvage.losses:
-                _keep(salvage.path, target)
-            file.move_to(part_of(target))
+        with claimed(salvage.path) as source, disk_errors(target, "the log cannot go on", "It stays as it was."):
+            _require_unchanged(source, salvage)
+            replaces = _own_file(target, salvage)
+            copy = target.with_name(f"{target.name}{_COPYING}")
+            copy.unlink(missing_ok=True)  # of an earlier attempt that was killed; its source is still whole
+            with begun(copy) as file:
+                log = cls(target, file)
+                log._replaces = replaces
+                log._copy_all(salvage, header, as_resumed)
+                if salvage.losses:
+                    _keep(salvage.path, target)
+                file.move_to(part_of(target), replacing=True, source=source)
         return log
+
+    def _copy_all(self, salvage: Salvage, header: Header, as_resumed: Header | None) -> None:
+        self.begin(as_resumed or header)
+        if not any(message.topic == "/header" for message in salvage.messages):
+            self.append(header)
+        for message in salvage.messages:
+            self._copy(message)
+        if as_resumed is not None:
+            self.append(as_resumed)
+        self.sync()
 
     def begin(self, header: Header) -> None:
         """Write what is not a message: metadata for tools that list files, and the header as TOML.
@@ -143,23 +157,28 @@ class LogWriter:
         self._file.sync()
 
     def close(self) -> None:
-        """Finish the log and give it its name.
+        """Finish the log and give it its name; what it went on from is the only file that it replaces.
 
         Raises:
             LogError: somebody has put a file there meanwhile; the log stays `FILE.part`.
         """
         try:
             self._writer.finish()
+            with disk_errors(self._file.path, "the log cannot be given its name", "It is complete where it is."):
+                self._take_its_name()
         finally:
             self._file.close()
-        if self.path.exists() and not self._replaces:
+
+    def _take_its_name(self) -> None:
+        own = self.path.exists() and Fingerprint.of(self.path) == self._replaces
+        try:
+            self._file.move_to(self.path, replacing=own)
+        except FileExistsError as error:
             raise LogError(
                 "another file has taken the log's place",
                 got=str(self.path),
-                remedy=f"The log is complete and stays at {self._file.path}.",
-            )
-        self._file.path.replace(self.path)
-        sync_folder(self.path.parent)
+                remedy=f"The log is complete and stays at {self._file.path}; give it another name.",
+            ) from error
 
     def __enter__(self) -> Self:
         return self
@@ -188,7 +207,7 @@ class LogWriter:
 
 
 def _require_free(target: Path) -> None:
-    if target != log_of(target) or target.is_dir():
+    if target != log_of(target) or target.suffix == _COPYING or target.is_dir():
         raise LogError(
             "a log cannot have this name", got=str(target), remedy="Name a file; .part is added while the session runs."
         )
@@ -199,6 +218,43 @@ def _require_free(target: Path) -> None:
                 got=str(existing),
                 remedy=f"Choose another path, or continue it: isiw resume {target}",
             )
+
+
+def _require_unchanged(source: IO[bytes], salvage: Salvage) -> None:
+    if not Fingerprint.of(source) == salvage.fingerprint == Fingerprint.of(salvage.path):
+        raise LogError(
+            "the log has changed since it was read", got=str(salvage.path), remedy="Begin again by reading it."
+        )
+
+
+def _own_file(target: Path, salvage: Salvage) -> Fingerprint | None:
+    """The file at a log's final name, which its continuation may replace; None where there is none.
+
+    Raises:
+        LogError: one of the log's two names has a file with records that the log does not hold.
+    """
+    if salvage.path == target:
+        if part_of(target).exists():
+            refuse_if_locked(part_of(target))
+            raise _foreign(part_of(target), salvage)
+        return salvage.fingerprint
+    if not target.exists():
+        return None
+    try:
+        earlier = salvage_file(target)
+    except LogError as error:
+        raise _foreign(target, salvage) from error
+    if not holds(salvage, earlier):
+        raise _foreign(target, salvage)
+    return earlier.fingerprint
+
+
+def _foreign(path: Path, salvage: Salvage) -> LogError:
+    return LogError(
+        "another session's file is where this log would be, and it is never replaced",
+        got=str(path),
+        remedy=f"Give {salvage.path.name} or {path.name} another name or folder, and go on from there.",
+    )
 
 
 def _as_toml(header: Header) -> bytes:
@@ -221,3 +277,4 @@ def _keep(damaged: Path, target: Path) -> None:
         with begun(kept) as copy, damaged.open("rb") as source:
             shutil.copyfileobj(source, copy)
             copy.close()
+    sync_folder(kept.parent)

@@ -27,18 +27,21 @@ SMALLEST_UV = 1.0
 _AXIS_NAME = {"impact": "ISI after the impact [ms]", "valve": "ISI after the valve command [ms]"}
 
 
-def save_session_plot(record: SessionRecord, path: str | Path, *, truth: Window | None = None) -> Path:
+def save_session_plot(
+    record: SessionRecord, path: str | Path, *, truth: Window | None = None, overwrite: bool = False
+) -> Path:
     """Draw a session into a file; its suffix chooses the format.
 
     Args:
         record: the session.
         path: where to, such as `session.png` or `session.pdf`.
         truth: the true window, where the person is simulated.
+        overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: a format that matplotlib does not know.
+        InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
     """
-    return save_figure(session_figure(record, truth=truth), path)
+    return save_figure(session_figure(record, truth=truth), path, overwrite=overwrite)
 
 
 def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Figure:

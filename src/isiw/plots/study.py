@@ -17,17 +17,18 @@ _MARKERS = "osD^vPX"
 _COLUMNS = 4
 
 
-def save_study_plot(table: pd.DataFrame, path: str | Path) -> Path:
+def save_study_plot(table: pd.DataFrame, path: str | Path, *, overwrite: bool = False) -> Path:
     """Draw a study into a file; its suffix chooses the format.
 
     Args:
         table: as `isiw.studies.summarise` returns it.
         path: where to.
+        overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: a format that matplotlib does not know.
+        InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
     """
-    return save_figure(study_figure(table), path)
+    return save_figure(study_figure(table), path, overwrite=overwrite)
 
 
 def study_figure(table: pd.DataFrame) -> Figure:

@@ -5,12 +5,14 @@ Everything is drawn with matplotlib's object interface, so no display is needed 
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
+from isiw.log.outputs import write_output
 
 __all__ = ["BLUE", "FAINT", "GREEN", "INK", "ORANGE", "RED", "save_figure", "tidied"]
 
@@ -25,20 +27,22 @@ def tidied(*panels: Axes) -> None:
         axes.tick_params(labelsize=8, color=FAINT)
 
 
-def save_figure(figure: Figure, path: str | Path) -> Path:
+def save_figure(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
     """Write a figure into a file, whose folder is made where it is missing; the suffix chooses the format.
 
     Args:
         figure: the figure.
         path: the file.
+        overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: a format that matplotlib does not know.
+        InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
     """
     target = Path(path)
     known = figure.canvas.get_supported_filetypes()
-    if target.suffix.removeprefix(".").lower() not in known:
+    suffix = target.suffix.removeprefix(".").lower()
+    if suffix not in known:
         raise InvalidValueError("the picture's format is unknown", got=target.name, expected=", ".join(sorted(known)))
-    target.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(target, dpi=200)
-    return target
+    picture = io.BytesIO()
+    figure.savefig(picture, dpi=200, format=suffix)
+    return write_output(target, picture.getvalue(), overwrite=overwrite)

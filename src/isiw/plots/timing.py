@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, RED, save_figure, tidied
+from isiw.texts import plain
 
 if TYPE_CHECKING:
     from isiw.repeatability import TimingStudy
@@ -26,17 +27,18 @@ _NAMES = {
 }
 
 
-def save_timing_plot(study: TimingStudy, path: str | Path) -> Path:
+def save_timing_plot(study: TimingStudy, path: str | Path, *, overwrite: bool = False) -> Path:
     """Draw a study into a file; its suffix chooses the format.
 
     Args:
         study: the study.
         path: where to, such as `timing.png` or `timing.pdf`.
+        overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: a format that matplotlib does not know.
+        InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
     """
-    return save_figure(timing_figure(study), path)
+    return save_figure(timing_figure(study), path, overwrite=overwrite)
 
 
 def timing_figure(study: TimingStudy) -> Figure:
@@ -62,7 +64,8 @@ def _draw_events(axes: Axes, study: TimingStudy) -> None:
     axes.set_yscale("log")
     axes.set_xlabel("time in the trial [ms]; valve command at 500", fontsize=9)
     axes.set_ylabel("taps per ms", fontsize=9)
-    axes.set_title(f"{study.name}: {len(study.commanded_ms)} taps", fontsize=11, loc="left", color=INK)
+    title = plain(f"{study.name}: {len(study.commanded_ms)} taps")
+    axes.set_title(title, fontsize=11, loc="left", color=INK, parse_math=False)
     axes.legend(fontsize=7.5, frameon=False, loc="upper left", bbox_to_anchor=(0.1, 1.0))
 
 

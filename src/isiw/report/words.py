@@ -37,7 +37,12 @@ def final_statement(record: SessionRecord) -> str:
         return "No trial has been completed."
     last = record.estimates[-1]
     sentences = [_finding(last, record.header.space), _edges(last, record.header.space), _counts(record), last.reason]
-    if not last.stop:
+    if record.end_lost:
+        sentences.append(
+            "The log's end is missing; go on with the number of pulses that the stimulator counted besides: "
+            f"isiw resume --lost-pulses N {record.path}"
+        )
+    elif not last.stop:
         sentences.append(f"The session is not over; go on with: isiw resume {record.path}")
     if _excluded_since(record):
         sentences.append("Trials were excluded after this estimate; resume the session to have it without them.")

@@ -8,17 +8,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from isiw.checks import whole
 from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, HasMemory
-from isiw.errors import DeviceError, InvalidValueError, OtherVersionsWarning, StrategyError
+from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, OtherVersionsWarning, StrategyError
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import salvage
-from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent
+from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Event, Header, Intent
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session, SessionUpdate, learn, versions
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
+from isiw.texts import plain
 from isiw.trials import Stimulus, Trial, TrialTable
 
 __all__ = ["Replayed", "exclude", "replay", "resume"]
@@ -34,6 +36,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     on_trial: Callable[[SessionUpdate], None] | None = None,
     timeout_s: float | None = None,
     ask_deadline_s: float | None = None,
+    lost_pulses: int | None = None,
     verify: bool = True,
 ) -> Session:
     """A session that goes on where a log ends. Nothing is delivered or written before its `run`.
@@ -50,11 +53,15 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         on_trial: as for `Session`.
         timeout_s: another time for one delivery than the logged one [s].
         ask_deadline_s: another time for one ask than the logged one [s].
+        lost_pulses: needed where the end of a closed log is missing: how many stimuli were given that are not in it any
+            more, as the stimulator counted. They become mistrials "outcome unknown".
         verify: whether the strategy must ask again what the log says it asked. With other versions than those that
             were logged a difference is a warning; without verification the logged trials are told as they are.
 
     Raises:
         LogError: no such log, or one of which not even the header can be read.
+        DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
+        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there.
         StrategyError: the strategy cannot be made again, or asks something else with the same versions.
         DeviceError: a simulated device for a session with a real one, or the other way round.
 
@@ -65,6 +72,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     record = read_salvaged(salvaged)
     header = record.header
     _require_as_real(device, header)
+    record = _with_lost_pulses(record, lost_pulses)
     replayed = replay(record, strategy.restarted() if strategy else _strategy_of(header), verify=verify)
     if replayed.differing:
         warnings.warn(_differing_text(replayed, header), OtherVersionsWarning, stacklevel=2)
@@ -160,6 +168,7 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
 
     Raises:
         LogError: no such log, or it is still being written.
+        DamagedLogError: the log's end is missing; resume the session first.
         InvalidValueError: no such trial, or one that counts for nothing anyway.
     """
     salvaged = salvage(path)
@@ -171,8 +180,35 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
             expected="the number of an accepted trial that is not excluded yet",
             remedy=f"List them: isiw show {path}",
         )
+    _require_end(record)
     with LogWriter.continuing(path, salvaged, record.header) as log:
         log.append(Event(kind="exclusion", trial=trial, text=reason))
+        if record.losses:
+            log.append(Event(kind="fault", trial=trial, text=" ".join(record.losses)))
+
+
+def _with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> SessionRecord:
+    """A log with the stimuli that its missing end told of."""
+    if lost_pulses is None:
+        _require_end(record)
+        return record
+    lost_pulses = whole("lost_pulses", lost_pulses, least=0, below=MOST_TRIALS)
+    if not record.end_lost:
+        raise InvalidValueError(
+            "lost_pulses is for a log whose end is missing, and this one's is there", got=lost_pulses
+        )
+    known = len(record.table) + len(record.unknown)
+    return dataclasses.replace(record, delivered=known + lost_pulses)
+
+
+def _require_end(record: SessionRecord) -> None:
+    if record.end_lost:
+        raise DamagedLogError(
+            "the log's end is missing, so nobody knows how many stimuli were given",
+            got=str(record.path),
+            remedy="Look at the stimulator's counter, and resume with the number of pulses that isiw show does not "
+            "list: isiw resume --lost-pulses N, or isiw.resume(..., lost_pulses=N).",
+        )
 
 
 def _require_as_real(device: Device, header: Header) -> None:
@@ -218,7 +254,8 @@ def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> 
 
 
 def _versions_text(header: Header) -> str:
-    return ", ".join(f"{name} {version}" for name, version in {"isiw": header.isiw_version, **header.versions}.items())
+    logged = {"isiw": header.isiw_version, **header.versions}
+    return plain(", ".join(f"{name} {version}" for name, version in logged.items()))
 
 
 def _differing_text(replayed: Replayed, header: Header) -> str:

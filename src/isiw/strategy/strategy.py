@@ -9,9 +9,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeVar
 
+import numpy as np
+
 from isiw.acquisition.batch import greedy_batch, own_plan
 from isiw.acquisition.protocol import AcquisitionFunction
-from isiw.checks import deadline, number, whole
+from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel
@@ -203,16 +205,16 @@ class Strategy:
             isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
 
         Raises:
-            InvalidValueError: NaN, infinite or negative values, a response that is neither True nor False, or not
-                exactly one of `mep_mv` and `response`.
+            InvalidValueError: NaN, infinite or negative values, an amplitude that no amplifier gives, a response that
+                is neither True nor False, or not exactly one of `mep_mv` and `response`.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             StrategyError: a kind of outcome that the model cannot learn from.
         """
         if (mep_mv is None) == (response is None):
             raise InvalidValueError("tell needs either mep_mv or response", got=(mep_mv, response))
-        if response not in (None, False, True):
+        if not (response is None or isinstance(response, bool | np.bool_)):
             raise InvalidValueError("response must be True or False", got=response)
-        mep_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
+        mep_mv = None if mep_mv is None else amplitude("mep_mv", mep_mv)
         isi_sd_ms = number("isi_sd_ms", isi_sd_ms, least=0)
         isi_ms = None if isi_ms is None else self.space.check_realised(isi_ms)
         self._course = self._course.after(Observation.of([isi_ms], [mep_mv], [isi_sd_ms], [response]))

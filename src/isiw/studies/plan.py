@@ -44,8 +44,13 @@ __all__ = [
     "study_values",
 ]
 
-_MOST: Final = 2**62
-"""Of people, seeds and trials; their sums stay within 64 bits."""
+_MOST_SEED: Final = 2**62
+"""Sums of seeds stay within 64 bits."""
+
+_MOST_TRIALS: Final = 100_000
+
+_MOST_SESSIONS: Final = 1_000_000
+"""Of a study; more could not even be listed in a moment."""
 
 Engine: TypeAlias = Literal["single", "batched"]
 HitDelay: TypeAlias = Literal["unstated", "stated"]
@@ -146,10 +151,11 @@ class Study:
     def __post_init__(self) -> None:
         for name in ("strategies", "cohorts", "marks"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
+        check_wholes(self, "people", "batch", least=1, most=_MOST_SESSIONS)
+        check_wholes(self, "trials", least=1, most=_MOST_TRIALS)
+        check_wholes(self, "seed", least=0, most=_MOST_SEED)
         if not self.marks:
             object.__setattr__(self, "marks", (*range(5, self.trials, 5), self.trials))
-        check_wholes(self, "people", "trials", "batch", least=1, most=_MOST)
-        check_wholes(self, "seed", least=0, most=_MOST)
         check_numbers(self, "amplitude", above=0)
         if list(self.marks) != sorted(set(self.marks)) or not 1 <= self.marks[0] <= self.marks[-1] <= self.trials:
             raise InvalidValueError("marks ascend from 1 to the number of trials", got=self.marks)
@@ -170,6 +176,9 @@ class Study:
                 got=(labels, list(self.cohorts)),
                 remedy="Give the same strategy with other settings another label.",
             )
+
+        if (sessions := self.people * len(self.cohorts) * len(labels)) > _MOST_SESSIONS:
+            raise InvalidValueError("a study has too many sessions", got=sessions, expected=f"at most {_MOST_SESSIONS}")
 
     def units(self) -> list[Unit]:
         """All of its work; the first people of each strategy and cohort come first, so that all grow together."""

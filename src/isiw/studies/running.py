@@ -38,11 +38,15 @@ def conduct(
         on_done: called after each unit, once it is kept.
 
     Raises:
-        StudyError: the folder is another study's, or the executor is lost.
+        StudyError: the folder is another study's, is being run by another process, or cannot be written, or the
+            executor is lost.
     """
     store = begin_store(study, folder)
     # Closed at once where it is interrupted, so that no worker goes on in vain.
-    with closing((executor or Processes()).results(run_unit, store.left(retry=retry))) as results:
+    with (
+        store.locked(),
+        closing((executor or Processes()).results(run_unit, store.left(retry=retry))) as results,
+    ):
         for unit, result in results:
             store.keep(unit, result)
             on_done(unit, result)

@@ -1,18 +1,21 @@
 """The folder of a study: its configuration, and a part for each unit of work that is finished.
 
-    study.toml            the study, and the versions that it was made with
-    parts/KEY.parquet     the rows of a unit
-    errors/KEY.parquet    what became of a unit that failed, one row a person
+    study.toml                   the study, and the versions that it was made with
+    parts/KEY.CHECKSUM.parquet   the rows of a unit
+    errors/KEY.CHECKSUM.parquet  what became of a unit that failed, one row a person
 
 Each file is written beside its place, synced, and renamed into it by the process that runs the study, so that a file
-is whole or not there. What is left over of a write that was cut off is written over when the unit is run again.
+is whole or not there; its name holds the CRC-32 of its bytes, which tells whether it was damaged later. What is left
+over of a write that was cut off is written over when the unit is run again. One process at a time runs a study: while
+it does, it has `study.toml` locked.
 """
 
 from __future__ import annotations
 
-import os
 import platform
-from collections.abc import Sequence
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -26,7 +29,8 @@ import torch
 
 import isiw
 from isiw.errors import StudyError
-from isiw.log.durable import part_of, sync_folder
+from isiw.log.durable import put
+from isiw.log.locks import claim
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Study, Unit, study_from, study_values
 from isiw.toml_files import read_toml
@@ -54,7 +58,7 @@ class Store:
         Args:
             retry: run those that failed once more.
         """
-        done = self._keys("parts") | (set() if retry else self._keys("errors"))
+        done = set(self._files("parts")) | (set() if retry else set(self._files("errors")))
         return [unit for unit in self.study.units() if unit.key not in done]
 
     def keep(self, unit: Unit, result: pd.DataFrame | Failure) -> None:
@@ -63,21 +67,43 @@ class Store:
         Args:
             unit: the unit.
             result: its rows, or why there are none.
+
+        Raises:
+            StudyError: it cannot be written.
         """
-        error = self._path("errors", unit.key)
-        if isinstance(result, Failure):
-            _write(error, _error_rows(unit, result))
-            return
-        _write(self._path("parts", unit.key), result)
-        error.unlink(missing_ok=True)
+        failed = isinstance(result, Failure)
+        rows = _error_rows(unit, result) if isinstance(result, Failure) else result
+        with _disk_errors(self.folder):
+            kinds = ["errors"] if failed else ["parts", "errors"]
+            outdated = {files[unit.key] for files in map(self._files, kinds) if unit.key in files}
+            written = _write(self.folder / kinds[0], unit.key, rows)
+            for path in outdated - {written}:
+                path.unlink(missing_ok=True)
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Within, this process alone runs the study.
+
+        Raises:
+            StudyError: another one does.
+        """
+        with _disk_errors(self.folder), (self.folder / "study.toml").open("r+b") as file:
+            if not claim(file):
+                raise StudyError(
+                    "the study is being run by another process",
+                    got=str(self.folder),
+                    remedy="Wait for it, or run the study in another folder.",
+                )
+            yield
 
     def rows(self) -> pd.DataFrame:
         """All rows of the finished units, sorted; empty where there are none."""
-        return self._table("parts", self._keys("parts"), _KEYS)
+        return _table(self._files("parts").values(), _KEYS)
 
     def errors(self) -> pd.DataFrame:
         """The people whose units failed: strategy, cohort, person, unit, error, details; sorted."""
-        return self._table("errors", self._keys("errors") - self._keys("parts"), _KEYS[:3])
+        done = self._files("parts")
+        return _table((path for key, path in self._files("errors").items() if key not in done), _KEYS[:3])
 
     def unit(self, key: str) -> Unit:
         """The unit of a key.
@@ -90,18 +116,10 @@ class Store:
                 return unit
         raise StudyError("the study has no such unit", got=key, remedy="The rows have their units in the column unit.")
 
-    def _path(self, kind: str, key: str) -> Path:
-        return self.folder / kind / f"{key}.parquet"
-
-    def _keys(self, kind: str) -> set[str]:
-        return {path.stem for path in (self.folder / kind).glob("*.parquet")}
-
-    def _table(self, kind: str, keys: set[str], order: Sequence[str]) -> pd.DataFrame:
-        if not keys:
-            return pd.DataFrame()
-        parts = [_read(self._path(kind, key)) for key in sorted(keys)]
-        table: pd.DataFrame = pa.concat_tables(parts).to_pandas()
-        return table.sort_values(list(order), ignore_index=True)
+    def _files(self, kind: str) -> dict[str, Path]:
+        """The files of a kind, by their unit's key, in its order."""
+        found = ((path.stem.rpartition(".")[0], path) for path in (self.folder / kind).glob("*.parquet"))
+        return dict(sorted(found))
 
 
 def begin_store(study: Study, folder: str | Path) -> Store:
@@ -112,15 +130,19 @@ def begin_store(study: Study, folder: str | Path) -> Store:
         folder: where its results are.
 
     Raises:
-        StudyError: the folder is another study's, or was made with another version of isiw.
+        StudyError: the folder is another study's, was made with another version of isiw, or cannot be written.
     """
     store = Store(study, Path(folder))
     if (store.folder / "study.toml").exists():
         return _same(store, open_store(folder))
-    for kind in ("parts", "errors"):
-        (store.folder / kind).mkdir(parents=True, exist_ok=True)
     text = tomli_w.dumps(study_values(study) | {"versions": _versions()})
-    _replace(store.folder / "study.toml", text.encode())
+    with _disk_errors(store.folder):
+        for kind in ("parts", "errors"):
+            (store.folder / kind).mkdir(parents=True, exist_ok=True)
+        try:
+            put(store.folder / "study.toml", text.encode(), replacing=False)
+        except FileExistsError:  # somebody began here at the same moment
+            return _same(store, open_store(folder))
     return store
 
 
@@ -174,9 +196,33 @@ def _error_rows(unit: Unit, failure: Failure) -> pd.DataFrame:
     )
 
 
+@contextmanager
+def _disk_errors(folder: Path) -> Iterator[None]:
+    """Within, what the operating system refuses is a StudyError."""
+    try:
+        yield
+    except OSError as error:
+        raise StudyError(
+            f"the study's folder cannot be written: {error.strerror}",
+            got=str(folder),
+            remedy="Check its permissions and make room, then run the study again: all that is finished is kept.",
+        ) from error
+
+
+def _table(paths: Iterable[Path], order: Sequence[str]) -> pd.DataFrame:
+    parts = [_read(path) for path in paths]
+    if not parts:
+        return pd.DataFrame()
+    table: pd.DataFrame = pa.concat_tables(parts).to_pandas()
+    return table.sort_values(list(order), ignore_index=True)
+
+
 def _read(path: Path) -> pa.Table:
     try:
-        return pq.read_table(path)
+        content = path.read_bytes()
+        if path.suffixes[-2:-1] != [f".{_checksum(content)}"]:
+            raise pa.ArrowInvalid("its checksum fails")
+        return pq.read_table(pa.BufferReader(content))
     except (pa.ArrowException, OSError) as error:
         raise StudyError(
             f"a part of the study is damaged, or cannot be read: {error}",
@@ -185,16 +231,14 @@ def _read(path: Path) -> pa.Table:
         ) from error
 
 
-def _write(path: Path, rows: pd.DataFrame) -> None:
+def _write(folder: Path, key: str, rows: pd.DataFrame) -> Path:
     sink = pa.BufferOutputStream()
     pq.write_table(pa.Table.from_pandas(rows, preserve_index=False), sink)
-    _replace(path, sink.getvalue().to_pybytes())
+    content = sink.getvalue().to_pybytes()
+    path = folder / f"{key}.{_checksum(content)}.parquet"
+    put(path, content, replacing=True, through=folder / f"{key}.part")
+    return path
 
 
-def _replace(path: Path, content: bytes) -> None:
-    with part_of(path).open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    part_of(path).replace(path)
-    sync_folder(path.parent)
+def _checksum(content: bytes) -> str:
+    return f"{zlib.crc32(content):08x}"

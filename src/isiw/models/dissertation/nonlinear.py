@@ -138,6 +138,7 @@ class NonlinearRegression:
         range_ms, middle_ms = space.high_ms - space.low_ms, 0.5 * (space.low_ms + space.high_ms)
         sd_ms = self.width_ms / 4.0
         apart_ms = 0.0 if self.peaks == 1 else self.width_ms / 4.0
+        apart_ms = min(apart_ms, 0.25 * range_ms)  # both inside a range that is narrower than a window
         start = [[amplitude_mv, middle_ms + side * apart_ms, sd_ms] for side in (-1, 1)[: self.peaks]]
         sd = [amplitude_mv, range_ms / math.sqrt(12.0), 0.5 * sd_ms]
         low = [0.0, space.low_ms, 0.25 * self.min_width_ms]

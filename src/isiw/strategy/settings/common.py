@@ -12,13 +12,14 @@ import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import reduce
+from numbers import Integral
 from typing import Any, Final, Protocol, TypeVar, get_args, get_type_hints
 
 import numpy as np
 
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import acquisition_named
-from isiw.checks import check_numbers, check_probabilities, check_wholes
+from isiw.checks import check_numbers, check_probabilities, check_wholes, whole
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
 from isiw.models.protocol import ResponseModel
@@ -26,6 +27,9 @@ from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoW
 from isiw.toml_files import checked
 
 __all__ = ["Asking", "Setting", "Settings", "Stopping", "settings_from", "settings_keys", "settings_values"]
+
+MOST_OF_A_KIND = 100_000
+"""Of trials, particles, samples or anything else that a setting counts."""
 
 _S = TypeVar("_S", bound="Settings")
 
@@ -222,8 +226,18 @@ def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
             )
     settings = kind()
     for key, value in values.items():
+        _require_modest(value, f"the setting {key} of {name}")
         settings = _with(settings, known[key].path, _converted(known[key], value, f"the setting {key} of {name}"))
     return settings
+
+
+def _require_modest(value: Any, source: str) -> None:
+    """Raise where a number of trials, particles or the like would fill the memory before anything else could."""
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            _require_modest(inner, f"{source}: {key}")
+    elif isinstance(value, Integral) and not isinstance(value, bool):
+        whole(source, int(value), most=MOST_OF_A_KIND)
 
 
 def _with(owner: Any, path: tuple[str, ...], value: Any) -> Any:

@@ -1,0 +1,47 @@
+"""Files that are made of logs, such as pictures: they replace no log, and nothing else unasked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from isiw.errors import InvalidValueError
+from isiw.log.durable import put
+
+__all__ = ["write_output"]
+
+_LOG: Final = b"\x89MCAP"
+"""What every log begins with."""
+
+
+def write_output(path: str | Path, content: bytes, *, overwrite: bool = False) -> Path:
+    """Write a file that is no log, as a whole or not at all; its folder is made where it is missing.
+
+    Args:
+        path: where to.
+        content: what is in it.
+        overwrite: whether to replace a file that is there; a log never is.
+
+    Raises:
+        InvalidValueError: there is a file that is not to be replaced.
+    """
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if overwrite and _is_log(target):
+        raise InvalidValueError("a log is never overwritten", got=str(target), remedy="Choose another path.")
+    try:
+        put(target, content, replacing=overwrite)
+    except FileExistsError as error:
+        raise InvalidValueError(
+            "there is a file already, and it is not overwritten unasked",
+            got=str(target),
+            remedy="Choose another path, or ask for it: --overwrite, or overwrite=True.",
+        ) from error
+    return target
+
+
+def _is_log(path: Path) -> bool:
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(len(_LOG)) == _LOG

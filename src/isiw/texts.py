@@ -1,0 +1,30 @@
+"""Text from elsewhere, made harmless: what a terminal, a page or a picture would obey is taken out."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from typing import Final
+
+__all__ = ["plain"]
+
+_SEQUENCES: Final = re.compile(
+    r"(?:\x1b[\]PX^_]|[\x9d\x90\x98\x9e\x9f]).*?(?:\x07|\x1b\\|\x9c|$)"  # titles, links, and what a device is told
+    r"|(?:\x1b\[|\x9b)[0-?]*[ -/]*[@-~]?"  # colours, and moves of the cursor
+    r"|\x1b[ -/]*[0-~]?",
+    re.DOTALL,
+)
+_OBEYED: Final = frozenset({"Cc", "Cf", "Cs", "Co"})
+"""Unicode's categories of control characters, invisible ones that turn the direction of reading, and surrogates."""
+
+
+def plain(text: str) -> str:
+    """A text without escape sequences and invisible characters; newlines and tabs stay."""
+    return "".join(map(_plain, _SEQUENCES.sub("", text)))
+
+
+def _plain(character: str) -> str:
+    if character in "\n\t":
+        return character
+    category = unicodedata.category(character)
+    return "" if category in _OBEYED else "\n" if category in ("Zl", "Zp") else character

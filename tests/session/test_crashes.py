@@ -1,0 +1,178 @@
+"""A process that dies before or after any file operation loses nothing, replaces nothing, and can be gone on from."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import shutil
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from isiw.errors import LogError
+from isiw.log.reader import SessionRecord, read_session
+from isiw.session.loop import Session
+from isiw.session.resume import exclude, resume
+from session.crashes import Ending, run_until
+
+if not hasattr(os, "fork"):
+    pytest.skip("needs fork", allow_module_level=True)
+
+TRIALS = 3
+OTHERS = ("other.mcap", "other.mcap.part", "s.png")
+
+
+@dataclass
+class Bench:
+    """A folder with a session's log and another person's files, and what the device really delivered."""
+
+    folder: Path
+    ledger: Path
+    strategy: object
+    device: object
+
+    @property
+    def log(self) -> Path:
+        return self.folder / "s.mcap"
+
+    def session_device(self):
+        """A device that writes down each delivery, where no power cut reaches it."""
+
+        def answer(stimulus):
+            with open(self.ledger, "a") as file:  # noqa: PTH123 - not one of the operations that are counted
+                file.write(f"{stimulus.trial}\n")
+            return usual(stimulus)
+
+        device = self.device()
+        usual, device.answer = device.answer, answer
+        return device
+
+    def run(self, on_trial=None):
+        return Session(self.session_device(), self.strategy(TRIALS), log=self.log, on_trial=on_trial).run()
+
+    def resume(self):
+        return resume(self.log, self.session_device(), self.strategy(TRIALS)).run()
+
+    def exclude(self) -> None:
+        exclude(self.log, 1, "sneezed")
+
+    @property
+    def delivered(self) -> list[int]:
+        return [int(line) for line in self.ledger.read_text().split()] if self.ledger.exists() else []
+
+
+def one_trial(bench: Bench) -> None:
+    def stop(update) -> None:
+        if update.trial.index == 0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bench.run(stop)
+
+
+def killed(bench: Bench) -> None:
+    one_trial(bench)
+    whole = bench.log.read_bytes()
+    end = max(match.start() for match in re.finditer(rb"\x04\x00\x00\x00zstd", whole[: whole.rindex(b"\x0f")]))
+    bench.log.with_name("s.mcap.part").write_bytes(whole[: end - 37])
+    bench.log.unlink()
+
+
+def damaged(bench: Bench) -> None:
+    one_trial(bench)
+    whole = bytearray(bench.log.read_bytes())
+    whole[[match.start() for match in re.finditer(rb"\x04\x00\x00\x00zstd", whole)][2] + 60] ^= 1
+    bench.log.write_bytes(whole)
+
+
+SCENARIOS = {
+    "run": (lambda _: None, Bench.run),
+    "resume a closed log": (one_trial, Bench.resume),
+    "resume a killed one": (killed, Bench.resume),
+    "salvage a damaged one": (damaged, Bench.resume),
+    "exclude": (Bench.run, Bench.exclude),
+}
+
+
+@pytest.fixture
+def bench(tmp_path, scripted_strategy, scripted_device, monkeypatch):
+    """Makes the bench of one scenario, again and again the same."""
+    monkeypatch.setattr(os, "fsync", lambda _: None)  # which bytes stay is said by the test, not by this disk
+    made = Bench(tmp_path / "bench" / "logs", tmp_path / "bench" / "ledger", scripted_strategy, scripted_device)
+
+    def make(prepare) -> Bench:
+        if not (tmp_path / "prepared").exists():
+            (tmp_path / "bench" / "shadow").mkdir(parents=True)
+            made.folder.mkdir()
+            prepare(made)
+            for name in OTHERS:
+                (made.folder / name).write_bytes(b"precious")
+            made.folder.parent.rename(tmp_path / "prepared")
+        shutil.rmtree(tmp_path / "bench", ignore_errors=True)
+        shutil.copytree(tmp_path / "prepared", tmp_path / "bench")
+        return made
+
+    return make
+
+
+@pytest.fixture
+def asks(scripted_strategy, scripted_device, tmp_path):
+    """What an undisturbed session asks."""
+    result = Session(scripted_device(), scripted_strategy(TRIALS), log=tmp_path / "undisturbed.mcap").run()
+    return [trial.commanded_isi_ms for trial in result.trials]
+
+
+def require_nothing_lost(bench: Bench, before: SessionRecord | None, original: bytes | None) -> None:
+    for name in OTHERS:
+        assert (bench.folder / name).read_bytes() == b"precious"
+    try:
+        record = read_session(bench.log)
+    except LogError:
+        assert before is None
+        assert bench.delivered == []
+        return
+    known = {trial.index for trial in record.table} | {intent.trial for intent in record.unknown}
+    assert set(bench.delivered) <= known
+    if before is not None:
+        assert set(map(repr, before.history)) <= set(map(repr, record.history))
+    if original is not None and before is not None and before.losses:
+        assert original in [path.read_bytes() for path in bench.folder.iterdir()]
+
+
+def require_it_goes_on(bench: Bench, asks: list[float]) -> None:
+    try:
+        read_session(bench.log)
+    except LogError:  # it died before its first record: nothing was delivered, and nothing is in the way
+        for path in bench.folder.glob("s.mcap*"):
+            path.unlink()
+        bench.run()
+    else:
+        bench.resume()
+    record = read_session(bench.log)
+    assert record.finished
+    assert [path.name for path in sorted(bench.folder.glob("s.mcap*")) if "damaged" not in path.name] == ["s.mcap"]
+    assert [trial.index for trial in record.table] == list(range(TRIALS))
+    told = [trial.commanded_isi_ms for trial in record.table if trial.reason is None]
+    assert told == asks[: len(told)]
+    assert len(set(bench.delivered)) == len(bench.delivered)
+
+
+@pytest.mark.parametrize("ending", Ending)
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_whenever_it_dies_nothing_is_lost_or_replaced_and_it_goes_on(scenario, ending, bench, asks) -> None:
+    prepare, act = SCENARIOS[scenario]
+    made, before, original = bench(prepare), None, None
+    if existing := next(made.folder.glob("s.mcap*"), None):
+        before, original = read_session(existing), existing.read_bytes()
+    for step in itertools.count():
+        made = bench(prepare)
+        ended = run_until(step, ending, made.folder, made.folder.parent / "shadow", partial(act, made))
+        require_nothing_lost(made, before, original)
+        if scenario not in ("exclude", "salvage a damaged one"):
+            require_it_goes_on(made, asks)
+        if ended is not None:
+            break
+    assert step >= 20
