@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import isiw
-from isiw.cli import study
+from isiw.cli import prior, study
 from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.add_typer(prior.app, name="prior")
 app.add_typer(study.app, name="study")
 
 _WIDTHS = (5, 7, 30, 9, 14, 8, 8, 4)
@@ -45,11 +46,18 @@ def run(
     strategy: Annotated[str | None, typer.Option(help="A strategy of isiw strategies.", **NO_DEFAULT)] = None,
     seed: Seed = None,
     log: Annotated[Path | None, typer.Option(help="Where to log; by default a new file in isiw-sessions.")] = None,
+    lab: Annotated[
+        Path | None, typer.Option("--prior", help="A lab's prior, as isiw prior learn writes it.", **NO_DEFAULT)
+    ] = None,
+    after: Annotated[
+        list[Path] | None,
+        typer.Option(help="The log of an earlier session of the same person; of several, the first one first."),
+    ] = None,
 ) -> None:
     """Run a session with a simulated person, and say what was found."""
     with errors_reported(_INTERRUPTED):
         settings = isiw.config.load_config(config).with_overrides(
-            seed=seed, log=log, subject=subject, data=data, strategy=strategy
+            seed=seed, log=log, subject=subject, data=data, strategy=strategy, prior=lab, after=after
         )
         _run_to_the_end(isiw.config.session_for(settings, on_trial=_show_progress))
 

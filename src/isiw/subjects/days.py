@@ -34,11 +34,12 @@ def another_day(person: SimulatedSubject, stranger: SimulatedSubject, rng: np.ra
     """
     if not (isinstance(person.profile, PeakProfile) and isinstance(person.response, RecruitmentResponse)):
         raise TypeError(person)
-    stays, shift, amplitude, x50 = rng.random() < P_STAYS, *rng.standard_normal(3).tolist()
-    moved = replace(person.profile, start_ms=person.profile.start_ms + SHIFT_SD_MS * shift)
+    stays = rng.random() < P_STAYS
+    shift, amplitude, x50 = rng.standard_normal(3)
+    moved = replace(person.profile, start_ms=float(person.profile.start_ms + SHIFT_SD_MS * shift))
     response = replace(
         person.response,
         amplitude_mv=float(person.response.amplitude_mv * np.exp(AMPLITUDE_LOG_SD * amplitude)),
-        x50_pct_rmt=person.response.x50_pct_rmt + X50_SD_PCT * x50,
+        x50_pct_rmt=float(person.response.x50_pct_rmt + X50_SD_PCT * x50),
     )
     return replace(person, profile=moved if stays else stranger.profile, response=response)

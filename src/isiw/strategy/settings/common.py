@@ -177,7 +177,7 @@ def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
         name: of the strategy, for messages.
 
     Raises:
-        StrategyError: a key that the family does not have.
+        StrategyError: a key that the family does not have, or an object of another family.
         ConfigError: a nested key or value that cannot be used.
         InvalidValueError: an invalid value.
     """
@@ -205,6 +205,10 @@ def _with(owner: Any, path: tuple[str, ...], value: Any) -> Any:
 def _converted(setting: Setting, value: Any, source: str) -> Any:
     """The value as the field's type; nested ones are made from what is given and, for the rest, the default."""
     kind = next((k for k in (setting.kind, *get_args(setting.kind)) if is_dataclass(k)), None)
+    if kind is not None and is_dataclass(value) and not isinstance(value, kind):
+        raise StrategyError(
+            f"{source} is of another kind of model", got=type(value).__qualname__, expected=kind.__qualname__
+        )
     if kind is None or not isinstance(value, Mapping):
         return value.item() if isinstance(value, np.generic) else value
     default = {} if setting.default is None else asdict(setting.default)
@@ -223,7 +227,7 @@ def _merged(default: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, A
 def _plain(value: Any) -> Any:
     """As TOML has it: tables, lists, and plain values."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {key: _plain(inner) for key, inner in asdict(value).items() if inner is not None}
+        value = asdict(value)
     if isinstance(value, Mapping):
-        return {key: _plain(inner) for key, inner in value.items()}
+        return {key: _plain(inner) for key, inner in value.items() if inner is not None}
     return [_plain(inner) for inner in value] if isinstance(value, tuple) else value
