@@ -136,17 +136,18 @@ def check_numbers(owner: object, *names: str, optional: bool = False, **bounds: 
             _put(owner, name, number(f"{type(owner).__name__}.{name}", value, **bounds))
 
 
-def check_probabilities(owner: object, *names: str) -> None:
+def check_probabilities(owner: object, *names: str, optional: bool = False) -> None:
     """Check fields of a frozen dataclass that are probabilities; as `check_numbers` with bounds of 0 and 1.
 
     Args:
         owner: the instance.
         *names: its fields.
+        optional: whether None is allowed.
 
     Raises:
         InvalidValueError: a field that is no probability.
     """
-    check_numbers(owner, *names, least=0.0, most=1.0)
+    check_numbers(owner, *names, optional=optional, least=0.0, most=1.0)
 
 
 def check_wholes(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:

@@ -33,6 +33,7 @@ __all__ = [
     "TimingStudy",
     "error_table",
     "event_table",
+    "hit_delay_ms",
     "study_preset",
     "study_session",
     "study_sweeps",
@@ -45,6 +46,9 @@ STUDY_ISI_MS = (10.0, 30.0, 50.0, 51.0, 52.0, 53.0, 54.0, 70.0, 90.0)
 TRIAL_MS = 1000.0
 CALIBRATION_TAPS = 21
 BATCH = 100
+
+HIT_DELAY_SD_MS = 6.0
+"""SD over people of the hit delay of one rig, as on the tapping robot (dissertation, 4.2) [ms]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +88,20 @@ class TimingStudy:
         table = self.error_table[self.error_table["n"] > 1]
         left = (table["n"] - 1).sum()
         return float(np.sqrt((table["sd_ms"] ** 2 * (table["n"] - 1)).sum() / left)) if left > 0 else float("nan")
+
+
+def hit_delay_ms(study: TimingStudy) -> tuple[float, float] | None:
+    """From the valve command to the impact, as a strategy can be told [ms]; None where no impact was found.
+
+    Returns:
+        The mean, and the SD of another person's about it: what people differ by on the tapping robot, and the standard
+        error of the mean.
+    """
+    hits_ms = study.events.hit_ms[~np.isnan(study.events.hit_ms)] - VALVE_MS
+    if not hits_ms.size:
+        return None
+    error_ms = hits_ms.std(ddof=1) / np.sqrt(hits_ms.size) if hits_ms.size > 1 else 0.0
+    return float(hits_ms.mean()), float(np.hypot(HIT_DELAY_SD_MS, error_ms))
 
 
 def event_table(events: TapEvents) -> pd.DataFrame:
@@ -213,6 +231,15 @@ def timing_report(study: TimingStudy) -> str:
             for isi, n, mean, sd, mistrials in errors.itertuples()
         ]
         lines += ["", f"Pooled SD of the ISI error: {study.pooled_sd_ms:.2f} ms. Mistrials: {study.mistrials}."]
+    hit_delay = hit_delay_ms(study)
+    if hit_delay is not None:
+        mean_ms, sd_ms = hit_delay
+        lines += [
+            "",
+            "For ISIs that count from the valve command, tell the strategy when the tap hits:",
+            f"    hit_delay_ms = [{mean_ms:.1f}, {sd_ms:.1f}]",
+            "It is a setting of the strategy and an argument of DeviceInfo.",
+        ]
     return "\n".join(lines)
 
 

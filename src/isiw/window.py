@@ -17,6 +17,8 @@ __all__ = [
     "EDGE_LEVEL",
     "MIN_EXCESS_MV",
     "MIN_EXCESS_OF_BASELINE",
+    "BestISI",
+    "Enhancement",
     "Interval",
     "ProfileBand",
     "Window",
@@ -145,6 +147,24 @@ class ProfileBand(NamedTuple):
     high_mv: FloatArray
 
 
+class BestISI(NamedTuple):
+    """The ISI of the largest expected MEP, given that there is a window: posterior median and 90 % interval [ms]."""
+
+    isi_ms: float
+    low_ms: float
+    high_ms: float
+
+
+class Enhancement(NamedTuple):
+    """By how much the expected MEP is larger than without a tap [mV].
+
+    The shift of a recruitment curve's input that does so [% RMT] is None where the model has no such curve.
+    """
+
+    mep_mv: float
+    shift_pct_rmt: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class WindowEstimate:
     """What is believed about one person's window. What a non-Bayesian method does not have is None.
@@ -159,11 +179,16 @@ class WindowEstimate:
         profile_quantiles_mv: the 0.05, 0.5 and 0.95 quantiles of the expected MEP by ISI [mV], shape (3, t).
         spread_ms: SD of the ISIs that a particle search has narrowed itself down to [ms].
         split_probability: probability that the window has more than one segment, given that there is one.
-        hypotheses: which of the model's hypotheses, such as the kind of noise, each of `edge_samples_ms` belongs to,
-            shape (s,).
+        hypothesis_samples: which of the model's hypotheses, such as the kind of noise, each of `edge_samples_ms`
+            belongs to, as an index of `hypothesis_names`, shape (s,).
+        hypothesis_names: what the hypotheses are called.
+        expected_f1: posterior mean of the F1 of the reported decision.
+        best_isi: the ISI of the largest expected MEP.
+        largest_excluded: an enhancement that, with 90 % probability, is larger than the largest at any ISI.
 
     Raises:
-        InvalidValueError: a probability outside 0–1, a window reported against it, or not one hypothesis a sample.
+        InvalidValueError: a probability outside 0–1, a window reported against it, not one hypothesis a sample, or one
+            without a name.
     """
 
     probability: float | None
@@ -175,19 +200,43 @@ class WindowEstimate:
     profile_quantiles_mv: FloatArray | None = field(default=None, repr=False)
     spread_ms: float | None = None
     split_probability: float | None = None
-    hypotheses: IntArray | None = field(default=None, repr=False)
+    hypothesis_samples: IntArray | None = field(default=None, repr=False)
+    hypothesis_names: tuple[str, ...] = field(default=(), repr=False)
+    expected_f1: float | None = None
+    best_isi: BestISI | None = None
+    largest_excluded: Enhancement | None = None
 
     def __post_init__(self) -> None:
-        samples = () if self.edge_samples_ms is None else self.edge_samples_ms
-        if self.hypotheses is not None and len(self.hypotheses) != len(samples):
-            raise InvalidValueError(
-                "every sample of the edges has one hypothesis", got=len(self.hypotheses), expected=str(len(samples))
-            )
+        self._check_hypotheses()
+        check_probabilities(self, "expected_f1", optional=True)
         if self.probability is None:
             return
         check_probabilities(self, "probability")
         if self.window is not None and self.probability < 0.5:
             raise InvalidValueError("a window is reported although none is more probable", got=self.probability)
+
+    def _check_hypotheses(self) -> None:
+        kinds = self.hypothesis_samples
+        if kinds is None:
+            return
+        samples = 0 if self.edge_samples_ms is None else len(self.edge_samples_ms)
+        if len(kinds) != samples:
+            raise InvalidValueError(
+                "every sample of the edges has one hypothesis", got=len(kinds), expected=str(samples)
+            )
+        if samples and not 0 <= kinds.min() <= kinds.max() < len(self.hypothesis_names):
+            raise InvalidValueError(
+                "every hypothesis has a name", got=int(kinds.max()), expected=f"an index of {self.hypothesis_names}"
+            )
+
+    @property
+    def hypotheses(self) -> dict[str, float] | None:
+        """Probability of each of the model's hypotheses by name, given a window; None where it has none."""
+        if self.hypothesis_samples is None or not len(self.hypothesis_samples):
+            return None
+        counts = np.bincount(self.hypothesis_samples, minlength=len(self.hypothesis_names))
+        shares = (counts / counts.sum()).tolist()
+        return dict(zip(self.hypothesis_names, shares, strict=True))
 
     def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:
         """Credible intervals of start and end, given that there is a window [ms].
@@ -223,11 +272,11 @@ class WindowEstimate:
         """
         min_share = number("the least share of a hypothesis", min_share, least=0, most=1)
         whole = self.interval(level)
-        if whole is None or self.hypotheses is None or self.edge_samples_ms is None:
+        if whole is None or self.hypothesis_samples is None or self.edge_samples_ms is None:
             return whole
-        kinds, counts = np.unique(self.hypotheses, return_counts=True)
-        probable = kinds[counts >= min_share * len(self.hypotheses)]
-        given = [_central(self.edge_samples_ms[self.hypotheses == kind], level) for kind in probable]
+        kinds, counts = np.unique(self.hypothesis_samples, return_counts=True)
+        probable = kinds[counts >= min_share * len(self.hypothesis_samples)]
+        given = [_central(self.edge_samples_ms[self.hypothesis_samples == kind], level) for kind in probable]
         lows, highs = np.stack([np.transpose(whole), *given], axis=1)
         (start_low, end_low), (start_high, end_high) = lows.min(0).tolist(), highs.max(0).tolist()
         return (start_low, start_high), (end_low, end_high)

@@ -31,7 +31,7 @@ from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.priors import after, load
 from isiw.session.loop import Session, SessionUpdate
-from isiw.strategy.catalogue import list_strategies, make_strategy, settings_for
+from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
 from isiw.subjects.cohorts import COHORTS, cohort
 from isiw.subjects.subject import SimulatedSubject
 from isiw.toml_files import checked, read_toml
@@ -213,9 +213,11 @@ def device_for(config: RunConfig) -> Device:
         DeviceError: no recordings in the folder.
     """
     reference = config.space.reference
-    respond = partial(subject_for(config).begin(config.seed).respond, reference=reference)
+    subject = subject_for(config)
+    respond = partial(subject.begin(config.seed).respond, reference=reference)
+    hit_delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
     if config.subject.kind == "simulated":
-        return SimulatedDevice(SimulatedPerson(respond, reference))
+        return SimulatedDevice(SimulatedPerson(respond, reference, hit_delay_ms=hit_delay_ms))
     if config.subject.data is None:
         raise ConfigError(
             "subject.data is missing: recorded EMG is not part of the package",
@@ -223,7 +225,7 @@ def device_for(config: RunConfig) -> Device:
             remedy="Give it with --data DIR.",
         )
     recordings = load_recordings(config.subject.data)
-    return SimulatedDevice(RecordedPerson(respond, reference, recordings, config.seed))
+    return SimulatedDevice(RecordedPerson(respond, reference, recordings, config.seed, hit_delay_ms))
 
 
 def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:
@@ -244,9 +246,12 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
     kept = config.model_dump(mode="json", exclude_none=True, exclude={"log"})
     if config.subject.data is not None:
         kept["subject"]["data"] = str(config.subject.data.resolve())
+    device = device_for(config)
+    known = {"hit_delay_ms": device.describe().hit_delay_ms}
+    settings = known_settings(config.strategy.name, known) | _settings_for(config)
     return Session(
-        device_for(config),
-        make_strategy(config.strategy.name, space=space, seed=config.seed, **_settings_for(config)),
+        device,
+        make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),
         log=log,
         limits=Limits.of_space(space, **config.limits.model_dump()),
         on_trial=on_trial,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, get_args, runtime_checkable
 
-from isiw.checks import check_choice, check_numbers
+from isiw.checks import check_choice, check_numbers, number
 from isiw.errors import DeviceError
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Reference
@@ -28,9 +28,11 @@ class DeviceInfo:
         channels: the unit of each waveform by the channel's name; empty for a device that measures the MEP itself.
         version: firmware or software version, as text.
         detection_limit_mv: amplitudes below it are reported as 0 [mV]; None where there is no such limit.
+        hit_delay_ms: from the valve command to the impact, mean and SD over people [ms]; `isiw timing LOG` measures it.
+            None where it is not known, or where ISIs count from the impact.
 
     Raises:
-        InvalidValueError: an unknown reference or a detection limit that is not positive.
+        InvalidValueError: an unknown reference, or a detection limit or a hit delay that is not positive.
     """
 
     name: str
@@ -39,10 +41,14 @@ class DeviceInfo:
     channels: Mapping[str, str] = field(default_factory=dict)
     version: str = ""
     detection_limit_mv: float | None = None
+    hit_delay_ms: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         check_choice(self, "reference", get_args(Reference))
         check_numbers(self, "detection_limit_mv", above=0, optional=True)
+        if self.hit_delay_ms is not None:
+            mean, sd = (number("DeviceInfo.hit_delay_ms", value, above=0) for value in self.hit_delay_ms)
+            object.__setattr__(self, "hit_delay_ms", (mean, sd))
 
 
 @runtime_checkable

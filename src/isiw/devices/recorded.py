@@ -133,11 +133,19 @@ class RecordedPerson:
         reference: the event that ISIs count from.
         recordings: the recorded sweeps.
         seed: seed of the choice of sweeps; the choice of a trial depends on the seed and the trial's number alone.
+        hit_delay_ms: mean and SD of the hit delay that the device states [ms].
     """
 
-    def __init__(self, respond: Respond, reference: Reference, recordings: Recordings, seed: int = 0) -> None:
-        name = "simulated person in recorded EMG (semi-synthetic)"
-        self.info = DeviceInfo(name, reference, simulated=True, channels={"emg": "mV"})
+    def __init__(
+        self,
+        respond: Respond,
+        reference: Reference,
+        recordings: Recordings,
+        seed: int = 0,
+        hit_delay_ms: tuple[float, float] | None = None,
+    ) -> None:
+        name, channels = "simulated person in recorded EMG (semi-synthetic)", {"emg": "mV"}
+        self.info = DeviceInfo(name, reference, simulated=True, channels=channels, hit_delay_ms=hit_delay_ms)
         self._respond, self._recordings, self._seed = respond, recordings, seed
 
     def answer(self, stimulus: Stimulus) -> Sweep:

@@ -105,10 +105,17 @@ class SimulatedPerson:
         respond: answers a commanded ISI [ms] with the realised ISI and the MEP.
         reference: the event that ISIs count from.
         name: what the log calls the device.
+        hit_delay_ms: mean and SD of the hit delay that the device states [ms].
     """
 
-    def __init__(self, respond: Respond, reference: Reference, name: str = "simulated person") -> None:
-        self.info = DeviceInfo(name=name, reference=reference, simulated=True)
+    def __init__(
+        self,
+        respond: Respond,
+        reference: Reference,
+        name: str = "simulated person",
+        hit_delay_ms: tuple[float, float] | None = None,
+    ) -> None:
+        self.info = DeviceInfo(name=name, reference=reference, simulated=True, hit_delay_ms=hit_delay_ms)
         self._respond = respond
 
     def answer(self, stimulus: Stimulus) -> Measurement:

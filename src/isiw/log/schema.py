@@ -132,7 +132,9 @@ class Estimate(_Record):
     """What was believed after a trial, whether to stop, and what is asked next.
 
     `start_beyond`, `end_beyond` and `split` are probabilities given a window: that an edge lies beyond the range, and
-    that there is more than one segment.
+    that there is more than one segment. `hypotheses` are probabilities by name, `best_isi_ms` is the median and the
+    ends of the 90 % interval; `excluded_mv` and `excluded_pct_rmt` are the largest enhancement that is excluded with
+    90 % probability.
     """
 
     trial: int
@@ -147,6 +149,11 @@ class Estimate(_Record):
     start_beyond: float | None = None
     end_beyond: float | None = None
     split: float | None = None
+    hypotheses: dict[str, float] = Field(default_factory=dict)
+    expected_f1: float | None = None
+    best_isi_ms: tuple[float, ...] = ()
+    excluded_mv: float | None = None
+    excluded_pct_rmt: float | None = None
     grid_ms: tuple[float, ...] = ()
     profile_mv: Numbers = ()
     band_low_mv: Numbers = ()
@@ -160,7 +167,7 @@ class Estimate(_Record):
         """The record of an estimate, with its 90 % intervals."""
         segments = () if estimate.window is None else tuple(itertools.chain(*estimate.window.segments))
         start, end = estimate.interval(0.9) or ((None, None), (None, None))
-        beyond = estimate.beyond_probability or (None, None)
+        beyond, excluded = estimate.beyond_probability or (None, None), estimate.largest_excluded
         return cls(
             trial=trial,
             probability=estimate.probability,
@@ -174,6 +181,11 @@ class Estimate(_Record):
             start_beyond=beyond[0],
             end_beyond=beyond[1],
             split=estimate.split_probability,
+            hypotheses=estimate.hypotheses or {},
+            expected_f1=estimate.expected_f1,
+            best_isi_ms=tuple(estimate.best_isi or ()),
+            excluded_mv=None if excluded is None else excluded.mep_mv,
+            excluded_pct_rmt=None if excluded is None else excluded.shift_pct_rmt,
             next_isi_ms=next_isi_ms,
             stop=decision.stop,
             reason=decision.reason,

@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 
 from isiw.design import DesignSpace
 from isiw.models.protocol import Tensor
 from isiw.types import FloatArray
-from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window, WindowEstimate
+from isiw.window import (
+    EDGE_LEVEL,
+    MIN_EXCESS_MV,
+    MIN_EXCESS_OF_BASELINE,
+    BestISI,
+    Enhancement,
+    Window,
+    WindowEstimate,
+)
 
-__all__ = ["PROFILE_POINTS", "best_window", "edge_samples", "least_excess_mv", "profile_grid", "sampled_estimate"]
+__all__ = [
+    "EXCLUDED_AT",
+    "PROFILE_POINTS",
+    "SampledHypotheses",
+    "SampledProfiles",
+    "best_window",
+    "edge_samples",
+    "least_excess_mv",
+    "profile_grid",
+    "sampled_estimate",
+]
 
 PROFILE_POINTS = 101
 """ISIs at which the expected MEP and its band are reported."""
@@ -26,8 +46,12 @@ def least_excess_mv(peak_mv: Tensor, baseline_mv: Tensor) -> Tensor:
     return torch.where(peak_mv >= enough_mv, EDGE_LEVEL * peak_mv, torch.inf)
 
 
-def best_window(masks: Tensor, grid_ms: FloatArray) -> Window | None:
-    """The window of largest expected F1 among the level sets of the posterior's membership.
+EXCLUDED_AT = 0.9
+"""With which probability `WindowEstimate.largest_excluded` is larger than the largest enhancement."""
+
+
+def best_window(masks: Tensor, grid_ms: FloatArray) -> tuple[Window | None, float]:
+    """The window of largest expected F1 among the level sets of the posterior's membership, and that F1.
 
     Args:
         masks: sampled windows as 0 or 1, shape (s, t); none of them empty.
@@ -38,8 +62,8 @@ def best_window(masks: Tensor, grid_ms: FloatArray) -> Window | None:
     candidates = (membership >= cuts.unsqueeze(-1)).to(masks.dtype)
     overlap = candidates @ masks.T
     sizes = candidates.sum(-1, keepdim=True) + masks.sum(-1)
-    expected_f1 = (2.0 * overlap / sizes).mean(-1)
-    return Window.from_mask(grid_ms, candidates[expected_f1.argmax()].cpu().numpy() > 0)
+    expected_f1, best = (2.0 * overlap / sizes).mean(-1).max(-1)
+    return Window.from_mask(grid_ms, candidates[best].cpu().numpy() > 0), float(expected_f1)
 
 
 def edge_samples(masks: Tensor, space: DesignSpace) -> Tensor:
@@ -69,31 +93,74 @@ def profile_grid(space: DesignSpace) -> Tensor:
     return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=torch.float32)
 
 
+class SampledProfiles(NamedTuple):
+    """Sampled profiles of one person.
+
+    Args:
+        mep_mv: expected MEP at the ISIs of `profile_grid` [mV], shape (s, t).
+        baseline_mv: expected MEP without a tap [mV], shape (s,).
+    """
+
+    mep_mv: Tensor
+    baseline_mv: Tensor
+
+    @property
+    def excess_mv(self) -> Tensor:
+        """Largest enhancement at any ISI [mV], shape (s,)."""
+        return (self.mep_mv.amax(-1) - self.baseline_mv).clamp_min(0.0)
+
+
+class SampledHypotheses(NamedTuple):
+    """Which of a model's hypotheses sampled windows belong to.
+
+    Args:
+        kinds: an index of the names for each sample, shape (s,).
+        names: what the hypotheses are called.
+    """
+
+    kinds: Tensor
+    names: tuple[str, ...]
+
+
 def sampled_estimate(
-    masks: Tensor, profiles_mv: Tensor, space: DesignSpace, hypotheses: Tensor | None = None
+    masks: Tensor, profiles: SampledProfiles, space: DesignSpace, hypotheses: SampledHypotheses | None = None
 ) -> WindowEstimate:
     """What equally weighted samples say about the window of one person.
 
     Args:
         masks: sampled windows on the space's grid as 0 or 1, all 0 where there is none, shape (s, t).
-        profiles_mv: sampled profiles at the ISIs of `profile_grid` [mV], shape (any, t).
+        profiles: sampled profiles, of the same or of other samples.
         space: the design space.
-        hypotheses: which hypothesis of the model each sampled window belongs to, shape (s,).
+        hypotheses: of the sampled windows; None where the model has none.
     """
     somewhere = masks.any(-1)
     present = masks[somewhere]
     probability = len(present) / len(masks)
     edges = edge_samples(present, space)
     start, end = edges.median(0).values.tolist() if len(present) else (None, None)
-    levels = torch.tensor([0.05, 0.5, 0.95], dtype=profiles_mv.dtype, device=profiles_mv.device)
+    reported, f1 = best_window(present, space.grid_ms) if probability >= 0.5 else (None, 1.0)
+    levels = torch.tensor([0.05, 0.5, 0.95], dtype=profiles.mep_mv.dtype, device=profiles.mep_mv.device)
     return WindowEstimate(
         probability=probability,
-        window=best_window(present, space.grid_ms) if probability >= 0.5 else None,
+        window=reported,
         start_ms=start,
         end_ms=end,
         grid_ms=profile_grid(space).double().numpy(),
         edge_samples_ms=edges.double().cpu().numpy(),
-        profile_quantiles_mv=torch.quantile(profiles_mv, levels, dim=0).double().cpu().numpy(),
+        profile_quantiles_mv=torch.quantile(profiles.mep_mv, levels, dim=0).double().cpu().numpy(),
         split_probability=float(_split(present).double().mean()) if len(present) else None,
-        hypotheses=None if hypotheses is None else hypotheses[somewhere].cpu().numpy(),
+        hypothesis_samples=None if hypotheses is None else hypotheses.kinds[somewhere].cpu().numpy(),
+        hypothesis_names=() if hypotheses is None else hypotheses.names,
+        expected_f1=f1 * (1.0 - probability if reported is None else probability),
+        best_isi=_best_isi(profiles, space),
+        largest_excluded=Enhancement(float(torch.quantile(profiles.excess_mv, EXCLUDED_AT))),
     )
+
+
+def _best_isi(profiles: SampledProfiles, space: DesignSpace) -> BestISI | None:
+    enhanced = least_excess_mv(profiles.excess_mv, profiles.baseline_mv).isfinite()
+    if not bool(enhanced.any()):
+        return None
+    isi_ms = profile_grid(space).to(enhanced.device)[profiles.mep_mv[enhanced].argmax(-1)]
+    low, median, high = torch.quantile(isi_ms, torch.tensor([0.05, 0.5, 0.95], device=isi_ms.device)).tolist()
+    return BestISI(median, low, high)

@@ -64,10 +64,17 @@ def gain(share: float, mean: FloatArray, sd: FloatArray) -> Gain:
     return Gain(share, *_log_scales(mean, sd))
 
 
-def muscle(share: float, mean: FloatArray, sd: FloatArray) -> Muscle:
-    """A law of recruitment curves, all but the last as logarithms; `mean` and `sd` of shape (6,)."""
+def muscle(share: float, mean: FloatArray, sd: FloatArray, name: str) -> Muscle:
+    """A law of recruitment curves.
+
+    Args:
+        share: its probability.
+        mean: of the latents, all but the last as logarithms, shape (6,).
+        sd: shape (6,).
+        name: what it is called among the hypotheses.
+    """
     scales = [*_log_scales(mean[:-1], sd[:-1]), Scale(float(mean[-1]), float(sd[-1]))]
-    return Muscle(share, *scales)
+    return Muscle(name, share, *scales)
 
 
 def _log_scales(mean: FloatArray, sd: FloatArray) -> list[Scale]:

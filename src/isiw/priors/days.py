@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -144,7 +145,7 @@ def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
         noise=mixed_shares(_shares(latents.noise, len(fields(kinds))), kinds, law.p_other),
         floors=beside(usual.floors, _laws(latents, "floor", floor, law)),
         gains=beside(usual.gains, _laws(latents, "gain", gain, law)),
-        muscles=beside(usual.muscles, _laws(latents, "muscle", muscle, law)),
+        muscles=beside(usual.muscles, _laws(latents, "muscle", partial(muscle, name="as before"), law)),
     )
 
 

@@ -182,7 +182,7 @@ def _lab_prior(
         place=_where_known(laws["place"], lambda share, mean, sd: place(share, mean, sd, reference)),
         floor=_where_known(laws["floor"], floor),
         gain=_where_known(laws["gain"], gain),
-        muscle=_where_known(laws["muscle"], muscle),
+        muscle=_where_known(laws["muscle"], lambda share, mean, sd: muscle(share, mean, sd, "as in the lab")),
     )
 
 

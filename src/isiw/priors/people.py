@@ -32,7 +32,7 @@ def people_of(posteriors: Sequence[ParticlePosterior]) -> People:
     """Equally weighted particles of some people.
 
     Args:
-        posteriors: one a person, with the same prior.
+        posteriors: one a person.
     """
     each = [_person(posterior) for posterior in posteriors]
     blocks = {name: Block(*map(np.stack, zip(*(p.blocks[name] for p in each), strict=True))) for name in each[0].blocks}

@@ -14,7 +14,7 @@ __all__ = ["recalled"]
 
 
 def recalled(record: SessionRecord, prior: Prior, *, particles: int = 2000) -> ParticlePosterior:
-    """The posterior after a logged session.
+    """The posterior after a logged session; the hit delay is what its rig stated, where the prior says nothing of it.
 
     Args:
         record: the session.
@@ -29,7 +29,7 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 2000) -> P
         raise LogError(
             "the session has no accepted trial to learn from", got=str(record.path), remedy="Leave this log out."
         )
-    model = ParticleModel(prior, particles=particles)
+    model = ParticleModel(_of_rig(prior, record), particles=particles)
     if (limit_mv := record.header.device.detection_limit_mv) is not None:
         model = replace(model, detection_limit_mv=limit_mv)
     posterior = model.begin(record.header.space, seed=record.header.seed)
@@ -37,3 +37,9 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 2000) -> P
         told = Observation.of([trial.isi_ms], [trial.mep_mv], [trial.isi_sd_ms])
         posterior = model.update(posterior, told)
     return posterior
+
+
+def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
+    start = prior.profile.start
+    stated = start.hit_delay_ms or record.header.device.hit_delay_ms
+    return replace(prior, profile=replace(prior.profile, start=replace(start, hit_delay_ms=stated)))

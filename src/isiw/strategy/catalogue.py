@@ -10,10 +10,10 @@ from typing import Any, Final
 from isiw.checks import whole
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import StrategyError
-from isiw.strategy.settings.common import Settings, settings_from, settings_values
+from isiw.strategy.settings.common import Settings, settings_from, settings_keys, settings_values
 from isiw.strategy.strategy import Recipe, Strategy
 
-__all__ = ["list_strategies", "make_strategy", "settings_for"]
+__all__ = ["known_settings", "list_strategies", "make_strategy", "settings_for"]
 
 
 @dataclass(frozen=True)
@@ -112,6 +112,20 @@ def settings_for(name: str, **settings: Any) -> Settings:
     family = pkgutil.resolve_name(f"isiw.strategy.settings.{entry.family}")
     chosen: Settings = settings_from(family, {**entry.meant, **settings}, name)
     return chosen
+
+
+def known_settings(name: str, known: Mapping[str, Any]) -> dict[str, Any]:
+    """What is known of a rig or a person, as settings of a strategy: those that it has.
+
+    Args:
+        name: one of `list_strategies()`.
+        known: values by the keys of `isiw.strategy.settings.common.KNOWN`; None for what is not known.
+
+    Raises:
+        StrategyError: an unknown name.
+    """
+    keys = settings_keys(type(settings_for(name)))
+    return {key: value for key, value in known.items() if value is not None and key in keys}
 
 
 def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed: int = 0, **settings: Any) -> Strategy:

@@ -13,6 +13,7 @@ from typing import Any
 import pandas as pd
 import torch
 
+from isiw.errors import StudyError
 from isiw.models.protocol import Observation, ReportsTrouble, ResponseModel
 from isiw.strategy.choosing import Choice, Method
 from isiw.strategy.stopping import StopDecision
@@ -38,6 +39,11 @@ class _Batch:
     """A strategy with b people; the counterpart of `Strategy`, without TMS alone and without deadlines."""
 
     def __init__(self, sessions: Sequence[SimulatedSession], device: str) -> None:
+        if len({(session.strategy, repr(session.settings)) for session in sessions}) > 1:
+            raise StudyError(
+                "the people of a batch have strategies with different settings",
+                remedy="Run them in batches of their own.",
+            )
         players = [session.player() for session in sessions]
         first = players[0]
         drawing = any(player.acquisition != first.acquisition for player in players)

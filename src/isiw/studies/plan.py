@@ -15,7 +15,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from itertools import product
+from itertools import groupby, product
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias, get_args
 
@@ -31,12 +32,23 @@ from isiw.studies.sessions import SimulatedSession, Stopping, simulate
 from isiw.subjects.cohorts import COHORTS
 from isiw.toml_files import checked, read_toml
 
-__all__ = ["Engine", "Study", "StudyStrategy", "Unit", "load_study", "run_unit", "study_from", "study_values"]
+__all__ = [
+    "Engine",
+    "HitDelay",
+    "Study",
+    "StudyStrategy",
+    "Unit",
+    "load_study",
+    "run_unit",
+    "study_from",
+    "study_values",
+]
 
 _MOST: Final = 2**62
 """Of people, seeds and trials; their sums stay within 64 bits."""
 
 Engine: TypeAlias = Literal["single", "batched"]
+HitDelay: TypeAlias = Literal["unstated", "stated"]
 
 _SPACES: Final[Mapping[str, DesignSpace]] = {"valve": VALVE_SPACE, "impact": IMPACT_SPACE}
 
@@ -110,9 +122,11 @@ class Study:
         batch: how many people side by side.
         device: torch device of the batched engine, for the models that have one.
         amplitude: factor on all amplitudes of the people.
+        hit_delay: whether strategies that can use it are told the hit delay as the rig states it (`"stated"`), or
+            nothing (`"unstated"`).
 
     Raises:
-        InvalidValueError: a number or a word that cannot be, or a label given twice.
+        InvalidValueError: an invalid number or word, or a label given twice.
     """
 
     strategies: tuple[StudyStrategy, ...]
@@ -127,6 +141,7 @@ class Study:
     batch: int = 50
     device: str = "cpu"
     amplitude: float = 1.0
+    hit_delay: HitDelay = "unstated"
 
     def __post_init__(self) -> None:
         for name in ("strategies", "cohorts", "marks"):
@@ -140,6 +155,7 @@ class Study:
             raise InvalidValueError("marks ascend from 1 to the number of trials", got=self.marks)
         check_choice(self, "stopping", get_args(Stopping))
         check_choice(self, "engine", get_args(Engine))
+        check_choice(self, "hit_delay", get_args(HitDelay))
         if unknown := sorted(set(self.cohorts) - set(COHORTS)):
             raise InvalidValueError("unknown cohorts", got=unknown, expected=", ".join(COHORTS))
         labels = [strategy.label for strategy in self.strategies]
@@ -159,29 +175,33 @@ class Study:
         """All of its work; the first people of each strategy and cohort come first, so that all grow together."""
         size = self.batch if self.engine == "batched" else 1
         return [
-            self._unit(strategy, cohort, range(first, min(first + size, self.people)))
+            self._unit(tuple(alike))
             for first, cohort, strategy in product(range(0, self.people, size), self.cohorts, self.strategies)
+            for _, alike in groupby(
+                (self._session(strategy, cohort, person) for person in range(first, min(first + size, self.people))),
+                key=attrgetter("settings"),
+            )
         ]
 
-    def _unit(self, strategy: StudyStrategy, cohort: str, people: range) -> Unit:
-        last = f"-{people[-1]:05d}" if self.engine == "batched" else ""
-        sessions = tuple(
-            SimulatedSession(
-                strategy.name,
-                cohort,
-                person,
-                self.seed,
-                self.trials,
-                self.marks,
-                self.space,
-                settings=tuple(strategy.settings.items()),
-                label=strategy.label,
-                stopping=self.stopping,
-                amplitude=self.amplitude,
-            )
-            for person in people
+    def _session(self, strategy: StudyStrategy, cohort: str, person: int) -> SimulatedSession:
+        session = SimulatedSession(
+            strategy.name,
+            cohort,
+            person,
+            self.seed,
+            self.trials,
+            self.marks,
+            self.space,
+            settings=tuple(strategy.settings.items()),
+            label=strategy.label,
+            stopping=self.stopping,
+            amplitude=self.amplitude,
         )
-        return Unit(f"{strategy.label}.{cohort}.{people[0]:05d}{last}", sessions, self.engine, self.device)
+        return session if self.hit_delay == "unstated" else session.with_stated_hit_delay()
+
+    def _unit(self, sessions: tuple[SimulatedSession, ...]) -> Unit:
+        first, last = sessions[0], f"-{sessions[-1].person:05d}" if self.engine == "batched" else ""
+        return Unit(f"{first.label}.{first.cohort}.{first.person:05d}{last}", sessions, self.engine, self.device)
 
 
 def load_study(path: str | Path) -> Study:

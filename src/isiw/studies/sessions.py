@@ -19,7 +19,7 @@ from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import StudyError
 from isiw.metrics import covers, f1
 from isiw.signals import wrong_isi
-from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choosing import Choice
 from isiw.strategy.stopping import StopDecision, StoppingRule, stimuli_left
 from isiw.strategy.strategy import Strategy
@@ -124,6 +124,13 @@ class SimulatedSession:
         usual = cohort(self.cohort, self.person + 1, self.seed)[self.person]
         return replace(usual, scale=self.amplitude * usual.scale)
 
+    def with_stated_hit_delay(self) -> SimulatedSession:
+        """The same with the hit delay told to the strategy, as the person's rig states it, where it can use it."""
+        known = known_settings(self.strategy, {"hit_delay_ms": self.subject().stated_hit_delay_ms})
+        if self.space.reference == "impact":
+            return self
+        return replace(self, settings=tuple((known | dict(self.settings)).items()))
+
     def player(self) -> Strategy:
         """The strategy before its first trial."""
         return make_strategy(self.strategy, self.space, self.seed + self.person, **dict(self.settings))
@@ -150,11 +157,11 @@ def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
     Returns:
         One row a mark of each session: strategy (its label), cohort, person, seed, trial (the mark); how many pairs had
         been delivered by then, mistrials among them; F1; whether there is and was reported a window, its edges [ms],
-        its probability, whether the 90 % intervals cover start and end (NaN where there are none); how many asks were
-        fallbacks and how many fits failed (NaN where a batch cannot say whose); after how many pairs the stopping rule
-        fired (NaN where it has not), why, whether that was before the budget was used up (NaN where the rule is
-        ignored), and F1 and coverage at that moment, named `stop_f1` and so on; the time that the last ask and the last
-        tell took for each person [ms]. After the end of a session its last estimate stays.
+        its probability, the expected F1, whether the 90 % intervals cover start and end (NaN where there are none); how
+        many asks were fallbacks and how many fits failed (NaN where a batch cannot say whose); after how many pairs the
+        stopping rule fired (NaN where it has not), why, whether that was before the budget was used up (NaN where the
+        rule is ignored), and F1 and coverage at that moment, named `stop_f1` and so on; the time that the last ask and
+        the last tell took for each person [ms]. After the end of a session its last estimate stays.
 
     Raises:
         StudyError: a person's realised ISIs are hardly ever near enough to the commanded ones.
@@ -288,6 +295,7 @@ def _judged(estimate: Judgement, truth: Window | None, space: DesignSpace) -> di
         "start_ms": math.nan if reported is None else reported.start_ms,
         "end_ms": math.nan if reported is None else reported.end_ms,
         "probability": math.nan if posterior is None or posterior.probability is None else posterior.probability,
+        "expected_f1": math.nan if posterior is None or posterior.expected_f1 is None else posterior.expected_f1,
         "start_covered": math.nan if covered is None else float(covered[0]),
         "end_covered": math.nan if covered is None else float(covered[1]),
     }

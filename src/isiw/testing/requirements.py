@@ -81,8 +81,8 @@ def check_estimate(estimate: object, space: DesignSpace, when: str) -> None:
 
 def same_estimates(one: WindowEstimate, other: WindowEstimate) -> bool:
     """Whether two estimates are the same to the last bit."""
-    arrays = ("grid_ms", "edge_samples_ms", "profile_quantiles_mv", "hypotheses")
-    plain = ("probability", "window", "start_ms", "end_ms", "spread_ms")
+    arrays = ("grid_ms", "edge_samples_ms", "profile_quantiles_mv", "hypothesis_samples")
+    plain = ("probability", "window", "start_ms", "end_ms", "spread_ms", "expected_f1", "best_isi", "largest_excluded")
     return all(getattr(one, name) == getattr(other, name) for name in plain) and all(
         np.array_equal(np.asarray(getattr(one, name)), np.asarray(getattr(other, name))) for name in arrays
     )

@@ -127,7 +127,14 @@ class Tapper:
         """What the robot says about itself."""
         silent = {name for name, there in self._has.items() if not there}
         channels = {name: unit for name, unit in UNITS.items() if name not in silent}
-        return DeviceInfo("simulated tapping robot", self.settings.reference, simulated=True, channels=channels)
+        known = self.settings.expected_hit_ms, self.settings.expected_hit_sd_ms
+        return DeviceInfo(
+            "simulated tapping robot",
+            self.settings.reference,
+            simulated=True,
+            channels=channels,
+            hit_delay_ms=known if self.settings.reference == "valve" else None,
+        )
 
     @property
     def _has(self) -> dict[str, bool]:

@@ -17,18 +17,21 @@ from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.models.particles.likelihood import levels, total_log_likelihood
 from isiw.models.particles.moves import Mover
-from isiw.models.particles.noise import Response, draw_log_mep, log_gain
+from isiw.models.particles.noise import NoiseKind, Response, draw_log_mep, log_gain
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Latents, Person, Prior
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Observation, SimulatedPerson, Tensor
 from isiw.models.randomness import SIMULATED, step_generator, systematic
 from isiw.models.shared.history import History, observed
-from isiw.models.windows import profile_grid, sampled_estimate
+from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import ArrayLike
-from isiw.window import Window, WindowEstimate
+from isiw.window import Enhancement, Window, WindowEstimate
 
 __all__ = ["Moving", "ParticleModel", "ParticlePosterior"]
+
+LEAST_SAMPLES = 20
+"""Of fewer samples no quantile is told."""
 
 
 @dataclass(frozen=True)
@@ -235,12 +238,22 @@ class ParticlePosterior:
         """The window of one person."""
         one = slice(person, person + 1)
         picks = systematic(self.log_weights[one], self.model.particles)
-        sample = PersonSample(_each(self.person, lambda x: _take(x[one], picks)), self.space)
+        latents = Latents(*(_take(x[one], picks) for x in self.latents))
+        sample = PersonSample(self.model.prior.person(latents), self.space)
         grid = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=picks.device)
         thinned = PersonSample(_each(self._thinned.person, lambda x: x[one]), self.space)
         profiles_mv = thinned.expected_mep_mv(profile_grid(self.space).to(picks.device))
-        noise = _take(self.latents.noise[one], picks)
-        return sampled_estimate(sample.window_masks(grid)[0], profiles_mv[0], self.space, noise[0])
+        profiles = SampledProfiles(profiles_mv[0], thinned.baselines_mv()[0])
+        hypotheses = SampledHypotheses(self.model.prior.hypothesis(latents)[0], self.model.prior.hypotheses)
+        estimate = sampled_estimate(sample.window_masks(grid)[0], profiles, self.space, hypotheses)
+        return replace(estimate, largest_excluded=self._with_shift(estimate.largest_excluded, latents))
+
+    def _with_shift(self, excluded: Enhancement | None, latents: Latents) -> Enhancement | None:
+        """The same, with the shift of the input that recruitment curves exclude."""
+        shift_pct_rmt = self.model.prior.shift_pct_rmt(latents)[latents.noise == NoiseKind.RECRUITMENT]
+        if excluded is None or len(shift_pct_rmt) < LEAST_SAMPLES:
+            return excluded
+        return excluded._replace(shift_pct_rmt=float(torch.quantile(shift_pct_rmt, EXCLUDED_AT)))
 
 
 def _take(values: Tensor, picks: Tensor) -> Tensor:

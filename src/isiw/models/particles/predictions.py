@@ -15,7 +15,6 @@ from isiw.models.particles.shapes import highest_facilitation
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
 from isiw.models.windows import least_excess_mv
-from isiw.window import EDGE_LEVEL
 
 __all__ = ["PersonSample"]
 
@@ -45,17 +44,16 @@ class PersonSample:
 
     @cached_property
     def edge_level(self) -> Tensor:
-        """Facilitation at a window's edge by the 0.135 rule; above 1 where there is no window, shape (b, s)."""
-        response = self.person.response
-        excess = self._evoked - self._evoked[..., :1]
+        """Facilitation at a window's edge by the least-excess rule; above 1 where there is no window, shape (b, s)."""
+        excess_mv = self.person.response.log_floor.exp().unsqueeze(-1) * (self._evoked - self._evoked[..., :1])
         highest = highest_facilitation(self.person.shape, self.space.low_ms, self.space.high_ms)
-        peak = interpolated(excess.unsqueeze(-1), highest.unsqueeze(-1))[..., 0, 0]
-        enough = least_excess_mv(peak * response.log_floor.exp(), self.baselines_mv()).isfinite()
-        share = (excess / peak.clamp_min(1e-12).unsqueeze(-1)).contiguous()
-        right = torch.searchsorted(share, torch.full_like(share[..., :1], EDGE_LEVEL)).clamp(1, LEVELS - 1)
-        low, high = share.gather(-1, right - 1), share.gather(-1, right)
-        position = (right - 1 + (EDGE_LEVEL - low) / (high - low).clamp_min(1e-12)).squeeze(-1) / (LEVELS - 1)
-        return torch.where(enough & self.person.present, position.square(), 2.0)
+        peak_mv = interpolated(excess_mv.unsqueeze(-1), highest.unsqueeze(-1))[..., 0, 0]
+        least_mv = least_excess_mv(peak_mv, self.baselines_mv()).unsqueeze(-1)
+        right = torch.searchsorted(excess_mv.contiguous(), least_mv.contiguous()).clamp(1, LEVELS - 1)
+        low_mv, high_mv = excess_mv.gather(-1, right - 1), excess_mv.gather(-1, right)
+        position = (right - 1 + (least_mv - low_mv) / (high_mv - low_mv).clamp_min(1e-12)).squeeze(-1) / (LEVELS - 1)
+        enhanced = least_mv.squeeze(-1).isfinite() & self.person.present
+        return torch.where(enhanced, position.square(), 2.0)
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows as 0 or 1, shape (b, s, t)."""

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import torch
 
-from isiw.checks import check_numbers, check_probabilities
+from isiw.checks import check_numbers, check_probabilities, choice
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.particles.mixture import Mixture
@@ -71,6 +71,13 @@ _USED: Final = {
     NoiseKind.MISSING: ("gain", "reliability"),
     NoiseKind.RECRUITMENT: ("recruitment",),
     NoiseKind.ALL_OR_NONE: ("gain", "switch"),
+}
+
+
+_WITHOUT_CURVE: Final = {
+    NoiseKind.CONSTANT_CV: "constant-CV noise",
+    NoiseKind.MISSING: "missing responses",
+    NoiseKind.ALL_OR_NONE: "all-or-none responses",
 }
 
 
@@ -250,6 +257,7 @@ class Muscle:
     """A law of recruitment curves: `s = A / (1 + exp(-k (x + sigma_x z1 - x50))) exp(sigma_y z2)` (Goetz et al.).
 
     Args:
+        name: what it is called.
         share: its probability.
         ratio: the largest MEP over the floor, A.
         slope_per_pct: k [1 / % RMT].
@@ -262,6 +270,7 @@ class Muscle:
         InvalidValueError: an invalid share or scale.
     """
 
+    name: str
     share: float
     ratio: Scale
     slope_per_pct: Scale
@@ -277,7 +286,8 @@ class Muscle:
 
 
 FOREARM: Final = Muscle(
-    share=0.60,
+    name="forearm",
+    share=0.54,
     ratio=Scale(16.0, 0.45),  # 0.1–0.25 mV over the floor
     slope_per_pct=Scale(0.30, 0.06),
     input_sd=Scale(2.1, 0.20),  # 5–9 % RMT
@@ -287,7 +297,8 @@ FOREARM: Final = Muscle(
 )
 
 HAND: Final = Muscle(
-    share=0.18,
+    name="hand",
+    share=0.16,
     ratio=Scale(90.0, 0.85),  # 0.2–3 mV over the floor
     slope_per_pct=Scale(0.23, 0.1),
     input_sd=Scale(1.65, 0.25),
@@ -297,13 +308,14 @@ HAND: Final = Muscle(
 )
 
 OTHER_MUSCLE: Final = Muscle(
-    share=0.22,
-    ratio=Scale(20.0, 0.9),
-    slope_per_pct=Scale(0.30, 0.5),
-    input_sd=Scale(2.0, 0.35),
-    sigma_y=Scale(0.39, 0.35),
-    boost_pct=Scale(9.0, 0.55),
-    rest_pct=Scale(-15.0, 6.0),
+    name="other muscle",
+    share=0.30,
+    ratio=Scale(18.0, 0.7),
+    slope_per_pct=Scale(0.36, 0.5),
+    input_sd=Scale(2.0, 0.3),
+    sigma_y=Scale(0.39, 0.3),
+    boost_pct=Scale(10.5, 0.45),
+    rest_pct=Scale(-14.5, 5.0),
 )
 
 
@@ -406,6 +418,10 @@ class Prior:
         muscles: of recruitment curves.
         floors: of the EMG floor.
         session: of what changes within a session.
+        muscle: the name of the muscle, where it is known: the others that have a name are left out then.
+
+    Raises:
+        InvalidValueError: a muscle that is none of the muscles.
     """
 
     profile: ProfilePrior = field(default_factory=ProfilePrior)
@@ -421,6 +437,11 @@ class Prior:
         Floor(0.15, Scale(0.009, 1.2), Scale(0.22, 0.5)),
     )
     session: SessionPrior = field(default_factory=SessionPrior)
+    muscle: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.muscle is not None:
+            choice("Prior.muscle", self.muscle, [muscle.name for muscle in self.muscles])
 
     @cached_property
     def mixtures(self) -> dict[str, Mixture]:
@@ -434,7 +455,7 @@ class Prior:
             "gain": _mixture([(g.share, [_log(g.ratio), _log(g.cv)]) for g in self.gains]),
             "reliability": _mixture([(1.0, [_plain(switch.reliability)])]),
             "switch": _mixture([(1.0, [_plain(switch.switched_on), _plain(switch.switched_off)])]),
-            "recruitment": _mixture([(m.share, _of_muscle(m)) for m in self.muscles]),
+            "recruitment": _mixture([(m.share, _of_muscle(m)) for m in self.possible_muscles]),
         }
 
     @cached_property
@@ -505,6 +526,32 @@ class Prior:
     @cached_property
     def _places(self) -> Mixture:
         return mixture_of(self.profile.places)
+
+    @property
+    def possible_muscles(self) -> tuple[Muscle, ...]:
+        """All muscles but, where one is known, the others that have a name of their own."""
+        others = set() if self.muscle is None else {FOREARM.name, HAND.name} - {self.muscle}
+        return tuple(m for m in self.muscles if m.name not in others)
+
+    @property
+    def hypotheses(self) -> tuple[str, ...]:
+        """What the kinds of responses are called: kinds of noise, and muscles."""
+        names = dict.fromkeys(f"recruitment curve, {muscle.name}" for muscle in self.possible_muscles)
+        return (*_WITHOUT_CURVE.values(), *names)
+
+    def hypothesis(self, latents: Latents) -> Tensor:
+        """Which of `hypotheses` each particle belongs to, shape (b, p)."""
+        recruitment = latents.values[..., latents_of("recruitment", device=latents.values.device)]
+        names = [muscle.name for muscle in self.possible_muscles]
+        numbers = torch.tensor([list(dict.fromkeys(names)).index(name) for name in names], device=recruitment.device)
+        kind = len(_WITHOUT_CURVE) + numbers[self.mixtures["recruitment"].component(recruitment)]
+        for number, noise in enumerate(_WITHOUT_CURVE):
+            kind = torch.where(latents.noise == noise, number, kind)
+        return kind
+
+    def shift_pct_rmt(self, latents: Latents) -> Tensor:
+        """Shift of the recruitment curve's input at the best ISI [% RMT], 0 without facilitation, shape (b, p)."""
+        return torch.where(latents.present, latents.values[..., LATENTS.index("log_boost")].exp(), 0.0)
 
     def person(self, latents: Latents) -> Person:
         """What particles mean."""

@@ -2,7 +2,8 @@
 
 A family of strategies is a frozen dataclass of three parts: the model, what is asked, and when to stop. The keys that a
 configuration, a log and `make_strategy` know are the names of the parts' fields, so that no setting is written down
-twice. A field that a part marks with `metadata={"spread": True}` gives its own fields keys in its place.
+twice. A field that a part marks with `metadata={"spread": True}` gives its own fields keys in its place. What a rig or
+a lab knows, `KNOWN`, has short keys of its own.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
-from typing import Any, Protocol, TypeVar, get_args, get_type_hints
+from typing import Any, Final, Protocol, TypeVar, get_args, get_type_hints
 
 import numpy as np
 
@@ -26,6 +27,15 @@ from isiw.toml_files import checked
 __all__ = ["Asking", "Setting", "Settings", "Stopping", "settings_from", "settings_keys", "settings_values"]
 
 _S = TypeVar("_S", bound="Settings")
+
+KNOWN: Final = {
+    "hit_delay_ms": (
+        ("model", "prior", "profile", "start", "hit_delay_ms"),
+        ("model", "prior", "start", "hit_delay_ms"),
+    ),
+    "muscle": (("model", "prior", "muscle"),),
+}
+"""Short keys of what is known of the rig and the person; they stand for fields deep in a model's prior."""
 
 
 class AskingPart(Protocol):
@@ -143,7 +153,18 @@ def settings_keys(kind: type[Settings]) -> dict[str, Setting]:
     """
     defaults = kind()
     parts = ((part.name, getattr(defaults, part.name)) for part in fields(kind))  # type: ignore[arg-type] # a dataclass
-    return {setting.path[-1]: setting for name, part in parts for setting in _settings_of(part, (name,))}
+    keys = {setting.path[-1]: setting for name, part in parts for setting in _settings_of(part, (name,))}
+    known = ((key, _setting_at(defaults, path)) for key, paths in KNOWN.items() for path in paths)
+    return keys | {key: setting for key, setting in known if setting is not None}
+
+
+def _setting_at(owner: Any, path: tuple[str, ...]) -> Setting | None:
+    """The field at the end of a path; None where there is none."""
+    for name in path[:-1]:
+        owner = getattr(owner, name, None)
+    if owner is None or not hasattr(owner, path[-1]):
+        return None
+    return Setting(path, type(owner), get_type_hints(type(owner))[path[-1]], getattr(owner, path[-1]))
 
 
 def _settings_of(part: Any, path: tuple[str, ...]) -> Iterator[Setting]:
@@ -157,7 +178,7 @@ def _settings_of(part: Any, path: tuple[str, ...]) -> Iterator[Setting]:
 
 
 def settings_values(settings: Settings) -> dict[str, Any]:
-    """All settings by key, as TOML values."""
+    """All settings by key, as TOML values; those of `KNOWN` where they are given."""
     values = {}
     for key, setting in settings_keys(type(settings)).items():
         value: Any = settings
@@ -191,7 +212,8 @@ def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
                 remedy=f"{f'Did you mean {close[0]}? ' if close else ''}Correct it or remove it.",
             )
     settings = kind()
-    for key, value in values.items():
+    # What is deep in a part goes into the part that was given.
+    for key, value in sorted(values.items(), key=lambda item: len(known[item[0]].path)):
         settings = _with(settings, known[key].path, _converted(known[key], value, f"the setting {key} of {name}"))
     return settings
 
@@ -204,10 +226,11 @@ def _with(owner: Any, path: tuple[str, ...], value: Any) -> Any:
 
 def _converted(setting: Setting, value: Any, source: str) -> Any:
     """The value as the field's type; nested ones are made from what is given and, for the rest, the default."""
-    kind = next((k for k in (setting.kind, *get_args(setting.kind)) if is_dataclass(k)), None)
+    kinds: tuple[Any, ...] = (setting.kind, *get_args(setting.kind))
+    kind = next((k for k in kinds if isinstance(k, type) and is_dataclass(k)), None)
     if kind is not None and is_dataclass(value) and not isinstance(value, kind):
         raise StrategyError(
-            f"{source} is of another kind of model", got=type(value).__qualname__, expected=kind.__qualname__
+            f"{source} is of another kind of model", got=type(value).__module__, expected=kind.__module__
         )
     if kind is None or not isinstance(value, Mapping):
         return value.item() if isinstance(value, np.generic) else value
