@@ -235,7 +235,7 @@ def _converted(setting: Setting, value: Any, source: str) -> Any:
     if kind is None or not isinstance(value, Mapping):
         return value.item() if isinstance(value, np.generic) else value
     default = {} if setting.default is None else asdict(setting.default)
-    return checked(kind, _merged(default, value), source)  # type: ignore[arg-type] # a dataclass
+    return checked(kind, _merged(default, value), source)
 
 
 def _merged(default: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
