@@ -3,8 +3,8 @@
     python benchmarks/lab.py --labs 20 --seed 100000 --out benchmarks/results/lab
 
 In each lab ten people are measured with the default, and a prior is learnt from their logs; then other people of the
-lab, and people who do not belong there, are measured with the built-in prior, with the learnt one, and with a prior that
-was told the lab's law.
+lab, and people who do not belong there, are measured with the built-in prior, with the learnt one, and with a prior
+that was told the lab's law.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from isiw.subjects import LABS, Lab, cohort, lab
 
 MARKS = (1, 5, 10, 20, 40)
 TOLD_SHARE = 0.95
+LEARNT, EARLIER_TRIALS = 10, 40
 
 
 @dataclass(frozen=True)
@@ -40,20 +41,16 @@ class Unit:
     Args:
         name: of the kind of lab.
         seed: of the lab.
-        learnt: how many people are learnt from.
         people: how many are measured then.
         misfits: how many people of `odd` are measured then.
         trials: of each session that is measured then.
-        earlier_trials: of each session that is learnt from.
     """
 
     name: str
     seed: int
-    learnt: int
     people: int
     misfits: int
     trials: int
-    earlier_trials: int
 
 
 def told(law: Lab) -> Prior:
@@ -88,12 +85,12 @@ def examine(unit: Unit) -> pd.DataFrame:
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:
         logs = [
-            logged_session(person, f"P{number}", unit.seed + number, unit.earlier_trials, Path(folder))
-            for number, person in enumerate(cohort(unit.name, unit.learnt, unit.seed))
+            logged_session(person, f"P{number}", unit.seed + number, EARLIER_TRIALS, Path(folder))
+            for number, person in enumerate(cohort(unit.name, LEARNT, unit.seed))
         ]
         learnt = isiw.priors.learn(logs).joined()
     priors = {"built-in": Prior(), "learnt": learnt, "told": told(lab(unit.name, unit.seed))}
-    own = [(unit.name, number) for number in range(unit.learnt, unit.learnt + unit.people)]
+    own = [(unit.name, number) for number in range(LEARNT, LEARNT + unit.people)]
     odd = [("odd", number) for number in range(unit.misfits)]
     marks = tuple(mark for mark in MARKS if mark <= unit.trials)
     rows = []
@@ -120,15 +117,13 @@ def main(
     people: Annotated[int, typer.Option(help="New people of each lab.")] = 10,
     misfits: Annotated[int, typer.Option(help="People of `odd` in each lab.")] = 5,
     trials: Annotated[int, typer.Option(help="Trials of each new session.")] = 20,
-    learnt: Annotated[int, typer.Option(help="People that are learnt from.")] = 10,
-    earlier_trials: Annotated[int, typer.Option(help="Trials of each session that is learnt from.")] = 40,
     seed: Annotated[int, typer.Option(help="Seed of the first lab.")] = 100_000,
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("lab"),
 ) -> None:
     """Measure the eleventh person of a lab."""
     seeds = range(seed, seed + 100 * labs, 100)  # people have seeds of their own
-    units = [Unit(kind, s, learnt, people, misfits, trials, earlier_trials) for kind in kinds.split(",") for s in seeds]
+    units = [Unit(kind, s, people, misfits, trials) for kind in kinds.split(",") for s in seeds]
     tables = []
     with Progress() as progress:
         bar = progress.add_task("labs", total=len(units))

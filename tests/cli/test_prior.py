@@ -88,8 +88,8 @@ def test_the_same_person_twice_is_refused_with_the_way_out(isiw, logs, folder) -
     assert not (folder / "twice.toml").exists()
 
 
-def test_a_prior_that_is_not_there_is_named(isiw, logs) -> None:
-    result = isiw("run", "short.toml", "--prior", "nowhere.toml", "--log", "n.mcap")
+def test_a_prior_that_is_not_there_is_named(isiw) -> None:
+    result = isiw("run", "--prior", "nowhere.toml", "--log", "n.mcap")
     assert result.exit_code == 1
     assert "nowhere.toml" in result.output
 
