@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 import torch
-from logged import gaussian_person, write_log
 
 from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
@@ -14,6 +13,7 @@ from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session
 from isiw.models.particles.prior import Prior
 from isiw.subjects.subject import SimulatedSubject
+from priors.logged import gaussian_person, write_log
 
 EARLY_MS, LATE_MS = 20.0, 200.0
 
@@ -32,7 +32,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def first(folder):
-    return read_session(write_log(folder / "first.mcap", person(), trials=30))
+    return read_session(write_log(folder / "first.mcap", person(), trials=18))
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_the_rest_of_the_person_is_nearly_kept(next_day, first) -> None:
 
 
 def test_a_third_day_knows_both(first, next_day, folder) -> None:
-    second = read_session(write_log(folder / "second.mcap", person(), trials=30, seed=2))
+    second = read_session(write_log(folder / "second.mcap", person(), trials=18, seed=2))
     third = priors.after(first, second)
     assert third.profile.places[: len(next_day.profile.places)] == tuple(
         replace(place, share=pytest.approx(0.3 * place.share)) for place in next_day.profile.places
@@ -77,14 +77,14 @@ def test_a_third_day_knows_both(first, next_day, folder) -> None:
 
 
 def test_a_window_that_stayed_probably_did_not_move_and_one_elsewhere_did(first, folder) -> None:
-    stayed = read_session(write_log(folder / "stayed.mcap", person(EARLY_MS + 8.0), trials=30, seed=3))
-    gone = read_session(write_log(folder / "gone.mcap", person(LATE_MS), trials=30, seed=3))
+    stayed = read_session(write_log(folder / "stayed.mcap", person(EARLY_MS + 8.0), trials=18, seed=3))
+    gone = read_session(write_log(folder / "gone.mcap", person(LATE_MS), trials=18, seed=3))
     assert priors.moved(first, stayed) < 0.25
     assert priors.moved(first, gone) > 0.9
 
 
 def test_of_a_session_without_a_window_it_cannot_be_said_whether_it_moved(first, folder) -> None:
-    none = read_session(write_log(folder / "none.mcap", person(gain=0.0), trials=30))
+    none = read_session(write_log(folder / "none.mcap", person(gain=0.0), trials=18))
     with pytest.raises(InvalidValueError, match="probably has none"):
         priors.moved(none, first)
 

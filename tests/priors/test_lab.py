@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 import torch
-from logged import gaussian_person, write_log
 
 from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import ConfigError, InvalidValueError, LogError, StrategyError
 from isiw.models.particles.prior import Prior
 from isiw.strategy.catalogue import make_strategy
+from priors.logged import gaussian_person, write_log
 
 TRIALS = 14
 
@@ -42,10 +42,11 @@ def test_a_lab_prior_names_its_sessions_by_their_content(lab, logs) -> None:
     assert [(session.subject, session.trials) for session in lab.sessions] == [(f"P{k}", TRIALS) for k in range(3)]
 
 
-def test_every_session_is_reported_once_it_is_learnt(logs) -> None:
+def test_every_session_is_reported_once_it_is_learnt(tmp_path) -> None:
     done = []
-    priors.learn(logs[:1], on_done=lambda record: done.append(record.header.subject))
-    assert done == ["P0"]
+    log = write_log(tmp_path / "short.mcap", trials=3)
+    priors.learn([log], on_done=lambda record: done.append(record.header.subject))
+    assert done == ["P1"]
 
 
 def test_the_same_log_twice_is_refused_whatever_it_is_called(logs, tmp_path) -> None:
@@ -55,8 +56,8 @@ def test_the_same_log_twice_is_refused_whatever_it_is_called(logs, tmp_path) -> 
         priors.learn([logs[0], copy], again=True)
 
 
-def test_the_same_person_twice_is_refused_unless_told(logs, tmp_path) -> None:
-    twice = [logs[0], write_log(tmp_path / "again.mcap", subject="P0", trials=4, seed=2)]
+def test_the_same_person_twice_is_refused_unless_told(tmp_path) -> None:
+    twice = [write_log(tmp_path / f"{seed}.mcap", subject="P0", trials=3, seed=seed) for seed in (1, 2)]
     with pytest.raises(LogError, match=r"same person.*--again"):
         priors.learn(twice)
     assert len(priors.learn(twice, again=True).sessions) == 2

@@ -176,7 +176,7 @@ def _normals(latents: Latents, name: str, law: DayToDay) -> list[_Normal]:
         return []
     centre, spread = values.mean(0), values.std(0) + 1e-6
     # The regularisation keeps a law from being narrower than a few of the particles that it stands for.
-    fit = GaussianMixture(COMPONENTS[name], covariance_type="diag", reg_covar=0.05, random_state=0)
+    fit = GaussianMixture(COMPONENTS[name], covariance_type="diag", reg_covar=0.05, max_iter=1000, random_state=0)
     fit.fit((values - centre) / spread)
     added = law.added_sd()
     grown = np.array([added.get(LATENTS[column], 0.0) for column in own])

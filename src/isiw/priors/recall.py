@@ -13,7 +13,7 @@ from isiw.models.protocol import Observation
 __all__ = ["recalled"]
 
 
-def recalled(record: SessionRecord, prior: Prior, *, particles: int = 2000) -> ParticlePosterior:
+def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> ParticlePosterior:
     """The posterior after a logged session; the hit delay is what its rig stated, where the prior says nothing of it.
 
     Args:

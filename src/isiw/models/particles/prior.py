@@ -478,7 +478,7 @@ class Prior:
         uniform = torch.rand((4, *size), generator=generator, device=generator.device)
         start_ms = self.profile.start.start_ms(uniform[3], space).unsqueeze(-1)
         values = [start_ms, *(self.mixtures[name].sample(size, generator) for name in BLOCKS if name != "start")]
-        if self.profile.places:
+        if self.profile.p_place:
             anywhere = torch.cat([start_ms, values[1]], dim=-1)
             known = torch.rand(size, generator=generator, device=generator.device) < self.profile.p_place
             place = self._places.sample(size, generator)
@@ -517,9 +517,9 @@ class Prior:
         """
         start, width = self.profile.start.log_density(values[..., 0], space), self.mixtures["width"]
         anywhere = (start + width.log_density(values[..., 1:2])).unsqueeze(-1)
-        if not self.profile.places:
-            return anywhere
         share = self.profile.p_place
+        if not share:
+            return anywhere
         places = math.log(share) + self._places.log_parts(values[..., :2])
         return torch.cat([math.log1p(-share) + anywhere, places], dim=-1)
 
