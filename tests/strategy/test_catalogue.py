@@ -15,7 +15,7 @@ from isiw.models.particles import ParticleModel
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import ResponseModel
 from isiw.models.shared.scales import Scale
-from isiw.strategy.catalogue import list_strategies, make_strategy, settings_for
+from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
 from isiw.strategy.settings.particles import ParticleSettings
 
 NAMES = sorted(list_strategies())
@@ -101,17 +101,29 @@ def test_settings_reach_the_parts_they_are_meant_for() -> None:
     assert again.model == model
 
 
-def test_the_prior_as_a_list_of_numbers_is_the_prior_as_a_pair() -> None:
-    wide = {"width_ms": [90.0, 0.4, 0.0]}
-    pair, row = (make_strategy(prior={"profile": given}, **FEW) for given in ({"width_ms": (90.0, 0.4)}, wide))
-    assert pair.model == row.model
+def test_the_hit_delay_and_the_muscle_have_keys_of_their_own() -> None:
+    strategy = make_strategy(hit_delay_ms=(150, 5.0), muscle="hand", **FEW)
+    prior = Prior()
+    start = replace(prior.profile.start, hit_delay_ms=(150.0, 5.0))
+    assert strategy.model.prior == replace(prior, profile=replace(prior.profile, start=start), muscle="hand")
+    assert make_strategy(**strategy.recipe.settings).model == strategy.model
+    parametric = make_strategy("parametric-mi", hit_delay_ms=[150.0, 5.0])
+    assert parametric.model.prior.start.hit_delay_ms == (150.0, 5.0)
+
+
+def test_only_a_strategy_that_can_use_what_is_known_is_told() -> None:
+    known = {"hit_delay_ms": (150.0, 5.0), "muscle": None}
+    assert known_settings("default", known) == {"hit_delay_ms": (150.0, 5.0)}
+    assert known_settings("nr", known) == {}
 
 
 def test_a_prior_is_a_table_or_the_object_that_it_stands_for() -> None:
-    table = make_strategy(prior={"profile": {"p_window": 0.6}, "hand": {"boost": [3.0, 0.2]}}, **FEW)
+    table = make_strategy(prior={"profile": {"p_window": 0.6}, "switch": {"reliability": [0.5, 0.4]}}, **FEW)
     prior = Prior()
     prior = replace(
-        prior, profile=replace(prior.profile, p_window=0.6), hand=replace(prior.hand, boost=Scale(3.0, 0.2))
+        prior,
+        profile=replace(prior.profile, p_window=0.6),
+        switch=replace(prior.switch, reliability=Scale(0.5, 0.4)),
     )
     assert make_strategy(prior=prior, **FEW).model == table.model
 

@@ -18,9 +18,11 @@ __all__ = [
     "Budget",
     "CredibleWidth",
     "EdgeVariance",
+    "ExpectedF1",
     "NoWindow",
     "ParticleSpread",
     "Progress",
+    "SmallGain",
     "StopDecision",
     "StoppingRule",
     "SweptPast",
@@ -153,6 +155,72 @@ class NoWindow:
         if absent >= self.probability:
             return StopDecision(stop=True, reason=f"There is no window, with probability {absent:.2f}.")
         return StopDecision(stop=False, reason=f"No window has probability {absent:.2f}.")
+
+
+@dataclass(frozen=True)
+class ExpectedF1:
+    """Stop when the reported window is expected to be right enough.
+
+    Args:
+        f1: the least expected F1 to stop at.
+        min_probability: the least probability of a window.
+
+    Raises:
+        InvalidValueError: an F1 or a probability outside 0–1.
+    """
+
+    f1: float = 0.9
+    min_probability: float = 0.9
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "f1", "min_probability")
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        estimate = progress.estimate
+        if estimate.expected_f1 is None or estimate.probability is None:
+            return StopDecision(stop=False, reason="The F1 to be expected is not known.")
+        expected = f"an F1 of {estimate.expected_f1:.2f} is expected"
+        if estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
+            return StopDecision(stop=True, reason=f"The window is known: {expected}.")
+        return StopDecision(stop=False, reason=f"Of the window as it is known, {expected}.")
+
+
+@dataclass(frozen=True)
+class SmallGain:
+    """Stop when another few stimuli would hardly add anything: returns diminish, so the last few tell what they would.
+
+    Args:
+        gain: what the last stimuli must have added to the expected F1 for the session to go on.
+        last: how many stimuli.
+        min_told: the fewest trials to stop after.
+        min_probability: the least probability of a window.
+
+    Raises:
+        InvalidValueError: a gain or a probability outside 0–1, or no trials to look back at.
+    """
+
+    gain: float = 0.02
+    last: int = 10
+    min_told: int = 30
+    min_probability: float = 0.9
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "gain", "min_probability")
+        check_wholes(self, "last", "min_told", least=1)
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        now, earlier = progress.estimate, progress.past[-self.last - 1 :]
+        before = earlier[0].expected_f1 if len(earlier) > self.last else None
+        if now.expected_f1 is None or now.probability is None or before is None:
+            return StopDecision(stop=False, reason=f"What {self.last} stimuli add is not known yet.")
+        added = f"the last {self.last} stimuli added {now.expected_f1 - before:.2f} to the expected F1"
+        small = now.expected_f1 - before < self.gain and now.probability >= self.min_probability
+        if small and progress.told >= self.min_told:
+            reason = f"Another {self.last} stimuli would add little: {added}, now {now.expected_f1:.2f}."
+            return StopDecision(stop=True, reason=reason)
+        return StopDecision(stop=False, reason=f"Stimuli still add something, or too few were given: {added}.")
 
 
 @dataclass(frozen=True)
@@ -295,4 +363,6 @@ def looks_back(rule: StoppingRule) -> int:
     """
     if isinstance(rule, AnyOf):
         return max(looks_back(r) for r in rule.rules)
+    if isinstance(rule, SmallGain):
+        return rule.last + 1
     return rule.last if isinstance(rule, EdgeVariance) else 0

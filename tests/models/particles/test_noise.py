@@ -58,7 +58,7 @@ PAIRS: list[tuple[Response, ResponseCurve]] = [
     (particle(NoiseKind.CONSTANT_CV, spread=0.9), GainResponse(FLOOR, 0.08, 0.9)),
     (particle(NoiseKind.MISSING), GainResponse(FLOOR, 0.08, 0.6, max_response_probability=0.55)),
     (
-        particle(NoiseKind.FOREARM, log_ratio=math.log(16.0), spread=2.1),
+        particle(NoiseKind.RECRUITMENT, log_ratio=math.log(16.0), spread=2.1),
         RecruitmentResponse(FLOOR, 0.16, 0.30, 105.0, 12.0, 7.0, 0.4),
     ),
     (particle(NoiseKind.ALL_OR_NONE), AllOrNone()),
@@ -144,7 +144,7 @@ def test_a_gain_is_the_gain_of_the_simulated_persons_trials(believed: Response, 
 @pytest.mark.parametrize("output_log_sd", [0.3, 0.5])
 def test_few_nodes_predict_what_many_do(spread: float, output_log_sd: float) -> None:
     # Divergence [nat a trial]; the means over such responses are in the decision record on nodes and moves.
-    believed = particle(NoiseKind.FOREARM, log_ratio=math.log(16.0), spread=spread, output_log_sd=output_log_sd)
+    believed = particle(NoiseKind.RECRUITMENT, log_ratio=math.log(16.0), spread=spread, output_log_sd=output_log_sd)
     log_mep = torch.linspace(math.log(1e-3), math.log(2.0), 400)
     few = outcome_density(believed, LEVELS, log_mep[None, None])[0, 0]
     many = torch.stack([_by_many_nodes(believed, float(level), log_mep) for level in LEVELS.flatten()])

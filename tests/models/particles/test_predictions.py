@@ -20,7 +20,7 @@ from isiw.window import Window, window_from_excess
 def test_windows_are_those_of_the_rule_also_where_a_peak_lies_beyond_the_range(space: DesignSpace) -> None:
     # Tables of facilitations are interpolated in windows and in MEPs; they differ where an edge or a peak lies between.
     beliefs = Prior(ProfilePrior(p_window=0.9, start=StartPrior(p_anywhere=0.3)))
-    person = beliefs.person(beliefs.sample(1, 1000, torch.Generator().manual_seed(3)), space)
+    person = beliefs.person(beliefs.sample(1, 1000, torch.Generator().manual_seed(3), space))
     sample = PersonSample(person, space)
     grid_ms = torch.tensor(space.grid_ms, dtype=torch.float32)
     masks = sample.window_masks(grid_ms)[0].numpy()

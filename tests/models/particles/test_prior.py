@@ -1,36 +1,46 @@
+from __future__ import annotations
+
 from dataclasses import astuple, fields, replace
 
 import pytest
 import torch
 
-from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import (
+    BLOCKS,
+    FOREARM,
+    HAND,
     LATENTS,
-    AllOrNonePrior,
-    FloorPrior,
-    GainPrior,
+    Floor,
+    Gain,
+    Muscle,
     NoiseShares,
+    Person,
     Prior,
     ProfilePrior,
     SessionPrior,
     ShapeShares,
-    block,
+    SwitchPrior,
+    Width,
+    latents_of,
+    used_by,
 )
 from isiw.models.particles.shapes import ShapeKind
+from isiw.models.shared.scales import Scale
 
 MANY = 20_000
+ONLY_CURVES = NoiseShares(0.0, 0.0, 1.0, 0.0)
 
 
-def people(prior: Prior, space: DesignSpace):
-    generator = torch.Generator().manual_seed(1)
-    return prior.person(prior.sample(1, MANY, generator), space)
+def people(prior: Prior) -> Person:
+    return prior.person(prior.sample(1, MANY, torch.Generator().manual_seed(1), VALVE_SPACE))
 
 
 def test_kinds_come_as_often_as_the_prior_says() -> None:
     prior = Prior()
-    person = people(prior, VALVE_SPACE)
+    person = people(prior)
     for kinds, named in ((person.shape.kind, prior.profile.shapes), (person.response.kind, prior.noise)):
         probabilities = astuple(named)
         shares = torch.bincount(kinds[0], minlength=len(probabilities)) / MANY
@@ -42,27 +52,33 @@ def test_kinds_come_as_often_as_the_prior_says() -> None:
     ("part", "wrong"),
     [
         (ProfilePrior, {"p_window": 2.0}),
-        (ProfilePrior, {"width_ms": (float("nan"), 0.5, 0.0)}),
-        (GainPrior, {"cv": (0.0, 0.3)}),
-        (AllOrNonePrior, {"max_probability": (0.0, -1.0)}),
-        (FloorPrior, {"median_mv": (0.009, 0.0)}),
+        (Width, {"width_ms": Scale(float("nan"), 0.5)}),
+        (Width, {"share": 1.5}),
+        (Gain, {"cv": Scale(0.0, 0.3)}),
+        (SwitchPrior, {"reliability": Scale(0.0, -1.0)}),
+        (Floor, {"median_mv": Scale(0.009, 0.0)}),
         (SessionPrior, {"drift_sd": -0.1}),
-        (SessionPrior, {"startup": (0.5, -0.5)}),
+        (SessionPrior, {"startup": Scale(0.5, -0.5)}),
     ],
 )
-def test_an_impossible_part_is_refused(part, wrong) -> None:
+def test_an_invalid_part_is_refused(part: type, wrong: dict[str, object]) -> None:
+    usual = {Width: (0.5, Scale(100.0, 0.4)), Gain: (0.5, Scale(7.0, 0.6), Scale(0.6, 0.3))}
+    usual |= {Floor: (0.5, Scale(0.009, 0.4), Scale(0.2, 0.4))}
+    sound = part(*usual.get(part, ()))
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
-        part(**wrong)
+        replace(sound, **wrong)
 
 
-@pytest.mark.parametrize("wrong", [{"boost": (3.0, 0.0, 0.1)}, {"rest": (-4.5, 0.4, -0.1)}, {"ratio": (-1.0, 0.9)}])
-def test_an_impossible_muscle_is_refused(wrong) -> None:
+@pytest.mark.parametrize(
+    "wrong", [{"boost_pct": Scale(3.0, 0.0)}, {"rest_pct": Scale(-4.5, -0.4)}, {"ratio": Scale(-1.0, 0.9)}]
+)
+def test_an_invalid_muscle_is_refused(wrong: dict[str, Scale]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
-        replace(Prior().hand, **wrong)
+        replace(HAND, **wrong)
 
 
 @pytest.mark.parametrize("shares", [ShapeShares, NoiseShares])
-def test_shares_sum_to_one(shares) -> None:
+def test_shares_sum_to_one(shares: type) -> None:
     first = fields(shares)[0].name
     with pytest.raises(InvalidValueError, match="sum to 1"):
         shares(**{first: 1.0})
@@ -76,29 +92,58 @@ def test_every_kind_has_its_share_in_the_order_of_the_kinds() -> None:
 
 
 def test_blocks_of_latents_are_named() -> None:
-    chosen = block("place", "form", device=torch.device("cpu"))
+    chosen = latents_of("start", "form", device=torch.device("cpu"))
     names = [name for name, inside in zip(LATENTS, chosen.tolist(), strict=True) if inside]
-    assert names == ["start", "width", "form"]
+    assert names == ["start_ms", "form"]
 
 
-def test_most_forearms_are_usual_and_the_tail_reaches_the_others() -> None:
-    # Half of all lie within 0.68 SDs of the median, as without a tail.
-    prior = Prior()
-    response = people(prior, VALVE_SPACE).response
-    rest = response.rest[0][response.kind[0] == NoiseKind.FOREARM]
-    assert (rest - prior.forearm.rest.median).abs().median().item() == pytest.approx(
-        0.68 * prior.forearm.rest.sd, rel=0.1
-    )
-    assert 0.001 < (rest < -6.2).float().mean().item() < 0.03
+def test_without_a_window_or_a_curve_their_latents_mean_nothing() -> None:
+    noise = torch.tensor([[NoiseKind.CONSTANT_CV, NoiseKind.RECRUITMENT]])
+    used = used_by(noise, torch.tensor([[False, True]]))[0]
+    plain, curved = ({name for name, inside in zip(LATENTS, each.tolist(), strict=True) if inside} for each in used)
+    assert plain == {*BLOCKS["floor"], *BLOCKS["session"], *BLOCKS["gain"]}
+    assert curved == {"start_ms", "log_width_ms", "form", *BLOCKS["floor"], *BLOCKS["session"], *BLOCKS["recruitment"]}
 
 
-def test_hands_reach_from_small_meps_to_large_ones_at_threshold_and_below() -> None:
-    # A of 0.2 and 3 mV over a floor of 0.009 mV; k = 0.23 times 90 % and 100 % RMT less an x50 of 117 %.
-    response = people(Prior(noise=NoiseShares(0.0, 0.0, 0.0, 0.0, 1.0)), VALVE_SPACE).response
+@pytest.mark.parametrize("muscle", [FOREARM, HAND])
+def test_a_muscles_curves_are_as_it_says(muscle: Muscle) -> None:
+    # Half of a normal variable lies within 0.674 SDs of its median.
+    response = people(Prior(noise=ONLY_CURVES, muscles=(replace(muscle, share=1.0),))).response
+    slope = muscle.slope_per_pct.median
+    for values, scale in ((response.log_ratio.exp(), muscle.ratio), (response.spread, muscle.input_sd)):
+        assert values.median().item() == pytest.approx(scale.median, rel=0.05)
+        far = (values.log() - values.log().median()).abs().median().item()
+        assert far == pytest.approx(0.674 * scale.sd, rel=0.05)
+    assert response.rest.median().item() == pytest.approx(slope * muscle.rest_pct.median, rel=0.05)
+    assert response.boost.median().item() == pytest.approx(slope * muscle.boost_pct.median, rel=0.05)
+
+
+def test_hands_reach_from_small_meps_to_large_ones_below_and_above_threshold() -> None:
+    # A of 0.2 and 3 mV over a floor of 0.009 mV; k = 0.23 times 90 % and 110 % RMT less an x50 of 117 %.
+    response = people(Prior(noise=ONLY_CURVES, muscles=(HAND,), muscle="hand")).response
     largest, drives = response.log_ratio.exp(), response.rest
     for values, (low, high) in (
         (largest, (0.2 / 0.009, 3.0 / 0.009)),
-        (drives, (0.23 * (90 - 117), 0.23 * (100 - 117))),
+        (drives, (0.23 * (90 - 117), 0.23 * (110 - 117))),
     ):
         for rare in (values < low, values > high):
-            assert 0.02 < rare.float().mean().item() < 0.25
+            assert 0.01 < rare.float().mean().item() < 0.25
+
+
+def test_a_known_muscle_leaves_only_itself_and_what_has_no_name() -> None:
+    names = Prior(muscle="hand").hypotheses
+    assert "recruitment curve, hand" in names
+    assert "recruitment curve, other muscle" in names
+    assert "recruitment curve, forearm" not in names
+    with pytest.raises(InvalidValueError, match="forearm"):
+        Prior(muscle="foot")
+
+
+def test_the_density_is_the_law_that_samples_are_drawn_from() -> None:
+    # Importance weights between the prior and one of other widths average to 1, and so would not with another density.
+    # Both densities leave out the same constant.
+    here, there = Prior(), Prior(ProfilePrior(widths=(Width(1.0, Scale(110.0, 0.5)),)))
+    latents = here.sample(1, MANY, torch.Generator().manual_seed(2), VALVE_SPACE)
+    ratio = (there.log_density(latents.values, VALVE_SPACE) - here.log_density(latents.values, VALVE_SPACE)).exp()
+    assert ratio.mean().item() == pytest.approx(1.0, abs=0.02)
+    assert ratio.std().item() > 0.1

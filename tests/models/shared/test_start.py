@@ -7,62 +7,97 @@ import torch
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.shared.start import StartPrior
+from isiw.models.shared.start import Span, StartPrior
 
 MANY = 20_000
+USUAL = (Span(1.0, 0.0, 115.0),)
 
 
 def starts_ms(prior: StartPrior, space: DesignSpace) -> torch.Tensor:
-    return prior.start_ms(torch.randn(MANY, generator=torch.Generator().manual_seed(1)), space)
+    return prior.start_ms(torch.rand(MANY, generator=torch.Generator().manual_seed(1)), space)
 
 
-@pytest.mark.parametrize(("space", "low_ms", "high_ms"), [(IMPACT_SPACE, 0.0, 125.0), (VALVE_SPACE, 180.0, 305.0)])
+def share_of(starts: torch.Tensor, low_ms: float, high_ms: float) -> float:
+    return ((starts > low_ms) & (starts < high_ms)).float().mean().item()
+
+
+@pytest.mark.parametrize(("space", "low_ms", "high_ms"), [(IMPACT_SPACE, 0.0, 115.0), (VALVE_SPACE, 180.0, 295.0)])
 def test_windows_start_soon_after_the_impact_and_sometimes_anywhere(
     space: DesignSpace, low_ms: float, high_ms: float
 ) -> None:
-    start = starts_ms(StartPrior(p_anywhere=0.2), space)
-    near = ((start > low_ms - 15) & (start < high_ms + 15)).float().mean().item()
-    elsewhere = 0.2 * (1 - (high_ms - low_ms + 30) / (space.high_ms - space.low_ms + 50))
-    assert near == pytest.approx(1 - elsewhere, abs=0.02)
-    assert (start >= space.low_ms - 50).all()
+    start = starts_ms(StartPrior(USUAL, hit_delay_ms=(180.0, 6.0), p_anywhere=0.2), space)
+    elsewhere = 0.2 * (1 - (high_ms - low_ms + 30) / (space.high_ms - space.low_ms + 100))
+    assert share_of(start, low_ms - 15, high_ms + 15) == pytest.approx(1 - elsewhere, abs=0.02)
+    assert (start >= space.low_ms - 100).all()
     assert (start <= space.high_ms).all()
+
+
+def test_an_unknown_rig_may_hit_late_and_a_stated_hit_delay_says_when() -> None:
+    # A hit at 280 ms, and a start at most 115 ms later.
+    unknown = share_of(starts_ms(StartPrior(USUAL), VALVE_SPACE), 330, 395)
+    stated = share_of(starts_ms(StartPrior(USUAL, hit_delay_ms=(280.0, 6.0)), VALVE_SPACE), 330, 395)
+    robot = share_of(starts_ms(StartPrior(USUAL, hit_delay_ms=(180.0, 6.0)), VALVE_SPACE), 330, 395)
+    assert robot < 0.02 < unknown < stated
+    assert stated == pytest.approx(65 / 115, abs=0.05)
+
+
+def test_from_the_impact_the_hit_delay_says_nothing() -> None:
+    told, untold = StartPrior(hit_delay_ms=(100.0, 6.0)), StartPrior()
+    torch.testing.assert_close(starts_ms(told, IMPACT_SPACE), starts_ms(untold, IMPACT_SPACE))
 
 
 def test_a_prior_that_trusts_no_stimulator_is_even_over_the_range() -> None:
     start = starts_ms(StartPrior(p_anywhere=1.0), VALVE_SPACE)
-    shares = torch.histc(start, 5, min=-50.0, max=500.0) / MANY
+    shares = torch.histc(start, 5, min=-100.0, max=500.0) / MANY
     assert (shares - 0.2).abs().max() < 0.02  # three SDs of a share are 0.009
 
 
-@pytest.mark.parametrize("space", [DesignSpace(400, 900, reference="valve"), DesignSpace(200, 400)])
-def test_where_no_start_is_expected_all_are_as_likely(space: DesignSpace) -> None:
-    start = starts_ms(StartPrior(), space)
-    shares = torch.histc(start, 5, min=space.low_ms - 50, max=space.high_ms) / MANY
+def test_where_no_start_is_expected_all_are_as_likely() -> None:
+    space = DesignSpace(900, 1300, reference="valve")
+    shares = torch.histc(starts_ms(StartPrior(), space), 5, min=space.low_ms - 100, max=space.high_ms) / MANY
     assert (shares - 0.2).abs().max() < 0.02
 
 
 def test_a_range_with_a_part_of_the_usual_starts_has_only_their_share_of_them() -> None:
-    space = DesignSpace(115, 315)  # of the usual starts, 0 to 115 ms, its 50 ms margin holds 50 / 115
-    start = starts_ms(StartPrior(p_anywhere=0.5), space)
+    space = DesignSpace(165, 365)  # of the usual starts, 0 to 115 ms, its 100 ms margin holds 50 / 115
+    start = starts_ms(StartPrior(USUAL, p_anywhere=0.5), space)
     usual = 0.5 * 50 / 115
-    in_margin = (usual + 0.5 * 50 / 250) / (usual + 0.5)
-    assert (start < 115).float().mean().item() == pytest.approx(in_margin, abs=0.015)
+    in_margin = (usual + 0.5 * 50 / 300) / (usual + 0.5)
+    assert share_of(start, 0, 115) == pytest.approx(in_margin, abs=0.015)
 
 
-def test_later_latents_are_later_starts() -> None:
-    assert (StartPrior().start_ms(torch.linspace(-4, 4, 100), VALVE_SPACE).diff() >= 0).all()
+def test_later_quantiles_are_later_starts() -> None:
+    assert (StartPrior().start_ms(torch.linspace(0.001, 0.999, 100), VALVE_SPACE).diff() >= 0).all()
+
+
+def test_the_density_is_that_of_the_starts_drawn() -> None:
+    prior = StartPrior()
+    starts = starts_ms(prior, VALVE_SPACE)
+    grid_ms = torch.linspace(-100, 500, 6001)
+    density = prior.log_density(grid_ms, VALVE_SPACE).exp()
+    for low_ms, high_ms in ((-100, 100), (180, 295), (350, 450)):
+        inside = (grid_ms >= low_ms) & (grid_ms <= high_ms)
+        mass = (density * inside).sum().item() * 0.1
+        assert share_of(starts, low_ms, high_ms) == pytest.approx(mass, abs=0.012)
+    assert torch.isinf(prior.log_density(torch.tensor([-101.0, 501.0]), VALVE_SPACE)).all()
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("wrong", "said"),
     [
-        {"p_anywhere": float("nan")},
-        {"p_anywhere": 1.5},
-        {"hit_delay_ms": (180.0, 0.0)},
-        {"after_impact_ms": (100.0, 5.0)},
-        {"after_impact_ms": (50.0, 50.0)},
+        ({"p_anywhere": float("nan")}, "p_anywhere"),
+        ({"p_anywhere": 1.5}, "p_anywhere"),
+        ({"p_robot": -0.1}, "p_robot"),
+        ({"hit_delay_ms": (180.0, 0.0)}, "hit_delay_ms"),
+        ({"spans": (Span(0.5, 0.0, 115.0),)}, "sum to 1"),
     ],
 )
-def test_an_impossible_prior_is_refused(wrong: dict[str, object]) -> None:
-    with pytest.raises(InvalidValueError, match=next(iter(wrong))):
+def test_an_invalid_prior_is_refused(wrong: dict[str, object], said: str) -> None:
+    with pytest.raises(InvalidValueError, match=said):
         StartPrior(**wrong)
+
+
+@pytest.mark.parametrize("wrong", [(1.0, 115.0, 0.0), (1.0, 0.0, 115.0, 0.0), (1.5, 0.0, 115.0)])
+def test_an_invalid_span_is_refused(wrong: tuple[float, ...]) -> None:
+    with pytest.raises(InvalidValueError):
+        Span(*wrong)

@@ -1,15 +1,16 @@
-"""Mixtures of components for a few named latents: what is usual of them, and what else may be."""
+"""Mixtures of components for blocks of latents: what is usual of them, and what else may be."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
 
 from isiw.models.protocol import Tensor
 
-__all__ = ["Mixture"]
+__all__ = ["JointMixture", "Mixture"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,15 +34,6 @@ class Mixture:
         laws = torch.tensor([latents for _, latents in components], device=device)
         return cls(shares / shares.sum(), laws[..., 0], laws[..., 1])
 
-    def sample(self, size: tuple[int, ...], generator: torch.Generator) -> Tensor:
-        """Draws, shape (*size, d)."""
-        normal = torch.randn((*size, self.means.shape[-1]), generator=generator, device=generator.device)
-        if len(self.shares) == 1:
-            return self.means[0] + self.sds[0] * normal
-        uniform = torch.rand(size, generator=generator, device=generator.device)
-        which = torch.bucketize(uniform, self.shares.cumsum(0)[:-1])
-        return self.means[which] + self.sds[which] * normal
-
     def log_parts(self, x: Tensor) -> Tensor:
         """Log density of each component times its share at x (..., d), shape (..., k)."""
         z = (x.unsqueeze(-2) - self.means) / self.sds
@@ -56,3 +48,44 @@ class Mixture:
     def component(self, x: Tensor) -> Tensor:
         """The component that most probably explains x (..., d), shape (...)."""
         return self.log_parts(x).argmax(-1)
+
+
+class JointMixture:
+    """Independent mixtures of several blocks of latents, computed at once.
+
+    Args:
+        blocks: one mixture a block; their latents follow each other.
+    """
+
+    def __init__(self, blocks: Sequence[Mixture]) -> None:
+        most = max(len(block.shares) for block in blocks)
+        # Missing components have no share, and the law of the first, so that nothing is infinite but their log share.
+        filled = [torch.arange(most).where(torch.arange(most) < len(block.shares), 0) for block in blocks]
+        shares = [torch.nn.functional.pad(b.shares, (0, most - len(b.shares))) for b in blocks]
+        self._means = torch.cat([block.means[rows] for block, rows in zip(blocks, filled, strict=True)], dim=-1)
+        self._sds = torch.cat([block.sds[rows] for block, rows in zip(blocks, filled, strict=True)], dim=-1)
+        sizes = torch.tensor([block.means.shape[-1] for block in blocks])
+        self._block = torch.repeat_interleave(torch.arange(len(blocks)), sizes)
+        self._belongs = torch.nn.functional.one_hot(self._block, len(blocks)).float()
+        self._below = torch.stack(shares).cumsum(-1)[:, :-1]
+        self._log_shares = torch.stack(shares, dim=-1).log() - self._sds.log() @ self._belongs
+
+    def sample(self, size: tuple[int, ...], generator: torch.Generator) -> Tensor:
+        """Draws, shape (*size, d)."""
+        device = generator.device
+        uniform = torch.rand((*size, len(self._below)), generator=generator, device=device)
+        component = (uniform.unsqueeze(-1) > self._below.to(device)).sum(-1)[..., self._block.to(device)]
+        latent = torch.arange(self._means.shape[-1], device=device)
+        means, sds = (law.to(device)[component, latent] for law in (self._means, self._sds))
+        normal = torch.randn((*size, self._means.shape[-1]), generator=generator, device=device)
+        return torch.addcmul(means, sds, normal)
+
+    def log_density(self, x: Tensor) -> Tensor:
+        """Log density but for a constant at x (..., d), shape (...)."""
+        means, sds, belongs, log_shares = (
+            law.to(x) for law in (self._means, self._sds, self._belongs, self._log_shares)
+        )
+        z = (x.unsqueeze(-2) - means) / sds
+        parts = torch.addmm(log_shares.repeat(x[..., 0].numel(), 1), z.square().flatten(0, -2), belongs, alpha=-0.5)
+        density: Tensor = torch.logsumexp(parts.view(*z.shape[:-1], -1), dim=-2).sum(-1)
+        return density

@@ -15,6 +15,7 @@ import torch
 
 from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
+from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
 from isiw.models.particles.likelihood import levels, total_log_likelihood
 from isiw.models.particles.moves import Mover
 from isiw.models.particles.noise import NoiseKind, Response, draw_log_mep, log_gain
@@ -39,7 +40,7 @@ class Moving:
     """How often particles move, and when they are resampled.
 
     Args:
-        sweeps: sweeps of Markov chain moves after each trial; up to five times as many among the first 25, whose
+        sweeps: sweeps of Markov chain moves after each trial; up to four times as many among the first 25, whose
             history is short and tells apart the particles most.
         max_trial_sweeps: sweeps times trials are at most this many, so that a tell stays fast late in a session.
         min_ess: effective sample size, as a share of the particles, below which they are resampled.
@@ -58,7 +59,7 @@ class Moving:
 
     def sweeps_after(self, trials: int) -> int:
         """How many sweeps follow a trial: more where the history is short, fewer where it has become long."""
-        early = min(5.0, max(1.0, 25 / max(1, trials)))
+        early = min(4.0, max(1.0, 25 / max(1, trials)))
         return min(int(self.sweeps * early), max(1, self.max_trial_sweeps // max(1, trials)))
 
 
@@ -121,12 +122,12 @@ class ParticleModel:
         """The posterior after one more trial."""
         after = self.reweighted(posterior, observation)
         generator = step_generator(self.device, posterior.seed, after.trials)
-        after = self._resampled(after, generator)
+        ess = ess_share(after.log_weights)
+        after = self._resampled(after, ess, generator)
         mover = Mover(self.prior, posterior.space, after.history, generator)
-        latents, log_likelihood = after.latents, after.log_likelihood
-        for _ in range(self.moves.sweeps_after(after.trials)):
-            latents, log_likelihood = mover.sweep(latents, log_likelihood)
-        return replace(after, latents=latents, log_likelihood=log_likelihood)
+        moved = mover.sweeps(self.moves.sweeps_after(after.trials), after.latents, after.log_likelihood)
+        health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))
+        return replace(after, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
         """Draw one person from the prior, and a MEP at each ISI; see `SimulatesPeople`."""
@@ -153,12 +154,11 @@ class ParticleModel:
             history=posterior.history.appended(trial),
         )
 
-    def _resampled(self, posterior: ParticlePosterior, generator: torch.Generator) -> ParticlePosterior:
+    def _resampled(self, posterior: ParticlePosterior, ess: Tensor, generator: torch.Generator) -> ParticlePosterior:
         """Resample those people whose effective sample size has fallen; nobody else notices."""
         # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
         shuffled = torch.randperm(self.particles, generator=generator, device=generator.device)
-        ess = torch.exp(-torch.logsumexp(2.0 * posterior.log_weights, dim=-1, keepdim=True))
-        worn = ess < self.moves.min_ess * self.particles
+        worn = (ess < self.moves.min_ess).unsqueeze(-1)
         if not bool(worn.any()):
             return posterior
         kept = torch.arange(self.particles, device=shuffled.device)
@@ -184,6 +184,7 @@ class ParticlePosterior:
         log_likelihood: of the history under each of them, shape (b, p).
         evidence: log marginal likelihood of the history [nat], shape (b,).
         history: the trials so far.
+        health: how the particles took the last trial; None before the first.
     """
 
     model: ParticleModel
@@ -194,6 +195,12 @@ class ParticlePosterior:
     log_likelihood: Tensor
     evidence: Tensor
     history: History
+    health: Health | None = None
+
+    @property
+    def trouble(self) -> str | None:
+        """What is wrong with the particles; see `ReportsTrouble`."""
+        return None if self.health is None else trouble_of(self.health)
 
     @property
     def trials(self) -> int:

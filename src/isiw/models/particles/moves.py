@@ -7,6 +7,7 @@ to another kind of profile, of noise, or to and from "no window", the latents co
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 
@@ -16,7 +17,7 @@ from isiw.models.particles.prior import PROFILE_BLOCKS, RESPONSE_BLOCKS, Latents
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 
-__all__ = ["Mover"]
+__all__ = ["Moved", "Mover"]
 
 JUMP_PROBABILITY = 0.3
 PART_PROBABILITY = (0.35, 0.35, 0.30)
@@ -28,6 +29,34 @@ whether there is a window, and all of it; where and how wide it is; what belongs
 
 BLUR = 0.02
 """SD of what is added to a difference, as a share of the usual SD of each latent."""
+
+
+class Moved(NamedTuple):
+    """Particles after sweeps of moves.
+
+    Args:
+        latents: the particles, fields of shape (b, p).
+        log_likelihood: of the history under each of them, shape (b, p).
+        shifts: share of the shifts that were accepted, shape (b,); NaN where there were none.
+        jumps: share of the jumps that were accepted, shape (b,); NaN where there were none.
+    """
+
+    latents: Latents
+    log_likelihood: Tensor
+    shifts: Tensor
+    jumps: Tensor
+
+
+class _Weighed(NamedTuple):
+    """Particles, the log likelihood of the history under each, and their log prior density; all (b, p)."""
+
+    latents: Latents
+    log_likelihood: Tensor
+    log_prior: Tensor
+
+    def part(self, which: slice) -> _Weighed:
+        latents = Latents(*(field[:, which] for field in self.latents))
+        return _Weighed(latents, self.log_likelihood[:, which], self.log_prior[:, which])
 
 
 @dataclass(frozen=True)
@@ -46,33 +75,44 @@ class Mover:
     history: History
     generator: torch.Generator
 
-    def sweep(self, latents: Latents, log_likelihood: Tensor) -> tuple[Latents, Tensor]:
-        """Move every particle once.
+    def sweeps(self, number: int, latents: Latents, log_likelihood: Tensor) -> Moved:
+        """Move every particle some times.
 
         Args:
+            number: how often.
             latents: particles, fields of shape (b, p); whatever weights they have, they keep.
             log_likelihood: of the history under each of them, shape (b, p).
         """
+        if not number:
+            return Moved(latents, log_likelihood, *torch.full((2, len(log_likelihood)), torch.nan))
         half = latents.present.shape[-1] // 2
-        for own, other in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
-            mine, theirs = (Latents(*(field[:, part] for field in latents)) for part in (own, other))
-            moved, likelihood = self._step(mine, theirs, log_likelihood[:, own])
-            latents = Latents(*(_replace(old, own, new) for old, new in zip(latents, moved, strict=True)))
-            log_likelihood = _replace(log_likelihood, own, likelihood)
-        return latents, log_likelihood
+        everyone = _Weighed(latents, log_likelihood, self.prior.log_density(latents.values, self.space))
+        first, second = everyone.part(slice(0, half)), everyone.part(slice(half, None))
+        counts = torch.zeros(4, len(log_likelihood), device=log_likelihood.device)
+        for _ in range(number):
+            first = self._step(first, second.latents, counts)
+            second = self._step(second, first.latents, counts)
+        latents = Latents(*(torch.cat(halves, dim=1) for halves in zip(first.latents, second.latents, strict=True)))
+        shifts, shifted, jumps, jumped = counts
+        log_likelihood = torch.cat((first.log_likelihood, second.log_likelihood), dim=1)
+        return Moved(latents, log_likelihood, shifted / shifts, jumped / jumps)
 
-    def _step(self, mine: Latents, theirs: Latents, log_likelihood: Tensor) -> tuple[Latents, Tensor]:
-        jumps = self._uniform(mine.present) < JUMP_PROBABILITY
-        shifted, jumped = self._shift(mine, theirs), self._jump(mine)
+    def _step(self, mine: _Weighed, theirs: Latents, counts: Tensor) -> _Weighed:
+        like = mine.log_likelihood
+        jumps = self._uniform(like) < JUMP_PROBABILITY
+        shifted, jumped = self._shift(mine.latents, theirs), self._jump(mine.latents)
         proposal = Latents(*(_choose(jumps, a, b) for a, b in zip(jumped, shifted, strict=True)))
+        log_likelihood = total_log_likelihood(self.prior.person(proposal), self.history)
+        log_prior = self.prior.log_density(proposal.values, self.space)
         # A jump draws from the prior, so that its density cancels.
-        densities = (self.prior.log_density(each.values, self.space) for each in (proposal, mine))
-        prior_ratio = next(densities) - next(densities)
-        proposed = total_log_likelihood(self.prior.person(proposal), self.history)
-        log_ratio = proposed - log_likelihood + torch.where(jumps, 0.0, prior_ratio)
-        accept = torch.log(self._uniform(mine.present)) < log_ratio
-        moved = Latents(*(_choose(accept, a, b) for a, b in zip(proposal, mine, strict=True)))
-        return moved, torch.where(accept, proposed, log_likelihood)
+        prior_ratio = torch.where(jumps, 0.0, log_prior - mine.log_prior)
+        accept = torch.log(self._uniform(like)) < log_likelihood - mine.log_likelihood + prior_ratio
+        counts += torch.stack([who.sum(-1) for who in (~jumps, accept & ~jumps, jumps, accept & jumps)])
+        return _Weighed(
+            Latents(*(_choose(accept, a, b) for a, b in zip(proposal, mine.latents, strict=True))),
+            torch.where(accept, log_likelihood, mine.log_likelihood),
+            torch.where(accept, log_prior, mine.log_prior),
+        )
 
     def _shift(self, mine: Latents, theirs: Latents) -> Latents:
         """Add a scaled difference of two of the others, in those latents that mean anything to the particle."""
@@ -131,9 +171,3 @@ def _drawn(probabilities: tuple[float, ...], uniform: Tensor) -> Tensor:
 
 def _choose(condition: Tensor, yes: Tensor, no: Tensor) -> Tensor:
     return torch.where(condition.unsqueeze(-1) if yes.dim() > condition.dim() else condition, yes, no)
-
-
-def _replace(old: Tensor, part: slice, new: Tensor) -> Tensor:
-    result = old.clone()
-    result[:, part] = new
-    return result

@@ -17,7 +17,7 @@ import torch
 from isiw.checks import check_numbers, check_probabilities, choice
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.particles.mixture import Mixture
+from isiw.models.particles.mixture import JointMixture, Mixture
 from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.places import Place, mixture_of
 from isiw.models.particles.shapes import Shape
@@ -459,6 +459,10 @@ class Prior:
         }
 
     @cached_property
+    def _joint(self) -> JointMixture:
+        return JointMixture(list(self.mixtures.values()))
+
+    @cached_property
     def spreads(self) -> Tensor:
         """Usual SD of each latent, shape (d,)."""
         first = self.profile.start.spans[0]
@@ -477,23 +481,24 @@ class Prior:
         size = (people, particles)
         uniform = torch.rand((4, *size), generator=generator, device=generator.device)
         start_ms = self.profile.start.start_ms(uniform[3], space).unsqueeze(-1)
-        values = [start_ms, *(self.mixtures[name].sample(size, generator) for name in BLOCKS if name != "start")]
+        values = torch.cat([start_ms, self._joint.sample(size, generator)], dim=-1)
         if self.profile.p_place:
-            anywhere = torch.cat([start_ms, values[1]], dim=-1)
-            known = torch.rand(size, generator=generator, device=generator.device) < self.profile.p_place
-            place = self._places.sample(size, generator)
-            values[:2] = [torch.where(known.unsqueeze(-1), place, anywhere)]
+            known = torch.rand((*size, 1), generator=generator, device=generator.device) < self.profile.p_place
+            place = JointMixture([self._places]).sample(size, generator)
+            values = torch.cat([torch.where(known, place, values[..., :2]), values[..., 2:]], dim=-1)
         shape, noise = _kinds(self.profile.shapes, uniform[0]), _kinds(self.noise, uniform[1])
-        return Latents(torch.cat(values, dim=-1), shape, noise, uniform[2] < self.profile.p_window)
+        return Latents(values, shape, noise, uniform[2] < self.profile.p_window)
 
     def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
-        """Log density of latents, shape (b, p).
+        """Log density of latents but for a constant, shape (b, p).
 
         Args:
             values: latents, shape (b, p, d).
             space: the design space that the window is in.
         """
-        return torch.stack(list(self.log_densities(values, space).values())).sum(0)
+        if not self.profile.p_place:
+            return self.profile.start.log_density(values[..., 0], space) + self._joint.log_density(values[..., 1:])
+        return torch.logsumexp(self.log_places(values, space), dim=-1) + self._beside_place.log_density(values[..., 2:])
 
     def log_densities(self, values: Tensor, space: DesignSpace) -> dict[str, Tensor]:
         """Log density of the latents of each block, shape (b, p); start and width are one: `"place"`.
@@ -504,9 +509,9 @@ class Prior:
         """
         sizes = [len(names) for names in BLOCKS.values()]
         parts = dict(zip(BLOCKS, torch.split(values, sizes, dim=-1), strict=True))
-        place = torch.logsumexp(self.log_places(values, space), dim=-1)
         others = {name: mixture for name, mixture in self.mixtures.items() if name != "width"}
-        return {"place": place} | {name: mixture.log_density(parts[name]) for name, mixture in others.items()}
+        place = {"place": torch.logsumexp(self.log_places(values, space), dim=-1)}
+        return place | {name: mixture.log_density(parts[name]) for name, mixture in others.items()}
 
     def log_places(self, values: Tensor, space: DesignSpace) -> Tensor:
         """Log density of start and width, times its probability: anywhere, and in each place, shape (b, p, 1 + k).
@@ -526,6 +531,10 @@ class Prior:
     @cached_property
     def _places(self) -> Mixture:
         return mixture_of(self.profile.places)
+
+    @cached_property
+    def _beside_place(self) -> JointMixture:
+        return JointMixture([mixture for name, mixture in self.mixtures.items() if name != "width"])
 
     @property
     def possible_muscles(self) -> tuple[Muscle, ...]:

@@ -17,11 +17,11 @@ import numpy as np
 
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import acquisition_named
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
 from isiw.models.protocol import ResponseModel
-from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, NoWindow, StoppingRule
+from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoWindow, SmallGain, StoppingRule
 from isiw.toml_files import checked
 
 __all__ = ["Asking", "Setting", "Settings", "Stopping", "settings_from", "settings_keys", "settings_values"]
@@ -108,6 +108,8 @@ class Stopping:
         max_trials: stop after this many stimuli; mistrials count.
         stop_width_ms: stop when the 90 % credible intervals of both edges are at most this wide [ms], under every kind
             of noise that is still probable where the model weighs more than one.
+        stop_expected_f1: stop when the expected F1 of the reported window is at least this.
+        stop_gain: stop, after 30 trials, when the last ten stimuli added less than this to the expected F1.
         stop_no_window: stop when "there is no window" is at least this probable.
 
     Raises:
@@ -116,16 +118,20 @@ class Stopping:
 
     max_trials: int = 80
     stop_width_ms: float = 30.0
-    stop_no_window: float = 0.9
+    stop_expected_f1: float = 0.9
+    stop_gain: float = 0.02
+    stop_no_window: float = 0.95
 
     def __post_init__(self) -> None:
         check_wholes(self, "max_trials", least=1)
         check_numbers(self, "stop_width_ms", above=0)
         check_numbers(self, "stop_no_window", above=0, most=1)
+        check_probabilities(self, "stop_expected_f1", "stop_gain")
 
     def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - the budget counts from the first stimulus
-        """Known well enough, no window, or the budget used up."""
-        return AnyOf((CredibleWidth(self.stop_width_ms), NoWindow(self.stop_no_window), Budget(self.max_trials)))
+        """Known well enough, nothing left to gain, no window, or the budget used up."""
+        known = CredibleWidth(self.stop_width_ms), ExpectedF1(self.stop_expected_f1), SmallGain(self.stop_gain)
+        return AnyOf((*known, NoWindow(self.stop_no_window), Budget(self.max_trials)))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,101 @@
+"""The default on people whom its prior was written for, and on people off the map.
+
+    python benchmarks/people.py --cohorts recruitment,gaussian --hit-delay stated --out benchmarks/results/people_stated
+
+writes tables (Markdown) and their figures with versions, command and seeds (JSON): F1 and coverage by trial, what the
+stopping rule comes to, and how well the expected F1 foretells the actual one. Sessions are kept in a folder beside the
+tables as they finish: the same command goes on where it was interrupted. Reported people come from seed 100,000 on;
+seeds below 1,000 are for work.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+import typer
+from rich.progress import Progress
+
+from acquisition import facts_of, run
+from isiw.studies import Study, StudyStrategy
+
+MARKS = (5, 10, 15, 20, 25, 30, 40, 50, 60)
+TENTHS = 10
+
+
+def by_trial(rows: pd.DataFrame) -> pd.DataFrame:
+    """F1 and coverage by cohort and trial, each with its standard error."""
+    found = rows.assign(called_none=~rows["reported_window"].astype(bool))
+    return _means(found.groupby(["cohort", "trial"]), ["f1", "expected_f1", "start_covered", "end_covered"]).assign(
+        called_none=found.groupby(["cohort", "trial"])["called_none"].mean()
+    )
+
+
+def at_stopping(rows: pd.DataFrame) -> pd.DataFrame:
+    """Stimuli, F1 and coverage by cohort where the stopping rule fired, or at the last trial where it did not."""
+    last = rows.sort_values("trial").groupby(["cohort", "person"]).tail(1)
+    stopped = last["stop_trial"].notna()
+    names = ["f1", "start_covered", "end_covered"]
+    values = {name: last[f"stop_{name}"].where(stopped, last[name]) for name in names}
+    ends = last.assign(**values, stimuli=last["stop_trial"].where(stopped, last["trial"]))
+    grouped = ends.groupby("cohort")
+    said_none = ends["stop_reason"].str.startswith("There is no window")
+    return _means(grouped, ["stimuli", *names]).assign(stopped_on_none=said_none.groupby(ends["cohort"]).mean())
+
+
+def foretold(rows: pd.DataFrame) -> pd.DataFrame:
+    """Expected against actual F1, by tenths of the expected."""
+    tenth = (rows["expected_f1"] * TENTHS).astype(int).clip(0, TENTHS - 1) / TENTHS
+    grouped = rows.groupby(tenth.rename("expected_from"))
+    people = rows.assign(tenth=tenth).groupby(["tenth", "cohort", "person"])["f1"].mean().groupby("tenth").size()
+    return _means(grouped, ["expected_f1", "f1"]).assign(sessions=people)
+
+
+def _means(groups: pd.core.groupby.DataFrameGroupBy, names: list[str]) -> pd.DataFrame:
+    means = groups[names].mean()
+    errors = groups[names].sem().add_suffix("_se")
+    both = pd.concat([groups.size().rename("n"), means, errors], axis=1)
+    return both[["n", *(column for name in names for column in (name, f"{name}_se"))]]
+
+
+def main(
+    cohorts: Annotated[str, typer.Option(help="Cohorts, comma-separated.")] = "recruitment,gaussian,nonresponder",
+    people: Annotated[int, typer.Option(help="People a cohort.")] = 100,
+    trials: Annotated[int, typer.Option(help="Trials a session.")] = 60,
+    seed: Annotated[int, typer.Option(help="Seed of the cohorts.")] = 100_000,
+    hit_delay: Annotated[str, typer.Option(help="Whether the rig's hit delay is stated or unstated.")] = "stated",
+    workers: Annotated[int, typer.Option(help="Processes.")] = 2,
+    out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("people"),
+) -> None:
+    """Run the default on simulated people."""
+    study = Study(
+        (StudyStrategy("default"),),
+        tuple(cohorts.split(",")),
+        people,
+        seed,
+        trials,
+        tuple(sorted({*(mark for mark in MARKS if mark <= trials), trials})),
+        engine="batched",
+        batch=25,
+        hit_delay=hit_delay,  # type: ignore[arg-type] # checked by the study
+    )
+    with Progress() as progress:
+        rows = run(study, out.with_suffix(".study"), workers, progress)
+    tables = {"By trial": by_trial(rows), "At the stopping rule": at_stopping(rows), "Expected F1": foretold(rows)}
+    facts = facts_of("benchmarks/people.py", seed, people)
+    header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
+    parts = [f"## {title}\n\n{part.to_markdown(floatfmt='.3f')}\n" for title, part in tables.items()]
+    out.with_suffix(".md").write_text("\n".join([header, "", *parts]))
+    records = {
+        title: json.loads(part.reset_index().to_json(orient="records", double_precision=6))
+        for title, part in tables.items()
+    }
+    out.with_suffix(".json").write_text(json.dumps({"facts": facts, **records}, indent=1))
+
+
+if __name__ == "__main__":
+    np.seterr(all="raise", under="ignore")
+    typer.run(main)

@@ -1,0 +1,58 @@
+"""When particles no longer represent the posterior."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+import isiw
+from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
+from isiw.subjects.cohorts import cohort
+
+
+def health(*, ess: float = 0.5, shifts: float = 0.3, distinct: float = 0.9) -> Health:
+    return Health(*(torch.tensor([0.5, value]) for value in (ess, shifts, 0.2, distinct)))
+
+
+def test_the_effective_sample_size_counts_equal_weights() -> None:
+    log_weights = torch.tensor([[0.5, 0.5, 0.0, 0.0], [0.25, 0.25, 0.25, 0.25]]).log()
+    torch.testing.assert_close(ess_share(log_weights), torch.tensor([0.5, 1.0]))
+
+
+def test_copies_of_a_particle_count_once() -> None:
+    torch.testing.assert_close(distinct_share(torch.tensor([[-1.0, -2.0, -1.0, -1.0]])), torch.tensor([0.5]))
+
+
+def test_sound_particles_are_no_trouble() -> None:
+    assert trouble_of(health()) is None
+    assert trouble_of(health(shifts=math.nan)) is None
+
+
+@pytest.mark.parametrize(
+    ("bad", "said"),
+    [({"ess": 0.001}, "contradicts"), ({"shifts": 0.001}, "hardly move"), ({"distinct": 0.1}, "too much alike")],
+)
+def test_each_trouble_of_any_person_is_said(bad: dict[str, float], said: str) -> None:
+    assert said in (trouble_of(health(**bad)) or "")
+
+
+def test_an_amplifier_whose_unit_changes_is_told_as_a_contradiction() -> None:
+    # 20 MEPs of some 10 µV, then one a thousand times as large.
+    rng, strategy = np.random.default_rng(0), isiw.make_strategy(seed=1)
+    for isi_ms in np.linspace(120, 460, 20).tolist():
+        strategy.tell(isi_ms, 0.01 * math.exp(0.2 * rng.standard_normal()))
+        assert strategy.trouble is None
+    strategy.tell(250.0, 10.0)
+    assert "contradicts what was believed" in (strategy.trouble or "")
+
+
+@pytest.mark.parametrize("name", ["recruitment", "outliers", "nonresponder"])
+def test_people_as_they_are_cause_no_trouble(name: str) -> None:
+    strategy, responder = isiw.make_strategy(seed=2), cohort(name, 1, 3)[0].begin(1)
+    for _ in range(15):
+        isi_ms = strategy.ask()
+        strategy.tell(isi_ms, responder.respond(isi_ms, "valve").mep_mv)
+        assert strategy.trouble is None
