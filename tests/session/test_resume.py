@@ -415,7 +415,7 @@ def test_a_measured_zero_and_its_uncertainty_are_replayed(log: Path) -> None:
     assert [trial.isi_sd_ms for trial in session.trials] == [2.0, 2.0]
 
 
-def cut_at_a_records_end(log, trials) -> None:
+def cut_at_a_records_end(log: Path, trials: int) -> None:
     """What is left of a closed log that was copied in part: so many trials, and no end."""
     whole = log.read_bytes()
     blocks = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
@@ -423,7 +423,7 @@ def cut_at_a_records_end(log, trials) -> None:
 
 
 @pytest.fixture
-def cut(scripted_strategy, scripted_device, log):
+def cut(scripted_strategy: Any, scripted_device: Any, log: Path) -> Any:
     """A closed log of six trials, of which the last two were cut off."""
     Session(scripted_device(), scripted_strategy(6), log=log).run()
     cut_at_a_records_end(log, 4)
@@ -432,7 +432,7 @@ def cut(scripted_strategy, scripted_device, log):
 
 
 def test_a_log_without_its_end_does_not_go_on_before_somebody_says_how_many_stimuli_it_lost(
-    cut, scripted_strategy, scripted_device
+    cut: int, scripted_strategy: Any, scripted_device: Any
 ) -> None:
     before = cut.read_bytes()
     with pytest.raises(DamagedLogError, match=r"end is missing.*stimulator's counter.*--lost-pulses"):
@@ -443,7 +443,7 @@ def test_a_log_without_its_end_does_not_go_on_before_somebody_says_how_many_stim
 
 
 def test_the_stimuli_of_a_lost_end_are_counted_and_their_numbers_not_used_again(
-    cut, scripted_strategy, scripted_device
+    cut: int, scripted_strategy: Any, scripted_device: Any
 ) -> None:
     device = scripted_device()
     result = resume(cut, device, scripted_strategy(10), lost_pulses=2).run()
@@ -455,17 +455,19 @@ def test_the_stimuli_of_a_lost_end_are_counted_and_their_numbers_not_used_again(
 
 
 @pytest.mark.parametrize("pulses", [-1, 1.5, "2", True, 10**9])
-def test_lost_pulses_are_a_number_of_stimuli(cut, scripted_strategy, scripted_device, pulses) -> None:
+def test_lost_pulses_are_a_number_of_stimuli(
+    cut: int, scripted_strategy: Any, scripted_device: Any, pulses: Any
+) -> None:
     with pytest.raises(InvalidValueError, match="lost_pulses"):
         resume(cut, scripted_device(), scripted_strategy(10), lost_pulses=pulses)
 
 
-def test_a_log_with_its_end_has_lost_no_pulses(interrupted, scripted_strategy, scripted_device) -> None:
+def test_a_log_with_its_end_has_lost_no_pulses(interrupted: Any, scripted_strategy: Any, scripted_device: Any) -> None:
     with pytest.raises(InvalidValueError, match="this one's is there"):
         resume(interrupted, scripted_device(), scripted_strategy(10), lost_pulses=1)
 
 
-def test_excluding_a_trial_of_a_damaged_log_says_in_the_log_what_was_lost(interrupted) -> None:
+def test_excluding_a_trial_of_a_damaged_log_says_in_the_log_what_was_lost(interrupted: Any) -> None:
     whole = bytearray(interrupted.read_bytes())
     block = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)][6]
     whole[block + 30] ^= 1

@@ -101,6 +101,6 @@ def test_from_python_what_cannot_be_is_refused_as_well() -> None:
 
 
 @pytest.mark.parametrize("changed", [{"people": 10**9}, {"trials": 10**9}, {"batch": 10**9}, {"people": 300_000}])
-def test_a_study_that_could_not_even_be_listed_is_refused(changed) -> None:
+def test_a_study_that_could_not_even_be_listed_is_refused(changed: Any) -> None:
     with pytest.raises(InvalidValueError, match="at most"):
         tiny(**changed)
