@@ -3,6 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -22,7 +23,7 @@ def test_each_quantity_has_a_panel_with_both_priors_as_they_were_given(table: An
     shown = [axes for axes in prior_figure(table).axes if axes.get_visible()]
     assert [axes.get_title(loc="left") for axes in shown] == ["start [ms]", "width [ms]"]
     assert [axes.get_xscale() for axes in shown] == ["linear", "log"]
-    assert list(shown[0].lines[0].get_ydata()) == [0.0, 0.9, 0.0]
+    assert np.asarray(shown[0].lines[0].get_ydata()).tolist() == [0.0, 0.9, 0.0]
     assert shown[0].get_legend_handles_labels()[1] == ["built-in", "this lab"]
 
 

@@ -14,7 +14,10 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session
 from isiw.models.particles.prior import Prior
+from isiw.subjects.profiles import PeakProfile
+from isiw.subjects.responses import GainResponse
 from isiw.subjects.subject import SimulatedSubject
+from known import instance, known
 from priors.logged import gaussian_person, write_log
 
 EARLY_MS, LATE_MS = 20.0, 200.0
@@ -23,8 +26,9 @@ EARLY_MS, LATE_MS = 20.0, 200.0
 def person(start_ms: float = EARLY_MS, gain: float = 3.0) -> SimulatedSubject:
     """A person whose MEPs tell much, with the window elsewhere."""
     usual = gaussian_person()
-    response = replace(usual.response, gain_mv=gain * usual.response.gain_mv)
-    return replace(usual, profile=replace(usual.profile, start_ms=start_ms, width_ms=110.0), response=response)
+    response = instance(GainResponse, usual.response)
+    profile = replace(instance(PeakProfile, usual.profile), start_ms=start_ms, width_ms=110.0)
+    return replace(usual, profile=profile, response=replace(response, gain_mv=gain * response.gain_mv))
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +51,7 @@ def starts_ms(prior: Prior) -> torch.Tensor:
 
 
 def test_seven_in_ten_windows_are_expected_about_the_first_days(next_day: Any) -> None:
-    truth = person().window(VALVE_SPACE)
+    truth = known(person().window(VALVE_SPACE))
     near = (starts_ms(next_day) - truth.start_ms).abs() < 40.0
     usually = (starts_ms(Prior()) - truth.start_ms).abs() < 40.0
     assert near.float().mean() > 0.6 + 0.25 * usually.float().mean()

@@ -17,6 +17,7 @@ from isiw.errors import LogError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.session.loop import Session
 from isiw.session.resume import exclude, resume
+from scripted import ScriptedDevice, scripted_strategy
 from session.crashes import Ending, run_until
 
 if not hasattr(os, "fork"):
@@ -32,8 +33,6 @@ class Bench:
 
     folder: Path
     ledger: Path
-    strategy: object
-    device: object
 
     @property
     def log(self) -> Path:
@@ -47,15 +46,15 @@ class Bench:
                 file.write(f"{stimulus.trial}\n")
             return usual(stimulus)
 
-        device = self.device()
+        device = ScriptedDevice()
         usual, device.answer = device.answer, answer
         return device
 
     def run(self, on_trial: Any = None) -> Any:
-        return Session(self.session_device(), self.strategy(TRIALS), log=self.log, on_trial=on_trial).run()
+        return Session(self.session_device(), scripted_strategy(TRIALS), log=self.log, on_trial=on_trial).run()
 
     def resume(self) -> Any:
-        return resume(self.log, self.session_device(), self.strategy(TRIALS)).run()
+        return resume(self.log, self.session_device(), scripted_strategy(TRIALS)).run()
 
     def exclude(self) -> None:
         exclude(self.log, 1, "sneezed")
@@ -99,10 +98,10 @@ SCENARIOS = {
 
 
 @pytest.fixture
-def bench(tmp_path: Path, scripted_strategy: Any, scripted_device: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Makes the bench of one scenario, again and again the same."""
     monkeypatch.setattr(os, "fsync", lambda _: None)  # which bytes stay is said by the test, not by this disk
-    made = Bench(tmp_path / "bench" / "logs", tmp_path / "bench" / "ledger", scripted_strategy, scripted_device)
+    made = Bench(tmp_path / "bench" / "logs", tmp_path / "bench" / "ledger")
 
     def make(prepare: Any) -> Bench:
         if not (tmp_path / "prepared").exists():
@@ -120,9 +119,9 @@ def bench(tmp_path: Path, scripted_strategy: Any, scripted_device: Any, monkeypa
 
 
 @pytest.fixture
-def asks(scripted_strategy: Any, scripted_device: Any, tmp_path: Path) -> Any:
+def asks(tmp_path: Path) -> Any:
     """What an undisturbed session asks."""
-    result = Session(scripted_device(), scripted_strategy(TRIALS), log=tmp_path / "undisturbed.mcap").run()
+    result = Session(ScriptedDevice(), scripted_strategy(TRIALS), log=tmp_path / "undisturbed.mcap").run()
     return [trial.commanded_isi_ms for trial in result.trials]
 
 

@@ -362,19 +362,27 @@ def test_kim11_cycles_over_its_eleven_people_and_ignores_the_seed() -> None:
     assert cohort("kim11", 25, 0)[11:22] == cohort("kim11", 11, 0)
 
 
+def peak(subject: SimulatedSubject) -> PeakProfile:
+    return instance(PeakProfile, subject.profile)
+
+
+def curve(subject: SimulatedSubject) -> RecruitmentResponse:
+    return instance(RecruitmentResponse, subject.response)
+
+
 @pytest.mark.parametrize("name", LABS)
 def test_the_people_of_a_lab_have_its_law(name: str) -> None:
     law, drawn = lab(name, 3), people(name)
     normal = {
-        law.start_ms: [s.profile.start_ms for s in drawn],
+        law.start_ms: [peak(s).start_ms for s in drawn],
         law.hit_delay_ms: [s.hit_delay_ms for s in drawn],
     }
     for (mean, sd), values in normal.items():
         assert stats.kstest(values, stats.norm(mean, sd).cdf).pvalue > KS_LEVEL
-    assert_clipped_log_normal([s.profile.width_ms for s in drawn], *law.width_ms, (40, 230))
-    assert_log_normal([s.response.amplitude_mv for s in drawn], *law.amplitude_mv)
-    assert_log_normal([s.response.boost_pct_rmt for s in drawn], *law.boost_pct_rmt)
-    assert_log_normal([s.response.sigma_x_pct_rmt for s in drawn], *law.sigma_x_pct_rmt)
+    assert_clipped_log_normal([peak(s).width_ms for s in drawn], *law.width_ms, (40, 230))
+    assert_log_normal([curve(s).amplitude_mv for s in drawn], *law.amplitude_mv)
+    assert_log_normal([curve(s).boost_pct_rmt for s in drawn], *law.boost_pct_rmt)
+    assert_log_normal([curve(s).sigma_x_pct_rmt for s in drawn], *law.sigma_x_pct_rmt)
     assert_log_normal([s.response.floor.median_mv for s in drawn], *law.floor_mv)
 
 
@@ -389,19 +397,19 @@ def test_sessions_of_another_day_come_in_pairs_of_one_person() -> None:
     first, second = people("another-day")[::2], people("another-day")[1::2]
     for kept in ("hit_delay_ms", "hit_delay_sd_ms", "input_correlation"):
         assert [getattr(s, kept) for s in first] == [getattr(s, kept) for s in second]
-    assert [s.response.boost_pct_rmt for s in first] == [s.response.boost_pct_rmt for s in second]
+    assert [curve(s).boost_pct_rmt for s in first] == [curve(s).boost_pct_rmt for s in second]
 
 
 def test_another_day_the_window_has_shifted_or_is_anyones() -> None:
     first, second = cohort("another-day", 2 * PEOPLE, 3)[::2], cohort("another-day", 2 * PEOPLE, 3)[1::2]
-    stayed = np.array([a.profile.width_ms == b.profile.width_ms for a, b in zip(first, second, strict=True)])
+    stayed = np.array([peak(a).width_ms == peak(b).width_ms for a, b in zip(first, second, strict=True)])
     assert stayed.mean() == pytest.approx(0.7, abs=4 * math.sqrt(0.21 / PEOPLE))
-    shift_ms = np.array([b.profile.start_ms - a.profile.start_ms for a, b in zip(first, second, strict=True)])
+    shift_ms = np.array([peak(b).start_ms - peak(a).start_ms for a, b in zip(first, second, strict=True)])
     assert stats.kstest(shift_ms[stayed] / 12.0, stats.norm.cdf).pvalue > KS_LEVEL
-    assert_uniform([b.profile.start_ms for b, same in zip(second, stayed, strict=True) if not same], 5, 110)
-    x50 = [b.response.x50_pct_rmt - a.response.x50_pct_rmt for a, b in zip(first, second, strict=True)]
+    assert_uniform([peak(b).start_ms for b, same in zip(second, stayed, strict=True) if not same], 5, 110)
+    x50 = [curve(b).x50_pct_rmt - curve(a).x50_pct_rmt for a, b in zip(first, second, strict=True)]
     assert stats.kstest(np.array(x50) / 3.0, stats.norm.cdf).pvalue > KS_LEVEL
-    amplitude = [b.response.amplitude_mv / a.response.amplitude_mv for a, b in zip(first, second, strict=True)]
+    amplitude = [curve(b).amplitude_mv / curve(a).amplitude_mv for a, b in zip(first, second, strict=True)]
     assert_log_normal(amplitude, 1.0, 0.4)
 
 
