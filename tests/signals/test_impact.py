@@ -85,7 +85,7 @@ def test_other_sampling_rates_find_the_same_impact(render, rate_hz) -> None:
         (np.ones((2, 2, 5000)), 5000.0, "vector"),
     ],
 )
-def test_what_is_no_recording_is_an_error_and_never_a_number(waves, rate_hz, what) -> None:
+def test_what_is_not_a_recording_is_an_error_and_never_a_number(waves, rate_hz, what) -> None:
     with pytest.raises(InvalidValueError, match=what):
         impact_time(waves, rate_hz)
 

@@ -97,7 +97,7 @@ def test_paired_sessions_cross_strategies_cohorts_and_people() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"trials": 0}, {"person": -1}])
-def test_a_session_that_cannot_be_is_refused(wrong) -> None:
+def test_an_invalid_session_is_refused(wrong) -> None:
     values = {"strategy": "even", "cohort": "gaussian", "person": 0, "seed": 0, "trials": 3, "marks": (3,)}
     with pytest.raises(InvalidValueError):
         SimulatedSession(**(values | wrong))
