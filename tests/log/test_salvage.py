@@ -108,7 +108,7 @@ def test_without_its_first_block_a_log_still_has_its_header(finished_log: Path) 
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAP0\r\n", bytes(5000)])
-def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_what_is_not_a_log_is_refused(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "s.mcap").write_bytes(content)
     with pytest.raises(DamagedLogError):
         read_session(tmp_path / "s.mcap")
@@ -127,7 +127,7 @@ def test_the_part_is_read_where_there_are_both(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", ["", ".", "/", 300 * "s"])
-def test_what_can_be_no_file_is_an_error_of_its_own(path: str) -> None:
+def test_a_name_that_cannot_be_a_file_is_an_error_of_its_own(path: str) -> None:
     with pytest.raises(LogError):
         salvage(path)
 

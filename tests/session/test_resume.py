@@ -326,7 +326,7 @@ def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted: Path) 
     assert len(read_session(interrupted).table) == 10
 
 
-def test_what_is_no_log_cannot_be_resumed(tmp_path: Path) -> None:
+def test_what_is_not_a_log_cannot_be_resumed(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="no such log"):
         resume(tmp_path / "nothing.mcap", ScriptedDevice())
 

@@ -95,7 +95,7 @@ def test_an_unknown_strategy_is_told_with_the_known_ones(tmp_path: Path) -> None
         load_study(tmp_path / "study.toml")
 
 
-def test_from_python_what_cannot_be_is_refused_as_well() -> None:
+def test_from_python_invalid_values_are_refused_as_well() -> None:
     with pytest.raises(InvalidValueError, match="engine is unknown"):
         Study((StudyStrategy("even"),), ("wide",), engine=cast("Any", "fast"))
 

@@ -211,8 +211,8 @@ def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
         name: one of `COHORTS`.
         n: how many people. `kim11` has eleven, and cycles: its sessions differ in trial noise only. Of `another-day`
             every two, from the first on, are one person on two days.
-        seed: seed of the people, and of the lab in a cohort of one lab; 0–999 are for development, reported figures use 10,000
-            and above.
+        seed: seed of the people, and of the lab in a cohort of one lab; 0–999 are for development, reported figures use
+            10,000 and above.
 
     Raises:
         InvalidValueError: an unknown name, or a negative number.
