@@ -106,7 +106,7 @@ def settings_for(name: str, **settings: Any) -> Settings:
         ConfigError: a nested key or value that cannot be used.
         InvalidValueError: an invalid value.
     """
-    if name not in _CATALOGUE:
+    if not isinstance(name, str) or name not in _CATALOGUE:
         raise StrategyError("unknown strategy", got=name, expected=", ".join(_CATALOGUE))
     entry = _CATALOGUE[name]
     family = pkgutil.resolve_name(f"isiw.strategy.settings.{entry.family}")

@@ -63,7 +63,7 @@ class Strategy:
 
     Raises:
         StrategyError: the model's posterior lacks a capability that the acquisition function needs.
-        InvalidValueError: an initial ISI that is not a finite number.
+        InvalidValueError: no design space, or an initial ISI that is not a finite number.
     """
 
     def __init__(
@@ -78,6 +78,8 @@ class Strategy:
         seed: int = 0,
         recipe: Recipe | None = None,
     ) -> None:
+        if not isinstance(space, DesignSpace):
+            raise InvalidValueError("a strategy needs a design space", got=space, expected="an isiw.DesignSpace")
         self.space, self.model, self.acquisition, self.stopping = space, model, acquisition, stopping
         self.initial_ms = tuple(space.snap(isi_ms) for isi_ms in initial_ms)
         self.recipe = recipe or Recipe(name="", seed=seed)
