@@ -205,3 +205,21 @@ def test_a_setting_of_the_dissertations_that_cannot_be_is_refused(
 ) -> None:
     with pytest.raises(InvalidValueError, match=what):
         make_strategy(name, **settings)
+
+
+@pytest.mark.parametrize("name", [None, [], {}, 5])
+def test_a_name_of_another_type_is_unknown(name) -> None:
+    with pytest.raises(StrategyError, match="unknown strategy"):
+        make_strategy(name)
+
+
+@pytest.mark.parametrize("space", [None, "valve", (0, 500)])
+def test_what_is_no_design_space_is_refused(space) -> None:
+    with pytest.raises(InvalidValueError, match=r"needs a design space.*isiw.DesignSpace"):
+        make_strategy("incremental", space)
+
+
+@pytest.mark.parametrize("setting", ["particles", "initial_trials", "max_trials"])
+def test_a_setting_that_would_fill_the_memory_is_refused_at_once(setting) -> None:
+    with pytest.raises(InvalidValueError, match=rf"the setting {setting} of random must be .*at most"):
+        make_strategy("random", **{setting: 10**9})

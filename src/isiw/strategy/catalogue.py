@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from isiw.checks import whole
-from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.design import VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import StrategyError
 from isiw.strategy.settings.common import Settings, settings_from, settings_values
 from isiw.strategy.strategy import Recipe, Strategy
@@ -126,10 +126,11 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
     Raises:
         StrategyError: an unknown name or setting, or an acquisition function that cannot work with the model.
         ConfigError: a nested key or value that cannot be used.
-        InvalidValueError: an invalid seed or setting.
+        InvalidValueError: an invalid seed or setting, or no design space.
     """
     seed = whole("the seed", seed, least=0)
     chosen = settings_for(name, **settings)
+    require_space(space)
     initial_ms = chosen.asking.initial_ms(space)
     return Strategy(
         space,

@@ -173,7 +173,7 @@ def test_one_gaussian_needs_no_second_amplitude() -> None:
     assert fit(isi_ms, bell_mv(isi_ms)).amplitudes_mv == pytest.approx((float(bell_mv(isi_ms).max()),), rel=0.05)
 
 
-@pytest.mark.parametrize("high_ms", [5.0, 20.0, 50.0, 54.0])
+@pytest.mark.parametrize("high_ms", [5.0, 20.0, 50.0])
 def test_two_gaussians_are_fitted_in_a_range_that_is_narrower_than_a_window(high_ms) -> None:
     space, rng = DesignSpace(0, high_ms, 1.0), np.random.default_rng(2)
     isi_ms = np.linspace(0, high_ms, 12)
