@@ -218,3 +218,22 @@ def test_a_regression_gives_up_after_99_iterations(name: str) -> None:
 def test_an_invalid_setting_of_the_dissertations_is_refused(name: str, settings: dict[str, Any], what: str) -> None:
     with pytest.raises(InvalidValueError, match=what):
         make_strategy(name, **settings)
+
+
+@pytest.mark.parametrize("name", [None, [], {}, 5])
+def test_a_name_of_another_type_is_unknown(name: str) -> None:
+    with pytest.raises(StrategyError, match="unknown strategy"):
+        make_strategy(name)
+
+
+@pytest.mark.parametrize("space", [None, "valve", (0, 500)])
+def test_what_is_no_design_space_is_refused(space: DesignSpace) -> None:
+    with pytest.raises(InvalidValueError, match=r"needs a design space.*isiw.DesignSpace"):
+        make_strategy("incremental", space)
+
+
+@pytest.mark.parametrize("setting", ["particles", "initial_trials", "max_trials"])
+def test_a_setting_that_would_fill_the_memory_is_refused_at_once(setting: str) -> None:
+    huge: dict[str, Any] = {setting: 10**9}
+    with pytest.raises(InvalidValueError, match=rf"the setting {setting} of random must be .*at most"):
+        make_strategy("random", **huge)
