@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import shutil
+import threading
 import time
 from pathlib import Path
 from types import TracebackType
@@ -36,6 +37,7 @@ class LogWriter:
     def __init__(self, path: Path, file: DurableFile) -> None:
         self.path = path
         self._file = file
+        self._lock = threading.RLock()
         # Its annotation asks for a whole file; write, tell and flush are what it uses.
         self._writer = Writer(cast("IO[bytes]", file), enable_data_crcs=True)
         self._channels: dict[str, int] = {}
@@ -131,21 +133,55 @@ class LogWriter:
             channel_name: the channel, for a waveform.
         """
         topic = topic_of(record, channel_name)
-        self._copy(Message(topic, encode(topic, record), time.time_ns()))
+        data = encode(topic, record)
+        with self._lock:
+            self._copy(Message(topic, data, time.time_ns()))
 
     def sync(self) -> None:
         """Return when everything appended is on the disk."""
-        self._writer.flush()
-        self._file.sync()
+        with self._lock:
+            self._writer.flush()
+            self._file.sync()
 
-    def close(self) -> None:
-        """Finish the log and give it its name.
+    def require_in_place(self) -> None:
+        """Raise where what was synced is no longer at the log's path; to be called after `sync`.
 
         Raises:
-            LogError: somebody has put a file there meanwhile; the log stays `FILE.part`.
+            LogError: the file is gone, shorter or longer, or another one is in its place.
         """
+        with self._lock:
+            displacement = self._file.displacement()
+        if displacement is not None:
+            raise LogError(
+                f"the log is no longer as it was written: {displacement}",
+                got=str(self._file.path),
+                remedy="Nothing more is delivered. What can be saved of it is saved when the session ends.",
+            )
+
+    def discard(self) -> None:
+        """Remove a log in which there is nothing to keep."""
+        with self._lock:
+            in_place = self._file.displacement() is None
+            self._file.close()
+            if in_place:
+                self._file.path.unlink()
+
+    def close(self) -> None:
+        """Finish the log and give it its name; nothing happens where it is closed already.
+
+        Raises:
+            LogError: somebody has put a file there meanwhile, and the log stays `FILE.part`; or the log is no longer
+                at its path, and the message says where a copy is.
+        """
+        with self._lock:
+            if not self._file.closed:
+                self._close()
+
+    def _close(self) -> None:
         try:
             self._writer.finish()
+            self._file.sync()
+            self._save_if_displaced()
         finally:
             self._file.close()
         if self.path.exists() and not self._replaces:
@@ -154,8 +190,16 @@ class LogWriter:
                 got=str(self.path),
                 remedy=f"The log is complete and stays at {self._file.path}.",
             )
-        self._file.path.replace(self.path)
-        sync_folder(self.path.parent)
+        self._file.rename(self.path)
+
+    def _save_if_displaced(self) -> None:
+        displacement = self._file.displacement()
+        if displacement is not None:
+            raise LogError(
+                f"the log is no longer as it was written: {displacement}",
+                got=str(self._file.path),
+                remedy=f"What the session still held of it is in {self._file.rescued(self.path)}.",
+            )
 
     def __enter__(self) -> Self:
         return self

@@ -290,6 +290,7 @@ class Session:
         self._device.check(stimulus)
         self._log.append(Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=self._clock.now_s()))
         self._log.sync()
+        self._log.require_in_place()
         trial = Trial.unknown(stimulus)
         try:
             with self._interrupts.allowed():
