@@ -100,6 +100,19 @@ class ScriptedDevice:
         self.calls.append("unstage")
 
 
+class FakeRealClock:
+    """What a session takes for a real clock, without the waiting."""
+
+    def __init__(self) -> None:
+        self.time_s = 100.0
+
+    def now_s(self) -> float:
+        return self.time_s
+
+    def sleep_s(self, duration_s: float) -> None:
+        self.time_s += max(0.0, duration_s)
+
+
 def make_scripted_strategy(max_trials: int = 6, seed: int = 0, space: DesignSpace = SPACE) -> Strategy:
     return Strategy(space, RememberingModel(), WantedIsi(), Budget(max_trials), seed=seed)
 
@@ -119,6 +132,12 @@ def scripted_strategy() -> Callable[..., Strategy]:
 def scripted_device() -> type[ScriptedDevice]:
     """A device that answers as it is told to."""
     return ScriptedDevice
+
+
+@pytest.fixture
+def real_clock() -> FakeRealClock:
+    """A clock for devices that do not declare themselves simulated."""
+    return FakeRealClock()
 
 
 @pytest.fixture(scope="session")

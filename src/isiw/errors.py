@@ -9,7 +9,9 @@ Every message says what is wrong, what was got, what was expected, and the way o
     ├── StrategyError (ValueError)        a strategy that cannot be built, or not from these parts
     ├── DeviceError                       a device that failed, refused, or did not answer
     │   ├── LimitExceededError            a stimulus refused by a limit, before anything was delivered
-    │   └── DeviceTimeoutError            no answer within the time allowed
+    │   ├── NotDelivered                  a stimulus that the device refused before firing; it may be tried again
+    │   ├── DeviceTimeoutError            no answer within the time allowed
+    │   └── StillArmedError               a device that cannot be disarmed
     ├── StudyError                        a study that cannot go on, or whose folder is another one's
     └── LogError                          a log that cannot be written or read
         └── DamagedLogError               a log that ends too early or fails its checksums
@@ -65,8 +67,16 @@ class LimitExceededError(DeviceError):
     """A stimulus that a limit refused before anything was delivered."""
 
 
+class NotDelivered(DeviceError):  # noqa: N818 - an outcome; that nothing was given is what it says
+    """A stimulus that the device refused before firing: nothing was given, nothing counts, it may be tried again."""
+
+
 class DeviceTimeoutError(DeviceError):
     """A device that did not answer within the time allowed."""
+
+
+class StillArmedError(DeviceError):
+    """A device that could not be disarmed, however often it was tried."""
 
 
 class StudyError(IsiwError):

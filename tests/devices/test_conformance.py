@@ -9,7 +9,8 @@ import pytest
 
 from isiw.devices.callback import CallbackDevice
 from isiw.devices.clock import MonotonicClock, VirtualClock
-from isiw.devices.limits import LimitedDevice, Limits
+from isiw.devices.limited import LimitedDevice
+from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.recorded import RecordedPerson, Recordings
 from isiw.devices.replay import RecordedTrials

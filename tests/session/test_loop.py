@@ -130,14 +130,20 @@ def test_the_raw_sweeps_are_logged(scripted_strategy, scripted_device, log) -> N
 
 def test_a_simulated_session_does_not_sleep_through_its_intervals(scripted_strategy, scripted_device, log) -> None:
     Session(scripted_device(), scripted_strategy(4), log=log).run()
-    assert [intent.t_s for intent in read_session(log).intents] == [0.0, 5.0, 10.0, 15.0]
+    assert [intent.t_s for intent in read_session(log).intents] == [5.0, 10.0, 15.0, 20.0]
 
 
-def test_the_interval_between_trials_is_waited_for(scripted_strategy, scripted_device, log, space) -> None:
-    clock = VirtualClock(100.0)
+def test_the_interval_between_trials_is_waited_for_before_the_first_one_too(
+    scripted_strategy, scripted_device, log, space, real_clock
+) -> None:
     limits = Limits.of_space(space, min_iti_s=7.5)
-    Session(scripted_device(simulated=False), scripted_strategy(3), log=log, clock=clock, limits=limits).run()
-    assert [intent.t_s for intent in read_session(log).intents] == [100.0, 107.5, 115.0]
+    Session(scripted_device(simulated=False), scripted_strategy(3), log=log, clock=real_clock, limits=limits).run()
+    assert [intent.t_s for intent in read_session(log).intents] == [107.5, 115.0, 122.5]
+
+
+def test_a_virtual_clock_is_refused_where_somebody_may_be_stimulated(scripted_strategy, scripted_device, log) -> None:
+    with pytest.raises(DeviceError, match=r"does not wait between stimuli.*simulated=True"):
+        Session(scripted_device(simulated=False), scripted_strategy(3), log=log, clock=VirtualClock())
 
 
 def test_the_limit_of_pulses_ends_the_session_and_is_logged(scripted_strategy, scripted_device, log, space) -> None:

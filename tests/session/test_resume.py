@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from isiw.design import VALVE_SPACE
-from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError, InvalidValueError, LogError, StrategyError
@@ -284,9 +283,9 @@ def test_what_was_asked_and_never_answered_is_compared_as_well(interrupted, scri
 
 
 def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(
-    scripted_strategy, scripted_device, log
+    scripted_strategy, scripted_device, log, real_clock
 ) -> None:
-    real, clock = scripted_device(simulated=False), VirtualClock()
+    real, clock = scripted_device(simulated=False), real_clock
     with pytest.raises(KeyboardInterrupt):
         Session(real, scripted_strategy(10), log=log, clock=clock, on_trial=stop_after(4)).run()
     before = log.read_bytes()

@@ -1,5 +1,5 @@
 """Devices: what delivers a pair of stimuli and reports what came of it.
 
 A device of your own needs the five verbs of `protocol.Device`; `callback.CallbackDevice` makes one from functions.
-Every session wraps its device in `limits.LimitedDevice`.
+Every session wraps its device in `limited.LimitedDevice`.
 """

@@ -11,7 +11,7 @@ from isiw.errors import DeviceError
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Reference
 
-__all__ = ["Answer", "Device", "DeviceInfo", "HasMemory", "require_staged"]
+__all__ = ["Answer", "Device", "DeviceInfo", "HasMemory", "Readiness", "ReportsReadiness", "require_staged"]
 
 Answer: TypeAlias = Sweep | Measurement
 """What came of a stimulus: waveforms, or the MEP as the device measured it."""
@@ -28,6 +28,7 @@ class DeviceInfo:
         channels: the unit of each waveform by the channel's name; empty for a device that measures the MEP itself.
         version: firmware or software version, as text.
         detection_limit_mv: amplitudes below it are reported as 0 [mV]; None where there is no such limit.
+        address: what it is connected to, such as "COM3"; no two sessions of a computer drive a device of one address.
 
     Raises:
         InvalidValueError: an unknown reference or a detection limit that is not positive.
@@ -39,15 +40,44 @@ class DeviceInfo:
     channels: Mapping[str, str] = field(default_factory=dict)
     version: str = ""
     detection_limit_mv: float | None = None
+    address: str = ""
 
     def __post_init__(self) -> None:
         check_choice(self, "reference", get_args(Reference))
         check_numbers(self, "detection_limit_mv", above=0, optional=True)
 
 
+@dataclass(frozen=True)
+class Readiness:
+    """What a device says about its state before a stimulus.
+
+    Args:
+        ready: whether it could fire now.
+        reason: why it is not ready.
+        coil_c: temperature of the coil [°C]; None where it is not measured.
+        intensity_pct_mso: intensity that is set [% of the maximum stimulator output]; None where it is not known.
+
+    Raises:
+        InvalidValueError: a number that is not finite, or a negative intensity.
+    """
+
+    ready: bool = True
+    reason: str = ""
+    coil_c: float | None = None
+    intensity_pct_mso: float | None = None
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "coil_c", optional=True)
+        check_numbers(self, "intensity_pct_mso", least=0, optional=True)
+
+
 @runtime_checkable
 class Device(Protocol):
-    """Delivers pairs of stimuli and reports what came of them."""
+    """Delivers pairs of stimuli and reports what came of them.
+
+    A session calls all verbs in one thread, which is not the one that made the device. Only `stop` may come from
+    another one while `deliver` or `stage` is still busy.
+    """
 
     def describe(self) -> DeviceInfo:
         """What the device is; may be called at any time and delivers nothing."""
@@ -63,15 +93,24 @@ class Device(Protocol):
             timeout_s: the longest the call may take [s].
 
         Raises:
+            NotDelivered: refused before firing; nothing was given, and the session tries again.
             DeviceTimeoutError: no answer in time.
-            DeviceError: not staged, or anything else went wrong.
+            DeviceError: not staged, or anything else went wrong; whether the pulse was given is not known.
         """
 
     def stop(self) -> None:
-        """Disarm, whatever state the device is in; calling it again is harmless."""
+        """Disarm, whatever state the device is in, also while it delivers; calling it again is harmless."""
 
     def unstage(self) -> None:
         """Let go of what `stage` took; calling it again is harmless."""
+
+
+@runtime_checkable
+class ReportsReadiness(Protocol):
+    """Capability: a device that says before each stimulus whether it is ready, and what is set."""
+
+    def readiness(self) -> Readiness:
+        """The device's state now. Delivers nothing."""
 
 
 @runtime_checkable

@@ -19,7 +19,8 @@ from typing import Any
 import isiw
 from isiw.checks import deadline, number
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
-from isiw.devices.limits import LimitedDevice, Limits
+from isiw.devices.limited import LimitedDevice, require_real_time
+from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo
 from isiw.errors import DeviceError, LimitExceededError, StrategyError
 from isiw.log.durable import log_of
@@ -157,6 +158,7 @@ class Session:
         self._raw_device = device
         self._limits = limits or Limits.of_space(space)
         self._clock = clock or (VirtualClock() if info.simulated else MonotonicClock())
+        require_real_time(info, self._clock)
         self._signals = signals or SignalLimits()
         self._on_trial, self._timeout_s, self._ask_deadline_s = on_trial, timeout_s, ask_deadline_s
         recipe = strategy.recipe
