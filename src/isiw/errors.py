@@ -19,6 +19,24 @@ Every message says what is wrong, what was got, what was expected, and the way o
 
 from __future__ import annotations
 
+__all__ = [
+    "ConfigError",
+    "DamagedLogError",
+    "DeviceError",
+    "DeviceTimeoutError",
+    "InvalidValueError",
+    "IsiwError",
+    "LimitExceededError",
+    "LogError",
+    "NotDelivered",
+    "OtherVersionsWarning",
+    "OutOfSpaceError",
+    "StillArmedError",
+    "StrategyError",
+    "StudyError",
+    "told",
+]
+
 
 class IsiwError(Exception):
     """The root of everything that isiw raises on purpose.
@@ -93,3 +111,16 @@ class LogError(IsiwError):
 
 class DamagedLogError(LogError):
     """A log that ends too early or fails its checksums."""
+
+
+_LONGEST_TEXT = 10_000
+
+
+def told(error: BaseException) -> str:
+    """An error's type and message, whatever its `__str__` does, as text that any file can hold."""
+    try:
+        text = str(error)
+    except Exception:  # noqa: BLE001 - a device's own error may fail in any way when asked for its message
+        text = "(its message cannot be told)"
+    whole = f"{type(error).__name__}: {text[:_LONGEST_TEXT]}"
+    return whole.encode(errors="backslashreplace").decode()

@@ -7,7 +7,7 @@ from typing import Never
 
 import pytest
 
-from isiw.session.interrupts import DeferredInterrupts
+from isiw.session.interrupts import Interrupts
 
 if os.name == "nt":
     pytest.skip("POSIX signals", allow_module_level=True)
@@ -21,6 +21,10 @@ def terminal():
     signal.signal(signal.SIGHUP, before)
 
 
+def nothing() -> None:
+    pass
+
+
 def interrupt(number=signal.SIGINT) -> None:
     signal.raise_signal(number)
 
@@ -29,7 +33,7 @@ def test_an_interrupt_waits_until_it_is_allowed() -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts() as interrupts:
+        with Interrupts(nothing, nothing) as interrupts:
             interrupt()
             done.append("record")
             with interrupts.allowed():
@@ -45,7 +49,7 @@ def test_where_allowed_it_comes_at_once(number) -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts() as interrupts, interrupts.allowed():
+        with Interrupts(nothing, nothing) as interrupts, interrupts.allowed():
             interrupt(number)
             done.append("never")
 
@@ -58,7 +62,7 @@ def test_an_interrupt_that_found_no_moment_comes_at_the_end() -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts():
+        with Interrupts(nothing, nothing):
             interrupt()
             done.append("all")
 
@@ -71,7 +75,7 @@ def test_a_second_interrupt_does_not_cut_the_clearing_up_short() -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts() as interrupts:
+        with Interrupts(nothing, nothing) as interrupts:
             try:
                 with interrupts.allowed():
                     interrupt()
@@ -86,7 +90,7 @@ def test_a_second_interrupt_does_not_cut_the_clearing_up_short() -> None:
 
 def test_an_error_is_not_hidden_by_a_waiting_interrupt() -> None:
     def work() -> Never:
-        with DeferredInterrupts():
+        with Interrupts(nothing, nothing):
             interrupt()
             raise ZeroDivisionError
 
@@ -97,7 +101,7 @@ def test_an_error_is_not_hidden_by_a_waiting_interrupt() -> None:
 def test_the_handlers_are_put_back() -> None:
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [signal.getsignal(number) for number in numbers]
-    with DeferredInterrupts():
+    with Interrupts(nothing, nothing):
         assert all(signal.getsignal(n) is not b for n, b in zip(numbers, before, strict=True))
     assert [signal.getsignal(number) for number in numbers] == before
 
@@ -107,7 +111,7 @@ def test_outside_the_main_thread_it_does_nothing() -> None:
 
     def work() -> None:
         try:
-            with DeferredInterrupts() as interrupts, interrupts.allowed():
+            with Interrupts(nothing, nothing) as interrupts, interrupts.allowed():
                 pass
         except ValueError as error:
             failures.append(error)
@@ -122,7 +126,7 @@ def test_what_the_process_ignores_it_goes_on_ignoring() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     done = []
     try:
-        with DeferredInterrupts() as interrupts, interrupts.allowed():
+        with Interrupts(nothing, nothing) as interrupts, interrupts.allowed():
             interrupt(signal.SIGHUP)
             done.append("all")
     finally:

@@ -174,18 +174,6 @@ def test_the_device_is_always_stopped(scripted_strategy, scripted_device, log) -
     assert device.calls == ["stage", "stop", "unstage"]
 
 
-def test_a_device_that_cannot_be_staged_is_stopped_all_the_same(scripted_strategy, scripted_device, log) -> None:
-    device = scripted_device()
-
-    def stage() -> Never:
-        raise DeviceError("no air pressure")
-
-    device.stage = stage
-    record, _ = run_failing(Session(device, scripted_strategy(), log=log), DeviceError)
-    assert device.calls == ["stop", "unstage"]
-    assert record.events[-1].text == "DeviceError: no air pressure"
-
-
 @pytest.mark.parametrize("error", [DeviceError("coil too hot"), RuntimeError("cable"), KeyboardInterrupt()])
 def test_a_device_that_fails_leaves_an_intact_log_and_is_stopped(
     scripted_strategy, scripted_device, log, error

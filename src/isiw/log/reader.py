@@ -77,7 +77,12 @@ class SessionRecord:
     def unknown(self) -> tuple[Intent, ...]:
         """Stimuli that were delivered, or may have been, and whose outcome is not in the log."""
         known = {trial.index for trial in self.table}
-        intents = {intent.trial: intent for intent in self.intents}
+        intents: dict[int, Intent] = {}
+        for entry in self.history:
+            if isinstance(entry, Intent):
+                intents[entry.trial] = entry
+            elif isinstance(entry, Event) and entry.kind == "refused" and entry.trial is not None:
+                intents.pop(entry.trial, None)
         last = max(itertools.chain(known, intents), default=-1)
         return tuple(
             intents.get(number, Intent(trial=number, isi_ms=None)) for number in range(last + 1) if number not in known

@@ -15,7 +15,7 @@ from mcap.writer import Writer
 
 from isiw.errors import LogError
 from isiw.log.durable import DurableFile, begun, disk_errors, log_of, part_of, refuse_if_locked, sync_folder
-from isiw.log.salvage import Message, Salvage, current_file
+from isiw.log.salvage import Message, Salvage, current_file, salvage
 from isiw.log.schema import CHANNEL_IDS, Header, Record, announcement, encode, json_schema, topic_of
 
 __all__ = ["CONFIGURATION", "LogWriter"]
@@ -237,8 +237,22 @@ def _require_free(target: Path) -> None:
             raise LogError(
                 "there is a log already, and it is never overwritten",
                 got=str(existing),
-                remedy=f"Choose another path, or continue it: isiw resume {target}",
+                remedy=_way_on(existing),
             )
+
+
+def _way_on(existing: Path) -> str:
+    """What to do about a file that is in the way; only what can be resumed is suggested to be resumed."""
+    try:
+        found = salvage(existing)
+    except LogError:
+        return "Choose another path; this is no log that can be continued."
+    if not any(message.topic == "/header" for message in found.messages):
+        return "Choose another path; nothing of this log can be continued."
+    return (
+        f"Choose another path, or go on with it: isiw resume {log_of(existing)}, if isiw run has made it; otherwise "
+        "isiw.resume(path, device).run() in your own software."
+    )
 
 
 def _as_toml(header: Header) -> bytes:

@@ -6,17 +6,20 @@ import dataclasses
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, HasMemory
 from isiw.errors import DeviceError, InvalidValueError, OtherVersionsWarning, StrategyError
+from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session, SessionUpdate, learn, versions
+from isiw.session.safeguards import Safeguards
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus, Trial, TrialTable
@@ -34,6 +37,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     on_trial: Callable[[SessionUpdate], None] | None = None,
     timeout_s: float | None = None,
     ask_deadline_s: float | None = None,
+    safeguards: Safeguards | None = None,
     verify: bool = True,
 ) -> Session:
     """A session that goes on where a log ends. Nothing is delivered or written before its `run`.
@@ -50,6 +54,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         on_trial: as for `Session`.
         timeout_s: another time for one delivery than the logged one [s].
         ask_deadline_s: another time for one ask than the logged one [s].
+        safeguards: as for `Session`.
         verify: whether the strategy must ask again what the log says it asked. With other versions than those that
             were logged a difference is a warning; without verification the logged trials are told as they are.
 
@@ -82,6 +87,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         config=header.config,
         timeout_s=header.timeout_s if timeout_s is None else timeout_s,
         ask_deadline_s=header.ask_deadline_s if ask_deadline_s is None else ask_deadline_s,
+        safeguards=safeguards,
     )
     last = len(replayed.trials) - 1 if replayed.trials else None
     event = Event(kind="resume", trial=last, text=_resumption_text(record, replayed))
@@ -90,7 +96,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         as_resumed = as_resumed.model_copy(update={"created": header.created})
         return LogWriter.continuing(path, salvaged, header, as_resumed)
 
-    session.continue_from(replayed.trials, open_log, (*replayed.unknown, event))
+    session.continue_from(replayed.trials, open_log, (*replayed.unknown, event), partial(pulses_s, salvaged))
     return session
 
 
