@@ -180,7 +180,7 @@ def test_without_anybody_to_ask_a_pause_ends_the_session_and_it_can_be_resumed(
 
 
 VICTIM = """
-import hashlib, sys, time
+import hashlib, sys, threading, time
 sys.path.insert(0, {tests!r})
 from conftest import ScriptedDevice, make_scripted_strategy
 from isiw.session.loop import Session
@@ -191,7 +191,7 @@ ask = strategy.ask
 def asked(*_):
     if len(device.delivered) < 3:
         return ask()
-    print("hanging", flush=True)
+    threading.Timer(1.0, print, ("hanging",), {{"flush": True}}).start()  # when it hangs, and not before
     {hang}
 strategy.ask = asked
 Session(device, strategy, log={log!r}).run()

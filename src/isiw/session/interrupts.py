@@ -45,6 +45,8 @@ class Interrupts:
         self._settled = 0
         self._ending = False
         self._before: dict[signal.Signals, Any] = {}
+        self._watcher: threading.Thread | None = None
+        self._over = False
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
@@ -60,10 +62,12 @@ class Interrupts:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._watcher is not None:
+            self._over = True
+            signal.set_wakeup_fd(self._mouth_before)
         for number, handler in self._before.items():
             signal.signal(number, handler if handler is not None else signal.SIG_DFL)
-        if self._before:
-            signal.set_wakeup_fd(self._mouth_before)
+        if self._watcher is not None:
             self._mouth.close()
             self._watcher.join(_DISARMING_S)
             self._ears.close()
@@ -133,7 +137,7 @@ class Interrupts:
                         self._stuck()
 
     def _reacts(self) -> bool:
-        return self._wait_until(lambda: self._handled >= self._heard, _REACTION_S)
+        return self._wait_until(lambda: self._over or self._handled >= self._heard, _REACTION_S)
 
     @staticmethod
     def _wait_until(holds: Callable[[], bool], at_most_s: float) -> bool:

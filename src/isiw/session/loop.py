@@ -232,7 +232,9 @@ class Session:
                 self._log_beginning()
                 with self._rig.armed(len(self.trials), earlier_s):
                     decision = self._loop()
+                self._log_faults()
             except BaseException as error:
+                self._log_faults()
                 self._log_failure(error)
                 if not (self._rig.staged_once or self._resumed):
                     self._log.discard()
