@@ -1,6 +1,6 @@
 """Sessions with a device that fails in every way, run and resumed to their ends: is anything lost, or given twice?
 
-    python benchmarks/soak.py --sessions 2000 > benchmarks/results/soak.md
+    python -m benchmarks.soak --sessions 2000 > benchmarks/results/soak.md
 
 Each session has a device that fails at random (`isiw.testing.FaultyDevice`), from a stage that hangs to an answer that
 comes too late. What ends a session is resumed until its stimuli are used up. Then what the device has really fired is
@@ -20,7 +20,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -28,61 +28,10 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
+from benchmarks.remembering import SPACE, answer, strategy
 from isiw.testing import Fault, FaultyDevice, check_ledger
 
-SPACE = isiw.DesignSpace(0, 200, reference="valve")
 STUCK_S = 600.0
-
-
-@dataclass(frozen=True)
-class Remembering:
-    """A model that remembers what it was told; its posterior is itself."""
-
-    seed: int
-    told: tuple[tuple[float, float], ...] = ()
-
-    def begin(self, space: isiw.DesignSpace, seed: int, people: int = 1) -> Remembering:
-        """Nothing told yet."""
-        del space, people
-        return Remembering(seed)
-
-    def update(self, posterior: Remembering, observation: isiw.models.Observation) -> Remembering:
-        """One more trial."""
-        trial = (float(observation.isi_ms[0]), float(observation.mep_mv[0]))
-        return replace(posterior, told=(*posterior.told, trial))
-
-    def estimate(self, person: int = 0) -> isiw.WindowEstimate:
-        """No window."""
-        del person
-        return isiw.WindowEstimate(probability=0.1, window=None)
-
-    @property
-    def wanted_ms(self) -> float:
-        """The next ISI [ms], scrambled from everything told."""
-        scrambled = math.fsum((k + 1) * (isi + 1e3 * mep) for k, (isi, mep) in enumerate(self.told))
-        return (37.0 * self.seed + 53.0 + 7.0 * scrambled) % SPACE.high_ms
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """Scores ISIs by their distance from the wanted one."""
-
-    needs: tuple[type, ...] = ()
-
-    def __call__(self, posterior: Remembering, isi_ms: torch.Tensor) -> torch.Tensor:
-        """The scores."""
-        return -torch.abs(isi_ms - posterior.wanted_ms)[None]
-
-
-def strategy(trials: int, seed: int) -> isiw.Strategy:
-    """A strategy that uses up its budget."""
-    return isiw.Strategy(SPACE, Remembering(seed), Wanted(), isiw.strategy.stopping.Budget(trials), seed=seed)
-
-
-def answer(stimulus: isiw.Stimulus, timeout_s: float) -> isiw.Measurement:
-    """An MEP by a formula."""
-    del timeout_s
-    return isiw.Measurement(0.01 + (stimulus.isi_ms or 0.0) / 1e4, stimulus.isi_ms)
 
 
 class Soaked:
@@ -187,7 +136,7 @@ def main() -> None:
                 break
     faulthandler.cancel_dump_traceback_later()
     versions = {name: importlib.metadata.version(name) for name in ("mcap", "numpy", "torch")}
-    print(f"- command: `{shlex.join(['python', 'benchmarks/soak.py', *sys.argv[1:]])}`")
+    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.soak', *sys.argv[1:]])}`")
     print(f"- python {platform.python_version()}, {', '.join(f'{name} {v}' for name, v in versions.items())}\n")
     print(
         f"{counts['sessions']:,} sessions of {arguments.trials} trials, run {counts['runs']:,} times in all: "

@@ -57,8 +57,9 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         timeout_s: another time for one delivery than the logged one [s].
         ask_deadline_s: another time for one ask than the logged one [s].
         safeguards: as for `Session`.
-        verify: whether the strategy must ask again what the log says it asked, at first and at last. With other versions than those that
-            were logged a difference is a warning; without verification the logged trials are told as they are.
+        verify: whether the strategy must ask again what the log says it asked, at first and at last. With other
+            versions than those that were logged a difference is a warning; without verification the logged trials are
+            told as they are.
 
     Raises:
         LogError: no such log, or one of which not even the header can be read.
