@@ -43,9 +43,10 @@ def test_the_subjects_logs_of_a_folder_count_and_no_others(tmp_path, header) -> 
     simulated = dataclasses.replace(header.device, simulated=True)
     make_log(tmp_path / "simulated.mcap", header.model_copy(update={"device": simulated}))
     make_log(tmp_path / "mine.mcap", header)
-    assert len(earlier(tmp_path)) == 5
+    ages_s = earlier(tmp_path)
+    assert len(ages_s) == 5
+    assert ages_s == sorted(ages_s, reverse=True)
     assert len(earlier(tmp_path, "P08")) == 3
-    assert earlier(tmp_path) == sorted(earlier(tmp_path), reverse=True)
 
 
 def test_a_session_that_never_closed_its_log_counts(tmp_path, header) -> None:
