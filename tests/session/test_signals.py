@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -124,6 +125,21 @@ def test_a_request_to_end_is_no_question(scripted_strategy, scripted_device, log
     assert asked == []
 
 
+def test_a_ctrl_c_that_somebody_swallows_stops_the_session_all_the_same(
+    scripted_strategy, scripted_device, log
+) -> None:
+    def on_trial(update) -> None:
+        if update.trial.index == 2:
+            with suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+
+    device = scripted_device()
+    with pytest.raises(KeyboardInterrupt):
+        Session(device, scripted_strategy(6), log=log, on_trial=on_trial).run()
+    assert len(device.delivered) == 3
+    assert len(read_session(log).table) == 3
+
+
 def test_ctrl_c_in_the_middle_of_a_delivery_disarms_at_once_and_loses_no_outcome(
     scripted_strategy, scripted_device, log
 ) -> None:
@@ -215,7 +231,7 @@ def test_a_session_that_is_busy_outside_python_is_disarmed_by_the_first_signal_a
         process.send_signal(signal.SIGINT)
         assert process.stdout.readline() == "disarmed\n"
         process.send_signal(signal.SIGINT)
-        assert process.wait(60) == INTERRUPTED
+        assert process.wait(300) == INTERRUPTED
         assert "does not react" in process.stderr.read()
     record = read_session(log)
     assert record.losses == ()
@@ -233,6 +249,6 @@ def test_ctrl_z_disarms_before_it_suspends_and_a_continued_session_arms_for_nobo
         assert os.WIFSTOPPED(status)
         assert process.stdout.readline() == "disarmed\n"
         process.send_signal(signal.SIGCONT)
-        assert process.wait(60) != 0
+        assert process.wait(300) != 0
     assert len(read_session(log).table) == 3
     assert len(resume(log, scripted_device(), scripted_strategy(10)).run().trials) == 10

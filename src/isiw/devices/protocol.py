@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, get_args, runtime_checkable
 
 from isiw.checks import check_choice, check_numbers
-from isiw.errors import DeviceError
+from isiw.errors import NotDelivered
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Reference
 
@@ -122,6 +122,6 @@ class HasMemory(Protocol):
 
 
 def require_staged(name: str, *, staged: bool) -> None:
-    """Raise a DeviceError where a device is told to deliver without being armed."""
+    """Raise NotDelivered where a device is told to deliver without being armed."""
     if not staged:
-        raise DeviceError(f"{name} is not staged, so it delivers nothing", remedy="Call stage() first.")
+        raise NotDelivered(f"{name} is not staged, so it delivers nothing", remedy="Call stage() first.")

@@ -290,15 +290,14 @@ class Session:
     def _loop(self) -> StopDecision:
         decision = None
         while decision is None or not decision.stop:
-            if self._pause_reason is not None:
-                decision = self._pause(self._pause_reason)
+            if self._pausing:
+                decision = self._pause(self._pause_reason or "Interrupted by the operator.")
                 continue
             try:
                 decision = self._next_step()
             except KeyboardInterrupt:
                 if not self._interrupts.heard:
                     raise
-                self._pause_reason = self._pause_reason or "Interrupted by the operator."
             except NotDelivered:
                 if not self._pausing:
                     raise
