@@ -8,7 +8,7 @@ from typing import Never
 
 import pytest
 
-from isiw.session.interrupts import DeferredInterrupts
+from isiw.session.interrupts import Interrupts
 
 if os.name == "nt":
     pytest.skip("POSIX signals", allow_module_level=True)
@@ -22,6 +22,10 @@ def terminal() -> Iterator[None]:
     signal.signal(signal.SIGHUP, before)
 
 
+def nothing() -> None:
+    pass
+
+
 def interrupt(number: signal.Signals = signal.SIGINT) -> None:
     signal.raise_signal(number)
 
@@ -30,7 +34,7 @@ def test_an_interrupt_waits_until_it_is_allowed() -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts() as interrupts:
+        with Interrupts(nothing, nothing) as interrupts:
             interrupt()
             done.append("record")
             with interrupts.allowed():
@@ -46,7 +50,7 @@ def test_where_allowed_it_comes_at_once(number: signal.Signals) -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts() as interrupts, interrupts.allowed():
+        with Interrupts(nothing, nothing) as interrupts, interrupts.allowed():
             interrupt(number)
             done.append("never")
 
@@ -59,7 +63,7 @@ def test_an_interrupt_that_found_no_moment_comes_at_the_end() -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts():
+        with Interrupts(nothing, nothing):
             interrupt()
             done.append("all")
 
@@ -72,7 +76,7 @@ def test_a_second_interrupt_does_not_cut_the_clearing_up_short() -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts() as interrupts:
+        with Interrupts(nothing, nothing) as interrupts:
             try:
                 with interrupts.allowed():
                     interrupt()
@@ -87,7 +91,7 @@ def test_a_second_interrupt_does_not_cut_the_clearing_up_short() -> None:
 
 def test_an_error_is_not_hidden_by_a_waiting_interrupt() -> None:
     def work() -> Never:
-        with DeferredInterrupts():
+        with Interrupts(nothing, nothing):
             interrupt()
             raise ZeroDivisionError
 
@@ -98,7 +102,7 @@ def test_an_error_is_not_hidden_by_a_waiting_interrupt() -> None:
 def test_the_handlers_are_put_back() -> None:
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [signal.getsignal(number) for number in numbers]
-    with DeferredInterrupts():
+    with Interrupts(nothing, nothing):
         assert all(signal.getsignal(n) is not b for n, b in zip(numbers, before, strict=True))
     assert [signal.getsignal(number) for number in numbers] == before
 
@@ -108,7 +112,7 @@ def test_outside_the_main_thread_it_does_nothing() -> None:
 
     def work() -> None:
         try:
-            with DeferredInterrupts() as interrupts, interrupts.allowed():
+            with Interrupts(nothing, nothing) as interrupts, interrupts.allowed():
                 pass
         except ValueError as error:
             failures.append(error)
@@ -123,7 +127,7 @@ def test_what_the_process_ignores_it_goes_on_ignoring() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     done = []
     try:
-        with DeferredInterrupts() as interrupts, interrupts.allowed():
+        with Interrupts(nothing, nothing) as interrupts, interrupts.allowed():
             interrupt(signal.SIGHUP)
             done.append("all")
     finally:
