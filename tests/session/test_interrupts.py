@@ -3,6 +3,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from typing import Never
 
@@ -133,3 +134,31 @@ def test_what_the_process_ignores_it_goes_on_ignoring() -> None:
     finally:
         signal.signal(signal.SIGHUP, before)
     assert done == ["all"]
+
+
+def test_what_is_acknowledged_has_disarmed_already() -> None:
+    done = []
+
+    def slow() -> None:
+        time.sleep(0.3)  # the disarming itself is what takes long
+        done.append("disarmed")
+
+    with Interrupts(slow, nothing) as interrupts:
+        interrupt()
+        interrupts.acknowledge()
+        assert done == ["disarmed"]
+        interrupts.settle()
+        done.append("armed again")
+    assert done == ["disarmed", "armed again"]
+
+
+def test_every_signal_disarms_also_where_it_is_not_allowed_to_interrupt() -> None:
+    disarmed = threading.Event()
+
+    def work() -> None:
+        with Interrupts(disarmed.set, nothing):
+            interrupt()
+            assert disarmed.wait(60)
+
+    with pytest.raises(KeyboardInterrupt):
+        work()

@@ -90,8 +90,12 @@ class Interrupts:
         return self._ending or self.insisted
 
     def acknowledge(self) -> None:
-        """Deliver no KeyboardInterrupt for what was heard so far; it is being dealt with."""
+        """Deliver no KeyboardInterrupt for what was heard so far; it is being dealt with.
+
+        Returns when the device was disarmed for it, so that whoever arms it again is not disarmed by an old signal.
+        """
         self._pending = False
+        self._wait_until(self._is_disarmed, _DISARMING_S)
 
     def settle(self) -> None:
         """Forget what was heard; the operator has decided to go on."""
@@ -122,7 +126,7 @@ class Interrupts:
 
     def _suspend(self) -> None:
         """Stop the process as Ctrl-Z does, but disarmed; it goes on here."""
-        self._wait_until(lambda: self._disarmed >= self._handled, _DISARMING_S)
+        self._wait_until(self._is_disarmed, _DISARMING_S)
         os.kill(os.getpid(), signal.SIGSTOP)
 
     def _watch(self) -> None:
@@ -135,6 +139,9 @@ class Interrupts:
                     self._disarmed += 1
                     if self._heard > self._settled + 1 and not self._reacts():
                         self._stuck()
+
+    def _is_disarmed(self) -> bool:
+        return self._disarmed >= self._handled
 
     def _reacts(self) -> bool:
         return self._wait_until(lambda: self._over or self._handled >= self._heard, _REACTION_S)
