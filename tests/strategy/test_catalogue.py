@@ -164,7 +164,7 @@ def test_an_unknown_setting_of_the_prior_names_the_known_ones() -> None:
     ],
 )
 @pytest.mark.parametrize("name", ["default", "random"])
-def test_a_setting_that_cannot_be_is_refused_when_the_strategy_is_made(
+def test_an_invalid_setting_is_refused_when_the_strategy_is_made(
     name: str, settings: dict[str, Any], what: str
 ) -> None:
     with pytest.raises(InvalidValueError, match=what):
@@ -215,8 +215,25 @@ def test_a_regression_gives_up_after_99_iterations(name: str) -> None:
         ("incremental", {"quiet_ms": -1.0}, "quiet_ms"),
     ],
 )
-def test_a_setting_of_the_dissertations_that_cannot_be_is_refused(
-    name: str, settings: dict[str, Any], what: str
-) -> None:
+def test_an_invalid_setting_of_the_dissertations_is_refused(name: str, settings: dict[str, Any], what: str) -> None:
     with pytest.raises(InvalidValueError, match=what):
         make_strategy(name, **settings)
+
+
+@pytest.mark.parametrize("name", [None, [], {}, 5])
+def test_a_name_of_another_type_is_unknown(name: str) -> None:
+    with pytest.raises(StrategyError, match="unknown strategy"):
+        make_strategy(name)
+
+
+@pytest.mark.parametrize("space", [None, "valve", (0, 500)])
+def test_what_is_no_design_space_is_refused(space: DesignSpace) -> None:
+    with pytest.raises(InvalidValueError, match=r"needs a design space.*isiw.DesignSpace"):
+        make_strategy("incremental", space)
+
+
+@pytest.mark.parametrize("setting", ["particles", "initial_trials", "max_trials"])
+def test_a_setting_that_would_fill_the_memory_is_refused_at_once(setting: str) -> None:
+    huge: dict[str, Any] = {setting: 10**9}
+    with pytest.raises(InvalidValueError, match=rf"the setting {setting} of random must be .*at most"):
+        make_strategy("random", **huge)
