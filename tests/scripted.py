@@ -103,6 +103,19 @@ class ScriptedDevice:
         self.calls.append("unstage")
 
 
+class FakeRealClock:
+    """What a session takes for a real clock, without the waiting."""
+
+    def __init__(self) -> None:
+        self.time_s = 100.0
+
+    def now_s(self) -> float:
+        return self.time_s
+
+    def sleep_s(self, duration_s: float) -> None:
+        self.time_s += max(0.0, duration_s)
+
+
 def told_to(strategy: Strategy) -> tuple[tuple[float, float], ...]:
     return instance(RememberingPosterior, strategy.posterior).told
 

@@ -31,8 +31,12 @@ def test_the_python_examples_run_one_after_the_other(
     assert "nothing is missing" in printed
 
 
-def test_a_copied_device_waits_between_its_trials() -> None:
-    assert "simulated=" not in "".join(blocks("python"))
+def test_every_device_of_the_examples_says_that_it_is_simulated_and_what_a_real_one_leaves_out() -> None:
+    examples = "".join(blocks("python"))
+    infos = re.findall(r"isiw\.DeviceInfo\(.*", examples)
+    assert len(infos) == 2
+    assert all("simulated=True)  # leave simulated out for a real rig" in info for info in infos)
+    assert "VirtualClock" not in examples
 
 
 def test_a_labs_own_loop_takes_ten_lines() -> None:

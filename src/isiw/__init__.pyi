@@ -20,10 +20,14 @@ from .design import IMPACT_SPACE as IMPACT_SPACE
 from .design import VALVE_SPACE as VALVE_SPACE
 from .design import DesignSpace as DesignSpace
 from .devices.callback import CallbackDevice as CallbackDevice
+from .devices.clock import MonotonicClock as MonotonicClock
 from .devices.clock import VirtualClock as VirtualClock
+from .devices.deadlines import Deadlines as Deadlines
+from .devices.dry_run import DryRun as DryRun
 from .devices.limits import Limits as Limits
 from .devices.protocol import Device as Device
 from .devices.protocol import DeviceInfo as DeviceInfo
+from .devices.protocol import Readiness as Readiness
 from .devices.recorded import RecordedPerson as RecordedPerson
 from .devices.replay import RecordedTrials as RecordedTrials
 from .devices.robot.tapper import Tapper as Tapper
@@ -34,6 +38,7 @@ from .log.reader import read_session as read_session
 from .session.loop import Session as Session
 from .session.resume import exclude as exclude
 from .session.resume import resume as resume
+from .session.safeguards import Safeguards as Safeguards
 from .strategy.catalogue import list_settings as list_settings
 from .strategy.catalogue import list_strategies as list_strategies
 from .strategy.catalogue import make_strategy as make_strategy

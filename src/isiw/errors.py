@@ -9,13 +9,33 @@ Every message says what is wrong, what was got, what was expected, and the way o
     ├── StrategyError (ValueError)        a strategy that cannot be built from these parts
     ├── DeviceError                       a device that failed, refused, or did not answer
     │   ├── LimitExceededError            a stimulus refused by a limit, before anything was delivered
-    │   └── DeviceTimeoutError            no answer within the time allowed
+    │   ├── NotDelivered                  a stimulus that the device refused before firing; it may be tried again
+    │   ├── DeviceTimeoutError            no answer within the time allowed
+    │   └── StillArmedError               a device that cannot be disarmed
     ├── StudyError                        a study that cannot be run, continued or read
     └── LogError                          a log that cannot be written or read
         └── DamagedLogError               a log that ends too early or fails its checksums
 """
 
 from __future__ import annotations
+
+__all__ = [
+    "ConfigError",
+    "DamagedLogError",
+    "DeviceError",
+    "DeviceTimeoutError",
+    "InvalidValueError",
+    "IsiwError",
+    "LimitExceededError",
+    "LogError",
+    "NotDelivered",
+    "OtherVersionsWarning",
+    "OutOfSpaceError",
+    "StillArmedError",
+    "StrategyError",
+    "StudyError",
+    "told",
+]
 
 
 class IsiwError(Exception):
@@ -65,8 +85,16 @@ class LimitExceededError(DeviceError):
     """A stimulus that a limit refused before anything was delivered."""
 
 
+class NotDelivered(DeviceError):  # noqa: N818 - an outcome; that nothing was given is what it says
+    """A stimulus that the device refused before firing: nothing was given, nothing counts, it may be tried again."""
+
+
 class DeviceTimeoutError(DeviceError):
     """A device that did not answer within the time allowed."""
+
+
+class StillArmedError(DeviceError):
+    """A device that could not be disarmed, however often it was tried."""
 
 
 class StudyError(IsiwError):
@@ -83,3 +111,16 @@ class LogError(IsiwError):
 
 class DamagedLogError(LogError):
     """A log that ends too early or fails its checksums."""
+
+
+_LONGEST_TEXT = 10_000
+
+
+def told(error: BaseException) -> str:
+    """An error's type and message, whatever its `__str__` does, as text that any file can hold."""
+    try:
+        text = str(error)
+    except Exception:  # noqa: BLE001 - a device's own error may fail in any way when asked for its message
+        text = "(its message cannot be told)"
+    whole = f"{type(error).__name__}: {text[:_LONGEST_TEXT]}"
+    return whole.encode(errors="backslashreplace").decode()

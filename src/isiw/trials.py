@@ -245,8 +245,16 @@ class TrialTable:
         )
 
     def appended(self, trial: Trial) -> TrialTable:
-        """A table with one more trial at its end."""
-        return TrialTable((*self.trials, trial))
+        """A table with one more trial at its end; only its index is looked at, so that long sessions stay fast.
+
+        Raises:
+            InvalidValueError: an index that is not above the last one.
+        """
+        if self.trials and trial.index <= self.trials[-1].index:
+            raise InvalidValueError("the trials' indices must ascend", got=(self.trials[-1].index, trial.index))
+        table = object.__new__(TrialTable)
+        object.__setattr__(table, "trials", (*self.trials, trial))
+        return table
 
     def excluding(self, indices: Iterable[int]) -> TrialTable:
         """A table in which the trials of these indices are excluded."""

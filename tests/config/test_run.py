@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import pytest
+import tomli_w
 
 from isiw.config.run import (
     RunConfig,
@@ -157,3 +158,23 @@ def test_a_log_of_other_software_has_no_configuration(tmp_path: Path, config: di
     Session(ScriptedDevice(), scripted_strategy(1), log=tmp_path / "s.mcap", config=config).run()
     with pytest.raises(ConfigError, match=r"not run by isiw run.*isiw.resume"):
         config_of_log(read_session(tmp_path / "s.mcap"))
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [{"min_iti_s": True}, {"max_pulses": "5"}, {"max_pulses": 5.0}, {"max_block_pulses": True}, {"period_s": "60"}],
+)
+def test_limits_of_another_kind_are_refused(tmp_path, limits) -> None:
+    file = tmp_path / "session.toml"
+    file.write_text(tomli_w.dumps({"limits": limits}))
+    with pytest.raises(ConfigError, match=next(iter(limits))):
+        load_config(file)
+
+
+def test_every_limit_of_a_configuration_is_the_sessions(tmp_path) -> None:
+    wanted = {"min_iti_s": 6, "max_pulses": 30, "max_block_pulses": 12, "rest_s": 90.0, "max_period_pulses": 40}
+    file = tmp_path / "session.toml"
+    file.write_text(tomli_w.dumps({"log": str(tmp_path / "s.mcap"), "limits": wanted}))
+    session_for(load_config(file).with_overrides(strategy="random")).run()
+    kept = read_session(tmp_path / "s.mcap").header.limits
+    assert {name: getattr(kept, name) for name in wanted} == wanted

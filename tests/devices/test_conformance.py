@@ -12,7 +12,8 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.devices.callback import CallbackDevice
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
-from isiw.devices.limits import LimitedDevice, Limits
+from isiw.devices.limited import LimitedDevice
+from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.recorded import RecordedPerson, Recordings
 from isiw.devices.replay import RecordedTrials

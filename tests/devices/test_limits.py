@@ -1,142 +1,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Never
+from typing import Any
 
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.devices.clock import VirtualClock
-from isiw.devices.limits import LimitedDevice, Limits
-from isiw.errors import DeviceError, InvalidValueError, LimitExceededError
-from isiw.trials import Stimulus
-from scripted import ScriptedDevice
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import Readiness
+from isiw.errors import InvalidValueError, LimitExceededError
 
 LIMITS = Limits(low_ms=0, high_ms=200, min_iti_s=5.0, max_pulses=3)
-
-
-@pytest.fixture
-def clock() -> VirtualClock:
-    return VirtualClock()
-
-
-@pytest.fixture
-def inner() -> ScriptedDevice:
-    return ScriptedDevice()
-
-
-@pytest.fixture
-def limited(inner: ScriptedDevice, clock: VirtualClock) -> LimitedDevice:
-    device = LimitedDevice(inner, LIMITS, clock)
-    device.stage()
-    return device
-
-
-@pytest.mark.parametrize("isi_ms", [-0.001, 200.001, 1e9])
-def test_an_isi_beyond_the_range_is_refused_before_anything_is_delivered(
-    limited: LimitedDevice, inner: ScriptedDevice, isi_ms: float
-) -> None:
-    with pytest.raises(LimitExceededError, match="beyond the limits"):
-        limited.deliver(Stimulus(0, isi_ms), 1.0)
-    assert inner.delivered == []
-    assert limited.pulses_left == 3
-
-
-@pytest.mark.parametrize("isi_ms", [0.0, 200.0, None])
-def test_the_ends_of_the_range_and_tms_alone_are_allowed(
-    limited: LimitedDevice, inner: ScriptedDevice, isi_ms: float
-) -> None:
-    limited.deliver(Stimulus(0, isi_ms), 1.0)
-    assert inner.delivered == [Stimulus(0, isi_ms)]
-
-
-def test_a_stimulus_before_the_interval_is_over_is_refused(
-    limited: LimitedDevice, inner: ScriptedDevice, clock: VirtualClock
-) -> None:
-    limited.deliver(Stimulus(0, 10), 1.0)
-    clock.sleep_s(4.999)
-    with pytest.raises(LimitExceededError, match="too early"):
-        limited.deliver(Stimulus(1, 10), 1.0)
-    assert len(inner.delivered) == 1
-    clock.sleep_s(limited.wait_s())
-    limited.deliver(Stimulus(1, 10), 1.0)
-    assert len(inner.delivered) == 2
-
-
-def test_the_interval_runs_from_the_end_of_the_last_attempt(inner: ScriptedDevice, clock: VirtualClock) -> None:
-    def slow(stimulus: Stimulus) -> Never:
-        del stimulus
-        clock.sleep_s(3.0)
-        raise DeviceError("no answer")
-
-    inner.answer = slow
-    limited = LimitedDevice(inner, LIMITS, clock)
-    limited.stage()
-    with pytest.raises(DeviceError, match="no answer"):
-        limited.deliver(Stimulus(0, 10), 1.0)
-    assert limited.wait_s() == 5.0
-
-
-def test_a_delivery_that_fails_counts_as_delivered(limited: LimitedDevice, inner: ScriptedDevice) -> None:
-    def failing(stimulus: Stimulus) -> Never:
-        raise RuntimeError(stimulus)
-
-    inner.answer = failing
-    with pytest.raises(RuntimeError):
-        limited.deliver(Stimulus(0, 10), 1.0)
-    assert limited.pulses_left == 2
-
-
-def test_no_pulse_beyond_the_largest_number_is_delivered(
-    limited: LimitedDevice, inner: ScriptedDevice, clock: VirtualClock
-) -> None:
-    for trial in range(3):
-        limited.deliver(Stimulus(trial, 10), 1.0)
-        clock.sleep_s(5.0)
-    assert limited.pulses_left == 0
-    with pytest.raises(LimitExceededError, match="limit of 3 pulses"):
-        limited.deliver(Stimulus(3, 10), 1.0)
-    assert len(inner.delivered) == 3
-
-
-def test_pulses_of_an_earlier_run_count(inner: ScriptedDevice, clock: VirtualClock) -> None:
-    limited = LimitedDevice(inner, LIMITS, clock, delivered=3)
-    limited.stage()
-    with pytest.raises(LimitExceededError, match="limit of 3 pulses"):
-        limited.deliver(Stimulus(3, 10), 1.0)
-    assert inner.delivered == []
-
-
-def test_the_first_stimulus_after_a_resumption_waits_a_whole_interval(
-    inner: ScriptedDevice, clock: VirtualClock
-) -> None:
-    limited = LimitedDevice(inner, LIMITS, clock, delivered=1)
-    assert limited.wait_s() == LIMITS.min_iti_s
-
-
-def test_nothing_is_delivered_unless_staged(inner: ScriptedDevice, clock: VirtualClock) -> None:
-    limited = LimitedDevice(inner, LIMITS, clock)
-    with pytest.raises(DeviceError, match="not staged"):
-        limited.deliver(Stimulus(0, 10), 1.0)
-    limited.stage()
-    limited.stop()
-    with pytest.raises(DeviceError, match="not staged"):
-        limited.deliver(Stimulus(0, 10), 1.0)
-    assert inner.delivered == []
-    assert limited.pulses_left == 3
-
-
-class Powerless(ScriptedDevice):
-    def stage(self) -> Never:
-        raise DeviceError("no power")
-
-
-def test_a_device_that_fails_to_stage_stays_disarmed(clock: VirtualClock) -> None:
-    limited = LimitedDevice(Powerless(), LIMITS, clock)
-    with pytest.raises(DeviceError, match="no power"):
-        limited.stage()
-    with pytest.raises(DeviceError, match="not staged"):
-        limited.deliver(Stimulus(0, 10), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -162,3 +36,80 @@ def test_limits_that_limit_nothing_are_refused(values: dict[str, Any]) -> None:
 def test_limits_of_a_space_hold_exactly_its_isis(space: DesignSpace) -> None:
     limits = Limits.of_space(space, max_pulses=7)
     assert (limits.low_ms, limits.high_ms, limits.max_pulses) == (space.low_ms, space.high_ms, 7)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"min_iti_s": True},
+        {"min_iti_s": "5"},
+        {"max_pulses": "5"},
+        {"step_ms": 0.0},
+        {"step_ms": math.nan},
+        {"max_block_pulses": 0},
+        {"max_block_pulses": "12"},
+        {"rest_s": 0.0},
+        {"max_period_pulses": 1.5},
+        {"period_s": math.inf},
+        {"max_coil_c": math.nan},
+        {"intensity_pct_mso": -1.0},
+    ],
+)
+def test_limits_of_another_kind_are_refused(values) -> None:
+    with pytest.raises(InvalidValueError):
+        Limits(**({"low_ms": 0, "high_ms": 200} | values))
+
+
+@pytest.mark.parametrize("isi_ms", [10.0, 12.5, 200.0])
+def test_isis_on_the_grid_are_allowed(isi_ms) -> None:
+    Limits(10.0, 200.0, step_ms=2.5).require_isi(isi_ms)
+
+
+def test_many_steps_of_a_rounded_length_stay_on_the_grid() -> None:
+    limits = Limits(0.1, 1000.1, step_ms=0.1)
+    for step in (1, 3, 7_777, 9_999):
+        limits.require_isi(0.1 + step * 0.1)
+
+
+@pytest.mark.parametrize("isi_ms", [11.0, 12.4999, 199.0])
+def test_an_isi_off_the_grid_is_refused(isi_ms) -> None:
+    with pytest.raises(LimitExceededError, match="not on the grid"):
+        Limits(10.0, 200.0, step_ms=2.5).require_isi(isi_ms)
+
+
+def test_nothing_came_before_the_first_stimulus() -> None:
+    assert LIMITS.earliest_s([]) == -math.inf
+
+
+def test_after_a_whole_block_the_next_stimulus_waits_for_a_rest() -> None:
+    limits = Limits(0, 200, min_iti_s=5.0, max_block_pulses=3, rest_s=60.0)
+    assert limits.earliest_s([0.0, 5.0]) == 10.0
+    assert limits.earliest_s([0.0, 5.0, 10.0]) == 70.0
+    assert limits.earliest_s([0.0, 5.0, 10.0, 70.0]) == 75.0
+    assert limits.earliest_s([0.0, 60.0, 65.0]) == 70.0  # the block began at 60 s
+
+
+def test_no_period_holds_more_stimuli_than_its_limit() -> None:
+    limits = Limits(0, 200, min_iti_s=5.0, max_period_pulses=3, period_s=100.0)
+    assert limits.earliest_s([0.0, 5.0]) == 10.0
+    assert limits.earliest_s([0.0, 5.0, 10.0]) == 100.0
+    assert limits.earliest_s([0.0, 5.0, 10.0, 100.0]) == 105.0
+
+
+@pytest.mark.parametrize("coil_c", [None, 40.1, 99.0])
+def test_a_coil_that_is_hot_or_not_measured_is_refused(coil_c) -> None:
+    with pytest.raises(LimitExceededError, match="coil"):
+        Limits(0, 200, max_coil_c=40.0).require_state(Readiness(coil_c=coil_c))
+
+
+@pytest.mark.parametrize("intensity", [None, 54.9, 56.0])
+def test_another_or_an_unknown_intensity_is_refused(intensity) -> None:
+    with pytest.raises(LimitExceededError, match="intensity"):
+        Limits(0, 200, intensity_pct_mso=55.0).require_state(Readiness(intensity_pct_mso=intensity))
+
+
+def test_a_state_within_the_limits_is_accepted() -> None:
+    Limits(0, 200, max_coil_c=40.0, intensity_pct_mso=55.0).require_state(
+        Readiness(coil_c=40.0, intensity_pct_mso=55.0)
+    )
+    Limits(0, 200).require_state(Readiness())

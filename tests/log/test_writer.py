@@ -45,9 +45,14 @@ def test_what_was_synced_can_be_read_while_the_session_runs(tmp_path: Path, head
 @pytest.mark.parametrize("name", ["s.mcap", "s.mcap.part"])
 def test_an_existing_log_is_never_overwritten(tmp_path: Path, header: Header, name: str) -> None:
     (tmp_path / name).write_bytes(b"precious")
-    with pytest.raises(LogError, match=r"never overwritten.*isiw resume"):
+    with pytest.raises(LogError, match=r"never overwritten.*no log that can be continued"):
         LogWriter.create(tmp_path / "s.mcap", header)
     assert (tmp_path / name).read_bytes() == b"precious"
+
+
+def test_a_log_in_the_way_can_be_continued_and_the_message_says_how(finished_log: Path, header: Header) -> None:
+    with pytest.raises(LogError, match=r"never overwritten.*isiw resume .*isiw\.resume"):
+        LogWriter.create(finished_log, header)
 
 
 def test_a_file_that_appears_meanwhile_is_not_overwritten_at_the_end(tmp_path: Path, header: Header) -> None:

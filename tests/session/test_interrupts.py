@@ -3,12 +3,13 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from typing import Never
 
 import pytest
 
-from isiw.session.interrupts import DeferredInterrupts
+from isiw.session.interrupts import Interrupts
 
 if os.name == "nt":
     pytest.skip("POSIX signals", allow_module_level=True)
@@ -22,6 +23,10 @@ def terminal() -> Iterator[None]:
     signal.signal(signal.SIGHUP, before)
 
 
+def nothing() -> None:
+    pass
+
+
 def interrupt(number: signal.Signals = signal.SIGINT) -> None:
     signal.raise_signal(number)
 
@@ -30,7 +35,7 @@ def test_an_interrupt_waits_until_it_is_allowed() -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts() as interrupts:
+        with Interrupts(nothing, nothing) as interrupts:
             interrupt()
             done.append("record")
             with interrupts.allowed():
@@ -46,7 +51,7 @@ def test_where_allowed_it_comes_at_once(number: signal.Signals) -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts() as interrupts, interrupts.allowed():
+        with Interrupts(nothing, nothing) as interrupts, interrupts.allowed():
             interrupt(number)
             done.append("never")
 
@@ -59,7 +64,7 @@ def test_an_interrupt_that_found_no_moment_comes_at_the_end() -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts():
+        with Interrupts(nothing, nothing):
             interrupt()
             done.append("all")
 
@@ -72,7 +77,7 @@ def test_a_second_interrupt_does_not_interrupt_the_cleanup() -> None:
     done = []
 
     def work() -> None:
-        with DeferredInterrupts() as interrupts:
+        with Interrupts(nothing, nothing) as interrupts:
             try:
                 with interrupts.allowed():
                     interrupt()
@@ -87,7 +92,7 @@ def test_a_second_interrupt_does_not_interrupt_the_cleanup() -> None:
 
 def test_an_error_is_not_hidden_by_a_waiting_interrupt() -> None:
     def work() -> Never:
-        with DeferredInterrupts():
+        with Interrupts(nothing, nothing):
             interrupt()
             raise ZeroDivisionError
 
@@ -98,7 +103,7 @@ def test_an_error_is_not_hidden_by_a_waiting_interrupt() -> None:
 def test_the_handlers_are_put_back() -> None:
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [signal.getsignal(number) for number in numbers]
-    with DeferredInterrupts():
+    with Interrupts(nothing, nothing):
         assert all(signal.getsignal(n) is not b for n, b in zip(numbers, before, strict=True))
     assert [signal.getsignal(number) for number in numbers] == before
 
@@ -108,7 +113,7 @@ def test_outside_the_main_thread_it_does_nothing() -> None:
 
     def work() -> None:
         try:
-            with DeferredInterrupts() as interrupts, interrupts.allowed():
+            with Interrupts(nothing, nothing) as interrupts, interrupts.allowed():
                 pass
         except ValueError as error:
             failures.append(error)
@@ -123,9 +128,37 @@ def test_what_the_process_ignores_it_goes_on_ignoring() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     done = []
     try:
-        with DeferredInterrupts() as interrupts, interrupts.allowed():
+        with Interrupts(nothing, nothing) as interrupts, interrupts.allowed():
             interrupt(signal.SIGHUP)
             done.append("all")
     finally:
         signal.signal(signal.SIGHUP, before)
     assert done == ["all"]
+
+
+def test_what_is_acknowledged_has_disarmed_already() -> None:
+    done = []
+
+    def slow() -> None:
+        time.sleep(0.3)  # the disarming itself is what takes long
+        done.append("disarmed")
+
+    with Interrupts(slow, nothing) as interrupts:
+        interrupt()
+        interrupts.acknowledge()
+        assert done == ["disarmed"]
+        interrupts.settle()
+        done.append("armed again")
+    assert done == ["disarmed", "armed again"]
+
+
+def test_every_signal_disarms_also_where_it_is_not_allowed_to_interrupt() -> None:
+    disarmed = threading.Event()
+
+    def work() -> None:
+        with Interrupts(disarmed.set, nothing):
+            interrupt()
+            assert disarmed.wait(60)
+
+    with pytest.raises(KeyboardInterrupt):
+        work()

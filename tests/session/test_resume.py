@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, LogError, StrategyError
@@ -28,7 +27,7 @@ from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Measurement, MistrialReason, Stimulus
 from known import known
-from scripted import ScriptedDevice, scripted_strategy, told_to
+from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 
 
 @pytest.fixture
@@ -297,7 +296,7 @@ def test_what_was_asked_and_never_answered_is_compared_as_well(interrupted: Path
 
 
 def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(log: Path) -> None:
-    real, clock = ScriptedDevice(simulated=False), VirtualClock()
+    real, clock = ScriptedDevice(simulated=False), FakeRealClock()
     with pytest.raises(KeyboardInterrupt):
         Session(real, scripted_strategy(10), log=log, clock=clock, on_trial=stop_after(4)).run()
     before = log.read_bytes()
@@ -352,7 +351,7 @@ def test_a_default_session_with_a_drifting_person_goes_on_as_if_never_interrupte
 VICTIM = """
 import sys, time
 sys.path.insert(0, {tests!r})
-from scripted import ScriptedDevice, scripted_strategy, told_to
+from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 from isiw.devices.clock import VirtualClock
 from isiw.session.loop import Session
 

@@ -12,6 +12,7 @@ Every key may be left out. Example:
 
 from __future__ import annotations
 
+import dataclasses
 import datetime as dt
 import itertools
 from collections.abc import Callable, Mapping, Sequence
@@ -113,10 +114,18 @@ class StrategyConfig(_Section):
 
 
 class LimitsConfig(_Section):
-    """The limits, as in `isiw.Limits`; the ISI is limited to the design space."""
+    """The limits, as in `isiw.Limits`; the ISI is limited to the grid of the design space."""
 
-    min_iti_s: float = Field(default=5.0, ge=0.0, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    min_iti_s: float = Field(default=5.0, ge=0.0)
     max_pulses: int = Field(default=200, ge=1)
+    max_block_pulses: int | None = Field(default=None, ge=1)
+    rest_s: float = Field(default=120.0, gt=0.0)
+    max_period_pulses: int | None = Field(default=None, ge=1)
+    period_s: float = Field(default=3600.0, gt=0.0)
+    max_coil_c: float | None = None
+    intensity_pct_mso: float | None = Field(default=None, ge=0.0)
 
 
 class RunConfig(_Section):
@@ -263,7 +272,7 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         device,
         make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),
         log=log,
-        limits=Limits.of_space(space, **config.limits.model_dump()),
+        limits=dataclasses.replace(Limits.of_space(space), **config.limits.model_dump()),
         on_trial=on_trial,
         subject=f"{config.subject.cohort}-{config.seed}-{config.subject.number}",
         config={RUN_KEY: kept},

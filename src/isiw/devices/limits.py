@@ -1,18 +1,20 @@
-"""Limits that no strategy, session or mistake can exceed: a wrapper around any device."""
+"""Limits that no strategy, session or mistake can exceed, and what they say about the next stimulus."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from isiw.checks import check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.devices.clock import Clock
-from isiw.devices.protocol import Answer, Device, DeviceInfo, require_staged
+from isiw.devices.protocol import Readiness
 from isiw.errors import InvalidValueError, LimitExceededError
-from isiw.trials import Stimulus
 
-__all__ = ["LimitedDevice", "Limits"]
+__all__ = ["Limits"]
+
+_GRID_TOLERANCE_MS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,14 @@ class Limits:
         high_ms: longest ISI [ms].
         min_iti_s: shortest time between two deliveries [s].
         max_pulses: largest number of deliveries in a session, failed ones included.
+        step_ms: ISIs are whole multiples of it above the shortest [ms]; None where any ISI of the range is allowed.
+        max_block_pulses: most deliveries in a row without a rest; None where none is needed.
+        rest_s: a pause of this length is a rest [s].
+        max_period_pulses: most deliveries in any period; None where they are not limited.
+        period_s: length of that period [s].
+        max_coil_c: highest temperature of the coil at which to deliver [°C]; the device must report it.
+        intensity_pct_mso: the only intensity at which to deliver [% of the maximum stimulator output]; the device must
+            report it. Where None, one that is reported when the device is staged may not change any more.
 
     Raises:
         InvalidValueError: values that are not finite or limit nothing, or a number of pulses that is not whole.
@@ -33,11 +43,23 @@ class Limits:
     high_ms: float
     min_iti_s: float = 5.0
     max_pulses: int = 200
+    step_ms: float | None = None
+    max_block_pulses: int | None = None
+    rest_s: float = 120.0
+    max_period_pulses: int | None = None
+    period_s: float = 3600.0
+    max_coil_c: float | None = None
+    intensity_pct_mso: float | None = None
 
     def __post_init__(self) -> None:
         check_numbers(self, "low_ms", "high_ms")
         check_numbers(self, "min_iti_s", least=0)
         check_wholes(self, "max_pulses", least=1)
+        check_wholes(self, "max_block_pulses", "max_period_pulses", least=1, optional=True)
+        check_numbers(self, "rest_s", "period_s", above=0)
+        check_numbers(self, "step_ms", above=0, optional=True)
+        check_numbers(self, "max_coil_c", optional=True)
+        check_numbers(self, "intensity_pct_mso", least=0, optional=True)
         if self.low_ms > self.high_ms:
             raise InvalidValueError("the limits of the ISI must ascend", got=(self.low_ms, self.high_ms))
 
@@ -47,97 +69,75 @@ class Limits:
 
         Args:
             space: the design space.
-            min_iti_s: least time between two stimuli [s].
-            max_pulses: most stimuli in the session.
+            min_iti_s: shortest time between two deliveries [s].
+            max_pulses: largest number of deliveries in a session.
         """
-        return cls(space.low_ms, space.high_ms, min_iti_s, max_pulses)
+        return cls(space.low_ms, space.high_ms, min_iti_s, max_pulses, space.step_ms)
 
-
-class LimitedDevice:
-    """A device that refuses what exceeds its limits, before anything is delivered.
-
-    A delivery that fails counts like any other, because nobody knows whether the pulse left. The inter-trial interval
-    runs from the moment the last attempt ended.
-
-    Args:
-        device: the device to guard.
-        limits: what it may deliver.
-        clock: tells the time between deliveries.
-        delivered: deliveries of this session so far; where there are some, the first one now waits a whole interval.
-    """
-
-    def __init__(self, device: Device, limits: Limits, clock: Clock, *, delivered: int = 0) -> None:
-        self.limits = limits
-        self._device, self._clock, self._delivered = device, clock, delivered
-        self._last_s = clock.now_s() if delivered else -math.inf
-        self._staged = False
-
-    @property
-    def pulses_left(self) -> int:
-        """How many deliveries are still allowed."""
-        return max(0, self.limits.max_pulses - self._delivered)
-
-    def wait_s(self) -> float:
-        """How long until the inter-trial interval allows the next delivery [s]."""
-        return max(0.0, self._last_s + self.limits.min_iti_s - self._clock.now_s())
-
-    def check(self, stimulus: Stimulus) -> None:
-        """Raise where this stimulus must not be delivered now.
+    def require_isi(self, isi_ms: float) -> None:
+        """Raise where an ISI must not be delivered.
 
         Raises:
-            LimitExceededError: the number of pulses, the ISI's range, or the inter-trial interval.
+            LimitExceededError: it is beyond the range, or off the grid.
         """
-        limits, isi_ms = self.limits, stimulus.isi_ms
-        if self._delivered >= limits.max_pulses:
-            raise LimitExceededError(
-                f"the limit of {limits.max_pulses} pulses is reached",
-                remedy="Nothing was delivered. End the session, or start one with a higher max_pulses.",
-            )
-        if isi_ms is not None and not limits.low_ms <= isi_ms <= limits.high_ms:
+        if not self.low_ms <= isi_ms <= self.high_ms:
             raise LimitExceededError(
                 "the ISI is beyond the limits",
                 got=isi_ms,
-                expected=f"{limits.low_ms:g} to {limits.high_ms:g} ms",
+                expected=f"{self.low_ms:g} to {self.high_ms:g} ms",
                 remedy="Nothing was delivered. Let the limits hold the whole design space.",
             )
-        if self.wait_s() > 0:
+        if self.step_ms is not None and self._off_grid_ms(isi_ms) > _GRID_TOLERANCE_MS:
             raise LimitExceededError(
-                "the next stimulus comes too early",
-                got=f"{limits.min_iti_s - self.wait_s():.3f} s since the last one",
-                expected=f"at least {limits.min_iti_s:g} s",
-                remedy="Nothing was delivered. Sleep for wait_s() first.",
+                "the ISI is not on the grid of the limits",
+                got=isi_ms,
+                expected=f"{self.low_ms:g} ms and steps of {self.step_ms:g} ms",
+                remedy="Nothing was delivered. Give the limits the grid of the design space.",
             )
 
-    def describe(self) -> DeviceInfo:
-        """What the guarded device is."""
-        return self._device.describe()
+    def _off_grid_ms(self, isi_ms: float) -> float:
+        return math.fabs(math.remainder(isi_ms - self.low_ms, self.step_ms or math.inf))
 
-    def stage(self) -> None:
-        """Get ready and arm."""
-        self._device.stage()
-        self._staged = True
-
-    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
-        """Deliver one pair of stimuli, if the limits allow it.
+    def require_state(self, state: Readiness) -> None:
+        """Raise where what the device reports does not allow a stimulus.
 
         Raises:
-            LimitExceededError: refused; nothing was delivered.
-            DeviceError: not staged, or the device failed.
+            LimitExceededError: the coil is too hot, the intensity is another one, or a limited value is not reported.
         """
-        require_staged(self.describe().name, staged=self._staged)
-        self.check(stimulus)
-        self._delivered += 1
-        try:
-            return self._device.deliver(stimulus, timeout_s)
-        finally:
-            self._last_s = self._clock.now_s()
+        if self.max_coil_c is not None and not (state.coil_c is not None and state.coil_c <= self.max_coil_c):
+            raise LimitExceededError(
+                "the coil is too hot, or its temperature is not known",
+                got="no temperature" if state.coil_c is None else f"{state.coil_c:g} °C",
+                expected=f"at most {self.max_coil_c:g} °C",
+                remedy="Nothing was delivered. Let the coil cool, then resume the session.",
+            )
+        if self.intensity_pct_mso is not None and state.intensity_pct_mso != self.intensity_pct_mso:
+            raise LimitExceededError(
+                "the intensity is not the session's, or is not known",
+                got="no intensity" if state.intensity_pct_mso is None else f"{state.intensity_pct_mso:g} % MSO",
+                expected=f"{self.intensity_pct_mso:g} % MSO",
+                remedy="Nothing was delivered. Set the intensity back, then resume the session.",
+            )
 
-    def stop(self) -> None:
-        """Disarm; from here on nothing is delivered until the next `stage`."""
-        self._staged = False
-        self._device.stop()
+    def earliest_s(self, times_s: Sequence[float]) -> float:
+        """When the next stimulus may come at the earliest [s]; minus infinity where any time will do.
 
-    def unstage(self) -> None:
-        """Let go of the device."""
-        self._staged = False
-        self._device.unstage()
+        Args:
+            times_s: when the earlier ones came [s], ascending, shape (n,).
+        """
+        if not times_s:
+            return -math.inf
+        earliest = [times_s[-1] + self.min_iti_s]
+        if self.max_block_pulses is not None and self._block_pulses(times_s) >= self.max_block_pulses:
+            earliest.append(times_s[-1] + self.rest_s)
+        if self.max_period_pulses is not None and len(times_s) >= self.max_period_pulses:
+            earliest.append(times_s[-self.max_period_pulses] + self.period_s)
+        return max(earliest)
+
+    def _block_pulses(self, times_s: Sequence[float]) -> int:
+        """How many stimuli came since the last rest, counted no further than matters."""
+        last = times_s[-(self.max_block_pulses or 0) :]
+        rests = [
+            number for number, (before, after) in enumerate(pairwise(last), start=1) if after - before >= self.rest_s
+        ]
+        return len(last) - max(rests, default=0)

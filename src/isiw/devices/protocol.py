@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, get_args, runtime_checkable
 
 from isiw.checks import check_choice, check_numbers, number
-from isiw.errors import DeviceError
+from isiw.errors import NotDelivered
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Reference
 
-__all__ = ["Answer", "Device", "DeviceInfo", "HasMemory", "require_staged"]
+__all__ = ["Answer", "Device", "DeviceInfo", "HasMemory", "Readiness", "ReportsReadiness", "require_staged"]
 
 Answer: TypeAlias = Sweep | Measurement
 """What came of a stimulus: waveforms, or the MEP as the device measured it."""
@@ -30,6 +30,7 @@ class DeviceInfo:
         detection_limit_mv: amplitudes below it are reported as 0 [mV]; None where there is no such limit.
         hit_delay_ms: from the valve command to the impact, mean and SD over people [ms]; `isiw timing LOG` measures it.
             None where it is not known, or where ISIs count from the impact.
+        address: what it is connected to, such as "COM3"; no two sessions of a computer drive a device of one address.
 
     Raises:
         InvalidValueError: an unknown reference, or a detection limit or a hit delay that is not positive.
@@ -42,6 +43,7 @@ class DeviceInfo:
     version: str = ""
     detection_limit_mv: float | None = None
     hit_delay_ms: tuple[float, float] | None = None
+    address: str = ""
 
     def __post_init__(self) -> None:
         check_choice(self, "reference", get_args(Reference))
@@ -51,9 +53,37 @@ class DeviceInfo:
             object.__setattr__(self, "hit_delay_ms", (mean, sd))
 
 
+@dataclass(frozen=True)
+class Readiness:
+    """What a device says about its state before a stimulus.
+
+    Args:
+        ready: whether it could fire now.
+        reason: why it is not ready.
+        coil_c: temperature of the coil [°C]; None where it is not measured.
+        intensity_pct_mso: intensity that is set [% of the maximum stimulator output]; None where it is not known.
+
+    Raises:
+        InvalidValueError: a number that is not finite, or a negative intensity.
+    """
+
+    ready: bool = True
+    reason: str = ""
+    coil_c: float | None = None
+    intensity_pct_mso: float | None = None
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "coil_c", optional=True)
+        check_numbers(self, "intensity_pct_mso", least=0, optional=True)
+
+
 @runtime_checkable
 class Device(Protocol):
-    """Delivers pairs of stimuli and reports what came of them."""
+    """Delivers pairs of stimuli and reports what came of them.
+
+    A session calls all verbs in one thread, which is not the one that made the device. Only `stop` may come from
+    another one while `deliver` or `stage` is still busy.
+    """
 
     def describe(self) -> DeviceInfo:
         """What the device is; may be called at any time and delivers nothing."""
@@ -69,15 +99,24 @@ class Device(Protocol):
             timeout_s: the longest the call may take [s].
 
         Raises:
+            NotDelivered: refused before firing; nothing was given, and the session tries again.
             DeviceTimeoutError: no answer in time.
-            DeviceError: not staged, or anything else went wrong.
+            DeviceError: not staged, or anything else went wrong; whether the pulse was given is not known.
         """
 
     def stop(self) -> None:
-        """Disarm, whatever state the device is in; calling it again is harmless."""
+        """Disarm, whatever state the device is in, also while it delivers; calling it again is harmless."""
 
     def unstage(self) -> None:
         """Let go of what `stage` took; calling it again is harmless."""
+
+
+@runtime_checkable
+class ReportsReadiness(Protocol):
+    """Capability: a device that says before each stimulus whether it is ready, and what is set."""
+
+    def readiness(self) -> Readiness:
+        """The device's state now. Delivers nothing."""
 
 
 @runtime_checkable
@@ -89,11 +128,11 @@ class HasMemory(Protocol):
 
 
 def require_staged(name: str, *, staged: bool) -> None:
-    """Raise a DeviceError where a device is told to deliver without being armed.
+    """Raise NotDelivered where a device is told to deliver without being armed.
 
     Args:
         name: the device's, for the message.
         staged: whether it is armed.
     """
     if not staged:
-        raise DeviceError(f"{name} is not staged, so it delivers nothing", remedy="Call stage() first.")
+        raise NotDelivered(f"{name} is not staged, so it delivers nothing", remedy="Call stage() first.")

@@ -6,8 +6,11 @@ been type-checked, and has not been run.
 
 from __future__ import annotations
 
+import itertools
 import os
+import shutil
 import sys
+import tempfile
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -151,6 +154,10 @@ def put(path: Path, content: bytes, *, replacing: bool, through: Path | None = N
         raise
 
 
+def _exclusive(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_EXCL, 0o666)
+
+
 class DurableFile:
     """A new binary file that can be renamed while it is written.
 
@@ -164,8 +171,9 @@ class DurableFile:
     def __init__(self, path: Path) -> None:
         with disk_errors(path, "the log cannot be created", "Choose another path."):
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file: IO[bytes] = path.open("xb")
-        self.path = path
+            # Appending, so that a file that is shortened behind our back stays shorter than what was written.
+            self._file: IO[bytes] = open(path, "a+b", opener=_exclusive)  # noqa: SIM115 - Path has no opener
+        self.path, self._size = path, 0
         try:
             lock(self._file, path)
         except LogError:
@@ -173,14 +181,21 @@ class DurableFile:
             path.unlink()
             raise
 
+    @property
+    def closed(self) -> bool:
+        """Whether it is closed."""
+        return self._file.closed
+
     def write(self, data: bytes) -> int:
         """Append."""
         with _writing(self.path):
-            return self._file.write(data)
+            written = self._file.write(data)
+        self._size += written
+        return written
 
     def tell(self) -> int:
         """Size so far."""
-        return self._file.tell()
+        return self._size
 
     def flush(self) -> None:
         """Hand everything to the operating system."""
@@ -192,6 +207,38 @@ class DurableFile:
         with _writing(self.path):
             self._file.flush()
             os.fsync(self._file.fileno())
+
+    def displacement(self) -> str | None:
+        """What has become of the file's name or size behind its back, in words; None where it is as it was synced."""
+        try:
+            there = self.path.stat()
+        except OSError as error:
+            return f"the file is gone ({error.strerror})"
+        if not os.path.samestat(there, os.fstat(self._file.fileno())):
+            return "another file is in its place"
+        if there.st_size != self._size:
+            return f"the file has {there.st_size} bytes instead of the {self._size} written"
+        return None
+
+    def rescued(self, wanted: Path) -> Path:
+        """Copy what the open file holds to a free name near the wanted one, and return it.
+
+        The folder is made again where it is gone, and the one for temporary files stands in where that cannot be.
+        """
+        try:
+            wanted.parent.mkdir(parents=True, exist_ok=True)
+            return self._copied(wanted.parent, wanted)
+        except (OSError, LogError):
+            return self._copied(Path(tempfile.gettempdir()), wanted)
+
+    def _copied(self, folder: Path, wanted: Path) -> Path:
+        names = (folder / f"{wanted.stem}.rescued{number or ''}{wanted.suffix}" for number in itertools.count())
+        with begun(next(name for name in names if not name.exists())) as copy:
+            self._file.seek(0)
+            shutil.copyfileobj(self._file, copy)
+            copy.close()
+            sync_folder(folder)
+        return copy.path
 
     def move_to(self, place: Path, *, replacing: bool, source: IO[bytes] | None = None) -> None:
         """Take another name in one step, and go on there; the lock goes along.
@@ -217,8 +264,7 @@ class DurableFile:
             take_free_place(self.path, place)
         self.path = place
         if sys.platform == "win32":
-            self._file = place.open("r+b")
-            self._file.seek(0, os.SEEK_END)
+            self._file = place.open("a+b")
             lock(self._file, place)
 
     def close(self) -> None:

@@ -41,7 +41,7 @@ class SessionRecord:
         losses: what could not be read, a sentence each; empty where the log is whole.
         finished: whether the session closed its log.
         end_lost: whether its end is missing, so that nobody knows how many stimuli it told of.
-        delivered: how many stimuli its index counts; 0 where it has none.
+        delivered: how many stimuli were given by its index, or may have been; 0 where it has none.
     """
 
     path: Path
@@ -101,7 +101,12 @@ class SessionRecord:
     def unknown(self) -> tuple[Intent, ...]:
         """Stimuli that were delivered, or may have been, and whose outcome is not in the log."""
         known = {trial.index for trial in self.table}
-        intents = {intent.trial: intent for intent in self.intents}
+        intents: dict[int, Intent] = {}
+        for entry in self.history:
+            if isinstance(entry, Intent):
+                intents[entry.trial] = entry
+            elif isinstance(entry, Event) and entry.kind == "refused" and entry.trial is not None:
+                intents.pop(entry.trial, None)
         last = max(itertools.chain(known, intents, [min(self.delivered, MOST_TRIALS) - 1]))
         return tuple(
             intents.get(number, Intent(trial=number, isi_ms=None)) for number in range(last + 1) if number not in known
@@ -142,8 +147,14 @@ def read_salvaged(salvaged: Salvage) -> SessionRecord:
         _shortened(losses),
         salvaged.finished,
         salvaged.end_lost,
-        salvaged.delivered,
+        _delivered(salvaged, records.history),
     )
+
+
+def _delivered(salvaged: Salvage, history: Sequence[Record]) -> int:
+    """How many stimuli the index counts without those that were refused."""
+    refused = sum(isinstance(record, Event) and record.kind == "refused" for record in history)
+    return max(salvaged.counted.get("/intent", 0) - refused, salvaged.counted.get("/trial", 0))
 
 
 @dataclass

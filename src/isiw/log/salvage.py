@@ -77,7 +77,7 @@ class Salvage:
         losses: what could not be read, a sentence each; empty where nothing is missing.
         finished: whether the session closed its log.
         end_lost: whether the end of a closed log is missing, so that nobody knows how many stimuli it told of.
-        delivered: how many stimuli the index at the end of the log counts; 0 where there is no such index.
+        counted: how many records of each topic the index at the end counts; empty where there is no such index.
         topics: by channel number; known beforehand, in case the chunk that defines the channels is lost.
     """
 
@@ -89,7 +89,7 @@ class Salvage:
     losses: list[str] = field(default_factory=list)
     finished: bool = False
     end_lost: bool = False
-    delivered: int = 0
+    counted: dict[str, int] = field(default_factory=dict)
     topics: dict[int, str] = field(default_factory=lambda: {number: topic for topic, number in CHANNEL_IDS.items()})
 
 
@@ -189,7 +189,7 @@ def _read_file(file: IO[bytes], found: Salvage) -> None:
     _put_in_order(found)
     _report_gaps(found, 0 if counted is None else counted.message_count)
     if counted is not None:
-        found.delivered = max(counted.channel_message_counts.get(CHANNEL_IDS[t], 0) for t in ("/intent", "/trial"))
+        found.counted = {topic: counted.channel_message_counts.get(number, 0) for topic, number in CHANNEL_IDS.items()}
     found.end_lost = found.path.suffix != ".part" and counted is None and not reading.whole
 
 

@@ -1,11 +1,11 @@
 """What is in a log: one kind of record per topic, as JSON with a JSON schema.
 
     /header     who, with what, and how: everything needed to make the strategy again; once more on resuming
-    /intent     about to be delivered; an intent without a trial was interrupted
+    /intent     about to be delivered; an intent without a trial was interrupted, or refused as an event says
     /trial      what came of it
     /emg …      the waveforms of a trial, one topic a channel
     /estimate   what was believed after the trial, and what is asked next
-    /event      an exclusion, a limit, a fault, a resumption, a fallback
+    /event      an exclusion, a limit, a fault, a resumption, a fallback, a refusal, a late answer, a pause
 
 JSON knows no infinity: where a number is not finite it is one of the strings "Infinity", "-Infinity" and "NaN".
 """
@@ -21,11 +21,12 @@ from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, WithJsonSchema
+from pydantic_core import PydanticSerializationError
 
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
-from isiw.errors import InvalidValueError
+from isiw.errors import InvalidValueError, told
 from isiw.signals.judgement import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, Trial
@@ -243,11 +244,15 @@ def _rounded(values: FloatArray) -> tuple[float, ...]:
     return tuple(np.asarray(values, dtype=np.float64).round(PROFILE_DECIMALS).tolist())
 
 
-EventKind: TypeAlias = Literal["exclusion", "limit", "fault", "resume", "fallback", "fit"]
+EventKind: TypeAlias = Literal["exclusion", "limit", "fault", "resume", "fallback", "fit", "refused", "late", "pause"]
 
 
 class Event(_Record):
-    """Something that happened to a session; `trial` is the excluded trial, or else the last one before it."""
+    """Something that happened to a session.
+
+    `trial` is the one that was excluded, refused or answered late, and otherwise the last one before the event. What is
+    "refused" was not delivered, whatever the intent before it says.
+    """
 
     kind: EventKind
     trial: TrialNumber | None = None
@@ -328,7 +333,7 @@ def waveform_topic(channel_name: str) -> str:
         InvalidValueError: an empty name, or one that isiw uses for itself.
     """
     topic = f"/{channel_name}"
-    if topic == "/" or topic in _KINDS:
+    if topic == "/" or topic in _KINDS or not channel_name.isprintable():  # half a surrogate pair is not printable
         raise InvalidValueError(
             "a waveform's channel cannot have this name", got=channel_name, remedy="Rename it in the device."
         )
@@ -341,8 +346,18 @@ def encode(topic: str, record: Record) -> bytes:
     Args:
         topic: of the record.
         record: what to write.
+
+    Raises:
+        InvalidValueError: a text in it is none that JSON can hold.
     """
-    return adapter(topic).dump_json(record)
+    try:
+        return adapter(topic).dump_json(record)
+    except (PydanticSerializationError, UnicodeEncodeError) as error:
+        raise InvalidValueError(
+            f"a record of {topic} cannot be written as JSON",
+            got=told(error),
+            remedy="Look at the names, units and texts that the device gives.",
+        ) from error
 
 
 def decode(topic: str, data: bytes) -> Record:

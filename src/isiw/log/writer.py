@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import shutil
+import threading
 import time
 from pathlib import Path
 from types import TracebackType
@@ -48,6 +49,7 @@ class LogWriter:
     def __init__(self, path: Path, file: DurableFile) -> None:
         self.path = path
         self._file = file
+        self._lock = threading.RLock()
         # Its annotation asks for a whole file; write, tell and flush are what it uses.
         self._writer = Writer(cast("IO[bytes]", file), enable_data_crcs=True)
         self._channels: dict[str, int] = {}
@@ -149,22 +151,60 @@ class LogWriter:
             channel_name: the channel, for a waveform.
         """
         topic = topic_of(record, channel_name)
-        self._copy(Message(topic, encode(topic, record), time.time_ns()))
+        data = encode(topic, record)
+        with self._lock:
+            self._copy(Message(topic, data, time.time_ns()))
 
     def sync(self) -> None:
         """Return when everything appended is on the disk."""
-        self._writer.flush()
-        self._file.sync()
+        with self._lock:
+            self._writer.flush()
+            self._file.sync()
+
+    def require_in_place(self) -> None:
+        """Raise where what was synced is no longer at the log's path; to be called after `sync`.
+
+        Raises:
+            LogError: the file is gone, shorter or longer, or another one is in its place.
+        """
+        with self._lock:
+            displacement = self._file.displacement()
+        if displacement is not None:
+            raise LogError(
+                f"the log is no longer as it was written: {displacement}",
+                got=str(self._file.path),
+                remedy="Nothing more is delivered. What can be saved of it is saved when the session ends.",
+            )
+
+    def discard(self) -> None:
+        """Remove a log in which there is nothing to keep."""
+        with self._lock:
+            in_place = self._file.displacement() is None
+            self._file.close()
+            if in_place:
+                self._file.path.unlink()
 
     def close(self) -> None:
         """Finish the log and give it its name; what it went on from is the only file that it replaces.
 
+        Nothing happens where it is closed already.
+
         Raises:
-            LogError: somebody has put a file there meanwhile; the log stays `FILE.part`.
+            LogError: somebody has put a file there meanwhile, and the log stays `FILE.part`; or the log is no longer
+                at its path, and the message says where a copy is.
         """
+        with self._lock:
+            if not self._file.closed:
+                self._close()
+
+    def _close(self) -> None:
         try:
             self._writer.finish()
-            with disk_errors(self._file.path, "the log cannot be given its name", "It is complete where it is."):
+            self._file.flush()
+            self._save_if_displaced()
+            with disk_errors(
+                self._file.path, "the log cannot be given its name", f"It is complete, at {self._file.path}."
+            ):
                 self._take_its_name()
         finally:
             self._file.close()
@@ -179,6 +219,15 @@ class LogWriter:
                 got=str(self.path),
                 remedy=f"The log is complete and stays at {self._file.path}; give it another name.",
             ) from error
+
+    def _save_if_displaced(self) -> None:
+        displacement = self._file.displacement()
+        if displacement is not None:
+            raise LogError(
+                f"the log is no longer as it was written: {displacement}",
+                got=str(self._file.path),
+                remedy=f"What the session still held of it is in {self._file.rescued(self.path)}.",
+            )
 
     def __enter__(self) -> Self:
         return self
@@ -216,8 +265,22 @@ def _require_free(target: Path) -> None:
             raise LogError(
                 "there is a log already, and it is never overwritten",
                 got=str(existing),
-                remedy=f"Choose another path, or continue it: isiw resume {target}",
+                remedy=_way_on(existing),
             )
+
+
+def _way_on(existing: Path) -> str:
+    """What to do about a file that is in the way; only what can be resumed is suggested to be resumed."""
+    try:
+        found = salvage_file(existing)
+    except LogError:
+        return "Choose another path; this is no log that can be continued."
+    if not any(message.topic == "/header" for message in found.messages):
+        return "Choose another path; nothing of this log can be continued."
+    return (
+        f"Choose another path, or go on with it: isiw resume {log_of(existing)}, if isiw run has made it; otherwise "
+        "isiw.resume(path, device).run() in your own software."
+    )
 
 
 def _require_unchanged(source: IO[bytes], salvage: Salvage) -> None:

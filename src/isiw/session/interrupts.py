@@ -1,34 +1,60 @@
-"""Ctrl-C at a safe moment: never between a stimulus and its record."""
+"""Signals of the operator and the system: each disarms at once, and interrupts where nothing is in flight."""
 
 from __future__ import annotations
 
+import os
 import signal
+import socket
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType, TracebackType
 from typing import Any, Self
 
-__all__ = ["DeferredInterrupts"]
+__all__ = ["Interrupts"]
 
-_NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last two, a closed terminal, are not on every system
-_SIGNALS = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
+_PAUSING = ("SIGINT", "SIGTSTP")  # Ctrl-C and Ctrl-Z; Windows has no Ctrl-Z
+_ENDING = ("SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK")  # the last three are not on every system
+_SUSPENDING = getattr(signal, "SIGTSTP", None)
+_PAUSING_SIGNALS = tuple(getattr(signal, name) for name in _PAUSING if hasattr(signal, name))
+_SIGNALS = (*_PAUSING_SIGNALS, *(getattr(signal, name) for name in _ENDING if hasattr(signal, name)))
+
+_REACTION_S = 5.0  # a main thread that runs no handler for so long is stuck
+_DISARMING_S = 30.0
+_GLANCE_S = 0.01
 
 
-class DeferredInterrupts:
-    """Holds back Ctrl-C, a request to terminate, and the closing of the terminal, except where they are allowed.
+class Interrupts:
+    """Hears Ctrl-C, Ctrl-Z, Ctrl-backslash, a request to terminate, and a terminal's closing.
 
-    Each arrives as a KeyboardInterrupt: at once inside `allowed`, else at the next entry into it or at the very end.
-    Outside the main thread, which is where Python delivers signals, nothing is held back; what the process ignores, as
-    under nohup, it goes on ignoring.
+    At each of them a thread of its own disarms at once, whatever the main thread is busy with. Besides, each arrives as
+    a KeyboardInterrupt in the main thread: at once inside `allowed`, else at the next entry into it or at the very end.
+    Ctrl-Z suspends the process when the device is disarmed. Outside the main thread, which is where Python delivers
+    signals, nothing is heard; what the process ignores, as under nohup, it goes on ignoring.
+
+    Args:
+        disarm: disarms; called in another thread, at every signal.
+        stuck: called in another thread where the main one does not react to a second signal.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, disarm: Callable[[], object], stuck: Callable[[], object]) -> None:
+        self._disarm, self._stuck = disarm, stuck
         self._pending = self._allowed = False
+        self._heard = self._disarmed = self._handled = 0
+        self._settled = 0
+        self._ending = False
         self._before: dict[signal.Signals, Any] = {}
+        self._watcher: threading.Thread | None = None
+        self._over = False
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
+            self._ears, mouth = socket.socketpair()
+            mouth.setblocking(False)  # noqa: FBT003 - its only argument
+            self._mouth, self._mouth_before = mouth, signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)
+            self._watcher = threading.Thread(target=self._watch, name="isiw interrupts", daemon=True)
+            self._watcher.start()
             heard = [number for number in _SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
             self._before = {number: signal.signal(number, self._receive) for number in heard}
         return self
@@ -36,26 +62,93 @@ class DeferredInterrupts:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._watcher is not None:
+            self._over = True
+            signal.set_wakeup_fd(self._mouth_before)
         for number, handler in self._before.items():
             signal.signal(number, handler if handler is not None else signal.SIG_DFL)
+        if self._watcher is not None:
+            self._mouth.close()
+            self._watcher.join(_DISARMING_S)
+            self._ears.close()
         if self._pending and error is None:
             raise KeyboardInterrupt
+
+    @property
+    def heard(self) -> bool:
+        """Whether a signal came that is not settled."""
+        return self._handled > self._settled
+
+    @property
+    def insisted(self) -> bool:
+        """Whether more than one did."""
+        return self._handled > self._settled + 1
+
+    @property
+    def ending(self) -> bool:
+        """Whether the session is to end, and not only to pause."""
+        return self._ending or self.insisted
+
+    def acknowledge(self) -> None:
+        """Deliver no KeyboardInterrupt for what was heard so far; it is being dealt with.
+
+        Returns when the device was disarmed for it, so that whoever arms it again is not disarmed by an old signal.
+        """
+        self._pending = False
+        self._wait_until(self._is_disarmed, _DISARMING_S)
+
+    def settle(self) -> None:
+        """Forget what was heard; the operator has decided to go on."""
+        self._settled, self._ending, self._pending = self._handled, False, False
 
     @contextmanager
     def allowed(self) -> Iterator[None]:
         """Within, an interrupt arrives at once."""
-        self._allowed = True
+        before, self._allowed = self._allowed, True
         try:
             if self._pending:
                 self._pending = False
                 raise KeyboardInterrupt
             yield
         finally:
-            self._allowed = False
+            self._allowed = before
 
     def _receive(self, number: int, frame: FrameType | None) -> None:
-        del number, frame
+        del frame
+        self._handled += 1
+        self._ending = self._ending or number not in _PAUSING_SIGNALS
+        if number == _SUSPENDING:
+            self._suspend()
         if self._allowed:
             self._allowed = False  # one is enough; the next must not interrupt the cleanup
             raise KeyboardInterrupt
         self._pending = True
+
+    def _suspend(self) -> None:
+        """Stop the process as Ctrl-Z does, but disarmed; it goes on here."""
+        self._wait_until(self._is_disarmed, _DISARMING_S)
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+    def _watch(self) -> None:
+        """Disarm at every signal, however busy the main thread is."""
+        with suppress(OSError):  # closed at the end
+            while numbers := self._ears.recv(1):
+                if numbers[0] in self._before:
+                    self._heard += 1
+                    self._disarm()
+                    self._disarmed += 1
+                    if self._heard > self._settled + 1 and not self._reacts():
+                        self._stuck()
+
+    def _is_disarmed(self) -> bool:
+        return self._disarmed >= self._handled
+
+    def _reacts(self) -> bool:
+        return self._wait_until(lambda: self._over or self._handled >= self._heard, _REACTION_S)
+
+    @staticmethod
+    def _wait_until(holds: Callable[[], bool], at_most_s: float) -> bool:
+        end_s = time.monotonic() + at_most_s
+        while not holds() and time.monotonic() < end_s:
+            time.sleep(_GLANCE_S)
+        return holds()

@@ -7,26 +7,36 @@ from __future__ import annotations
 
 import datetime as dt
 import importlib.metadata
-import math
 import platform
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import isiw
 from isiw.checks import deadline, number
-from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
-from isiw.devices.limits import LimitedDevice, Limits
-from isiw.devices.protocol import Answer, Device, DeviceInfo
-from isiw.errors import DeviceError, LimitExceededError, StrategyError
+from isiw.devices.clock import Clock
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import Answer, Device
+from isiw.errors import (
+    DeviceError,
+    DeviceTimeoutError,
+    InvalidValueError,
+    LimitExceededError,
+    LogError,
+    NotDelivered,
+    StrategyError,
+    told,
+)
 from isiw.log.durable import log_of
-from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform, waveform_topic
+from isiw.log.pulses import earlier_pulses_s
+from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform
 from isiw.log.writer import LogWriter
-from isiw.session.interrupts import DeferredInterrupts
-from isiw.signals.judgement import EMG_UNITS_MV, SignalLimits, judge, judge_measurement, require_unit
+from isiw.session.operator import goes_on
+from isiw.session.rig import Rig, require_matching
+from isiw.session.safeguards import Safeguards
+from isiw.signals.judgement import SignalLimits, judge, judge_measurement
 from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Measurement, Stimulus, Sweep, Trial, TrialTable
@@ -34,7 +44,15 @@ from isiw.window import WindowEstimate
 
 __all__ = ["Session", "SessionResult", "SessionUpdate", "learn"]
 
+P = ParamSpec("P")
+T = TypeVar("T")
+
 _PACKAGES = ("numpy", "torch", "botorch", "gpytorch")
+
+_NOTHING_GIVEN = (NotDelivered, LimitExceededError, LogError)
+"""What is raised only before a stimulus is delivered."""
+
+_NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
 
 
 @dataclass(frozen=True)
@@ -95,27 +113,9 @@ def learn(strategy: Strategy, trial: Trial) -> None:
         strategy.count_mistrial()
 
 
-def _require_matching(info: DeviceInfo, strategy: Strategy) -> None:
-    """Raise where the strategy would misread the device's answers."""
-    if info.reference != strategy.space.reference:
-        raise DeviceError(
-            "the device and the design space count ISIs from different events",
-            got=info.reference,
-            expected=strategy.space.reference,
-            remedy="Give the DesignSpace the device's reference.",
-        )
-    for name in info.channels:
-        waveform_topic(name)
-    if "emg" in info.channels:  # an acceleration is not read where the device itself knows the time of the hit
-        require_unit("emg", info.channels["emg"], EMG_UNITS_MV)
-    limit_mv, assumed_mv = info.detection_limit_mv, strategy.recipe.settings.get("detection_limit_mv")
-    if limit_mv is not None and assumed_mv is not None and not math.isclose(limit_mv, assumed_mv):
-        raise DeviceError(
-            "the device and the strategy have different detection limits, so an MEP of 0 would be misunderstood",
-            got=f"{limit_mv:g} mV from the device",
-            expected=f"{assumed_mv:g} mV, as the strategy assumes",
-            remedy=f"Make the strategy with the device's: make_strategy(..., detection_limit_mv={limit_mv:g}).",
-        )
+def _late_text(answer: Answer) -> str:
+    what = f"{answer.mep_mv:g} mV" if isinstance(answer, Measurement) else "a sweep"
+    return f"An answer came after the deadline: {what}. It is not told."
 
 
 class Session:
@@ -131,13 +131,15 @@ class Session:
         subject: the person's code, for the log.
         signals: what a sweep must keep to be accepted.
         config: anything that should be kept in the log, as TOML values.
-        timeout_s: how long the device may take for one delivery [s].
+        timeout_s: how long the device may take for one delivery [s]; past it, it is disarmed and the session ends.
         ask_deadline_s: how long the strategy may take for one ask [s]; past it, it falls back, and the log says so.
+        safeguards: what is done about faults, pauses and earlier sessions.
 
     Raises:
         DeviceError: the device counts its ISIs from another event than the space, or states another detection limit
-            than the strategy's.
-        InvalidValueError: a time that is no positive number, or a channel whose name or unit a session cannot use.
+            than the strategy's, or is not simulated and has a virtual clock.
+        InvalidValueError: a time that is no positive number, a channel whose name or unit a session cannot use, or
+            earlier logs without a subject to find in them.
     """
 
     def __init__(  # noqa: PLR0913 - the public surface of the design; all but two are keyword-only
@@ -154,17 +156,19 @@ class Session:
         config: Mapping[str, Any] | None = None,
         timeout_s: float = 30.0,
         ask_deadline_s: float | None = None,
+        safeguards: Safeguards | None = None,
     ) -> None:
-        space, info = strategy.space, device.describe()
-        _require_matching(info, strategy)
+        space = strategy.space
+        self._limits = limits or Limits.of_space(space)
+        self._safeguards = safeguards or Safeguards()
+        self._rig = Rig(device, self._limits, clock, self._safeguards)
+        self._clock, self._interrupts, info = self._rig.clock, self._rig.interrupts, self._rig.info
+        require_matching(info, strategy)
         timeout_s = number("timeout_s", timeout_s, above=0)
         ask_deadline_s = deadline("ask_deadline_s", ask_deadline_s)
         self.strategy = strategy
         self.trials = TrialTable()
         self.log_path = log_of(Path(log))
-        self._raw_device = device
-        self._limits = limits or Limits.of_space(space)
-        self._clock = clock or (VirtualClock() if info.simulated else MonotonicClock())
         self._signals = signals or SignalLimits()
         self._on_trial, self._timeout_s, self._ask_deadline_s = on_trial, timeout_s, ask_deadline_s
         recipe = strategy.recipe
@@ -183,11 +187,23 @@ class Session:
             versions={name: version for name, version in versions().items() if name != "isiw"},
             config=dict(config or {}),
         )
+        if self._safeguards.earlier_logs is not None and not subject:
+            raise InvalidValueError(
+                "earlier logs count for the same subject only, and there is none", remedy="Give the session a subject."
+            )
         self._open_log: Callable[[Header], LogWriter] = partial(LogWriter.create, log)
         self._first_records: Sequence[Record] = ()
+        self._own_earlier_s: Callable[[], Sequence[float]] = tuple
+        self._unconcluded: Trial | None = None
+        self._pause_reason: str | None = None
+        self._resumed = False
 
     def continue_from(
-        self, trials: TrialTable, open_log: Callable[[Header], LogWriter], first_records: Sequence[Record]
+        self,
+        trials: TrialTable,
+        open_log: Callable[[Header], LogWriter],
+        first_records: Sequence[Record],
+        earlier_s: Callable[[], Sequence[float]] = tuple,
     ) -> None:
         """Begin where another run ended; `isiw.resume` does this for you.
 
@@ -195,16 +211,19 @@ class Session:
             trials: what was delivered before; the strategy has learned it.
             open_log: opens the log that goes on, with this session's header.
             first_records: what it holds next.
+            earlier_s: says how long ago each stimulus before was [s].
         """
         self.trials, self._open_log, self._first_records = trials, open_log, first_records
+        self._own_earlier_s, self._resumed = earlier_s, True
 
     def run(self) -> SessionResult:
         """Run to the end, and close the log whatever happens.
 
         Raises:
-            DeviceError: the device failed; it is stopped, and the trial is a mistrial "outcome unknown".
+            DeviceError: the device failed; it is stopped, and the trial is a mistrial "outcome unknown". Or another
+                session drives it.
             LimitExceededError: a stimulus was refused; nothing was delivered.
-            LogError: the log cannot be written; nothing is delivered without a log.
+            LogError: the log cannot be written, or is no longer at its path; nothing is delivered without a log.
             StrategyError: the strategy knows of trials that are not this session's; nothing was delivered.
         """
         if self.strategy.delivered > len(self.trials):
@@ -214,28 +233,49 @@ class Session:
                 expected=f"{len(self.trials)} trials",
                 remedy="Make a new one, or give the session strategy.restarted().",
             )
-        with DeferredInterrupts() as self._interrupts, self._open_log(self._header) as self._log:
+        earlier_s = self._earlier_s()
+        with self._rig.driven(), self._open_log(self._header) as self._log:
+            self._rig.log = self._log
             try:
                 self._log_beginning()
-                with self._armed():
+                with self._rig.armed(len(self.trials), earlier_s):
                     decision = self._loop()
+                self._log_faults()
             except BaseException as error:
+                self._log_faults()
                 self._log_failure(error)
+                if not (self._rig.staged_once or self._resumed):
+                    self._log.discard()
                 raise
         return SessionResult(self.strategy.estimate(), decision, self.trials, self._log.path)
 
-    @contextmanager
-    def _armed(self) -> Iterator[None]:
-        self._device = LimitedDevice(self._raw_device, self._limits, self._clock, delivered=len(self.trials))
-        try:
-            with self._interrupts.allowed():
-                self._device.stage()
-            yield
-        finally:
-            try:
-                self._device.stop()
-            finally:
-                self._device.unstage()
+    def pause(self, reason: str) -> None:
+        """Disarm now, and pause before the next stimulus; from any thread, also from `on_trial`.
+
+        `Safeguards.on_pause` or the operator decides how it goes on; where nobody can, the session ends, and can be
+        resumed.
+
+        Args:
+            reason: why, for the operator and the log.
+        """
+        self._pause_reason = reason
+        self._rig.disarm()
+
+    def _earlier_s(self) -> list[float]:
+        """How long ago each earlier stimulus was to the same person, as far as the logs to look at know [s]."""
+        limits, folder = self._limits, self._safeguards.earlier_logs
+        if self._header.device.simulated or (limits.max_block_pulses is None and limits.max_period_pulses is None):
+            return []
+        earlier_s = list(self._own_earlier_s())
+        if folder is not None:
+            period_s = max(limits.period_s, limits.rest_s)
+            earlier_s += earlier_pulses_s(folder, self._header.subject, period_s, but=self.log_path)
+        return earlier_s
+
+    def _freely(self, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Call what may be interrupted at any time, as no stimulus is in flight and no record half written."""
+        with self._interrupts.allowed():
+            return call(*args, **kwargs)
 
     def _log_beginning(self) -> None:
         for record in self._first_records:
@@ -245,70 +285,163 @@ class Session:
 
     def _log_failure(self, error: BaseException) -> None:
         kind: EventKind = "limit" if isinstance(error, LimitExceededError) else "fault"
-        interrupted = isinstance(error, KeyboardInterrupt)
-        self._log_event(kind, "Interrupted by the operator." if interrupted else f"{type(error).__name__}: {error}")
+        self._log_event(kind, "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else told(error))
 
     def _log_event(self, kind: EventKind, text: str) -> None:
         self._log.append(Event(kind=kind, trial=len(self.trials) - 1 if self.trials else None, text=text))
 
+    def _log_faults(self) -> None:
+        """Log what went wrong and was overcome, in whichever thread."""
+        while self._rig.faults:
+            self._log_event("fault", self._rig.faults.popleft())
+
     def _loop(self) -> StopDecision:
-        decision = self.strategy.decision()
-        while not decision.stop:
-            if not self._device.pulses_left:
-                return self._stop_at_limit()
-            decision = self._one_trial()
+        decision = None
+        while decision is None or not decision.stop:
+            if self._pausing:
+                decision = self._pause(self._pause_reason or "Interrupted by the operator.")
+                continue
+            try:
+                decision = self._next_step()
+            except KeyboardInterrupt:
+                if not self._interrupts.heard:
+                    raise
+            except NotDelivered:
+                if not self._pausing:
+                    raise
         return decision
+
+    def _next_step(self) -> StopDecision | None:
+        """Conclude the trial that was delivered, or deliver the next; the decision to stop, where there is one."""
+        if self._unconcluded is not None:
+            return self._concluded(self._unconcluded)
+        if (decision := self._freely(self.strategy.decision)).stop:
+            return decision
+        if not self._rig.pulses_left:
+            return self._stop_at_limit()
+        self._one_trial()
+        return None
+
+    @property
+    def _pausing(self) -> bool:
+        return self._pause_reason is not None or self._interrupts.heard
+
+    def _pause(self, reason: str) -> StopDecision | None:
+        """Disarm, and arm again only where somebody says so; the decision to stop, where nobody does."""
+        self._rig.disarm()
+        self._log_faults()
+        if self._interrupts.ending:
+            raise KeyboardInterrupt
+        self._interrupts.acknowledge()
+        self._log_event("pause", reason)
+        self._log.sync()
+        if not self._freely(self._safeguards.on_pause or goes_on, reason):
+            if self._interrupts.heard:
+                raise KeyboardInterrupt
+            return StopDecision(stop=True, reason=f"Paused: {reason}")
+        self._interrupts.settle()
+        self._pause_reason = None
+        self._log_event("pause", "The operator goes on.")
+        self._rig.stage()
+        return None
 
     def _stop_at_limit(self) -> StopDecision:
         decision = StopDecision(stop=True, reason=f"The limit of {self._limits.max_pulses} pulses is reached.")
         self._log_event("limit", decision.reason)
-        self._log.append(Estimate.of(len(self.trials) - 1, self.strategy.estimate(), decision, None))
+        estimate = self._freely(self.strategy.estimate)
+        self._log.append(Estimate.of(len(self.trials) - 1, estimate, decision, None))
         return decision
 
-    def _one_trial(self) -> StopDecision:
-        stimulus = Stimulus(len(self.trials), self.strategy.ask(self._ask_deadline_s))
+    def _one_trial(self) -> None:
+        stimulus = Stimulus(len(self.trials), self._freely(self.strategy.ask, self._ask_deadline_s))
         if self.strategy.fallback_reason is not None:
             self._log.append(Event(kind="fallback", trial=stimulus.trial, text=self.strategy.fallback_reason))
-        trial = self._delivered(stimulus)
-        learn(self.strategy, trial)
+        for backoff_s in self._safeguards.backoffs_s:
+            try:
+                return self._deliver(stimulus)
+            except NotDelivered:
+                if self._pausing:
+                    raise
+                self._freely(self._clock.sleep_s, backoff_s)
+        return self._deliver(stimulus)
+
+    def _concluded(self, trial: Trial) -> StopDecision:
+        """Learn from a delivered trial and report; each step is taken once, also where the one after is interrupted."""
+        if self.strategy.delivered < len(self.trials):
+            self._freely(learn, self.strategy, trial)
         if trial.told and self.strategy.trouble is not None:
             self._log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
         decision, next_isi_ms = self._log_estimate(trial.index)
+        self._unconcluded = None
         if self._on_trial is not None:
-            update = SessionUpdate(trial, self.strategy.estimate(), decision, next_isi_ms, self._stimuli_left())
-            self._on_trial(update)
+            estimate = self._freely(self.strategy.estimate)
+            update = SessionUpdate(trial, estimate, decision, next_isi_ms, self._stimuli_left())
+            self._freely(self._on_trial, update)
         return decision
 
     def _log_estimate(self, trial: int) -> tuple[StopDecision, float | None]:
         """Put what is believed after a trial on disk; the decision and the next ISI [ms]."""
-        estimate, decision = self.strategy.estimate(), self.strategy.decision()
-        next_isi_ms = None if decision.stop else self.strategy.ask(self._ask_deadline_s)
+        estimate, decision = self._freely(self.strategy.estimate), self._freely(self.strategy.decision)
+        next_isi_ms = None if decision.stop else self._freely(self.strategy.ask, self._ask_deadline_s)
         self._log.append(Estimate.of(trial, estimate, decision, next_isi_ms))
         self._log.sync()
         return decision, next_isi_ms
 
     def _stimuli_left(self) -> int:
         budget = stimuli_left(self.strategy.stopping, len(self.trials))
-        return self._device.pulses_left if budget is None else min(budget, self._device.pulses_left)
+        return self._rig.pulses_left if budget is None else min(budget, self._rig.pulses_left)
 
-    def _delivered(self, stimulus: Stimulus) -> Trial:
+    def _wait(self) -> None:
+        """Sleep until the limits allow the next stimulus, or somebody wants to pause."""
+        while self._pause_reason is None and (wait_s := self._rig.wait_s()) > 0:
+            self._clock.sleep_s(min(wait_s, _NAP_S))
+
+    def _deliver(self, stimulus: Stimulus) -> None:
         """Deliver, with the intent on disk before and the trial after, whatever the device does."""
-        with self._interrupts.allowed():
-            self._clock.sleep_s(self._device.wait_s())
-        self._device.check(stimulus)
+        self._freely(self._wait)
+        self._require_allowed(stimulus)
         self._log.append(Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=self._clock.now_s()))
         self._log.sync()
-        trial = Trial.unknown(stimulus)
+        trial: Trial | None = Trial.unknown(stimulus)
         try:
-            with self._interrupts.allowed():
-                answer = self._device.deliver(stimulus, self._timeout_s)
-            self._log_waveforms(stimulus, answer)
-            trial = self._judged(stimulus, answer)
+            trial = self._judged(stimulus, self._answer(stimulus))
+        except _NOTHING_GIVEN as error:
+            trial = None
+            self._log.append(Event(kind="refused", trial=stimulus.trial, text=told(error)))
+            raise
+        except Exception as error:
+            if not self._pausing:
+                raise
+            self._rig.faults.append(f"While the device was being disarmed: {told(error)}")
         finally:
-            self._log.append(trial)
+            if trial is not None:
+                self._log.append(trial)
+                self.trials = self.trials.appended(trial)
+                self._unconcluded = trial
+            self._log_faults()
             self._log.sync()
-            self.trials = self.trials.appended(trial)
-        return trial
+
+    def _require_allowed(self, stimulus: Stimulus) -> None:
+        """Raise where the limits or the device do not allow a stimulus, before anything is logged of it."""
+        try:
+            self._rig.check(stimulus)
+        except NotDelivered as error:
+            self._log_event("limit", told(error))
+            raise
+
+    def _answer(self, stimulus: Stimulus) -> Answer:
+        """What came of a stimulus; its waveforms are logged, also where it comes too late."""
+        self._log.require_in_place()
+        try:
+            answer = self._rig.deliver(stimulus, self._timeout_s)
+        except DeviceTimeoutError:
+            late = self._rig.late_answer()
+            if late is not None:
+                self._log_waveforms(stimulus, late)
+                self._log.append(Event(kind="late", trial=stimulus.trial, text=_late_text(late)))
+            raise
+        self._log_waveforms(stimulus, answer)
+        return answer
 
     def _log_waveforms(self, stimulus: Stimulus, answer: Answer) -> None:
         if isinstance(answer, Sweep):

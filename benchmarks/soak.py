@@ -1,0 +1,154 @@
+"""Sessions with a device that fails in every way, run and resumed to their ends: is anything lost, or given twice?
+
+    python -m benchmarks.soak --sessions 2000 > benchmarks/results/soak.md
+
+Each session has a device that fails at random (`isiw.testing.FaultyDevice`), from a stage that hangs to an answer that
+comes too late. What ends a session is resumed until its stimuli are used up. Then what the device has really fired is
+compared with the log, pair by pair, and what was asked with what the strategy asks again when it is told the log. The
+strategy is one that depends on all it was told and costs nothing, so that it is the loop that is tried.
+"""
+
+from __future__ import annotations
+
+import argparse
+import faulthandler
+import importlib.metadata
+import math
+import platform
+import shlex
+import sys
+import tempfile
+import time
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+from rich.console import Console
+from rich.progress import track
+
+import isiw
+from benchmarks.remembering import SPACE, answer, strategy
+from isiw.testing import Fault, FaultyDevice, check_ledger
+
+STUCK_S = 600.0
+
+
+class Soaked:
+    """One session, resumed until it ends.
+
+    Args:
+        folder: where its log is.
+        seed: seed of everything.
+        trials: its budget.
+        rate: the share of calls that fail.
+    """
+
+    def __init__(self, folder: Path, seed: int, trials: int, rate: float) -> None:
+        self.log, self.seed, self.trials = folder / f"{seed}.mcap", seed, trials
+        self.clock = isiw.VirtualClock()
+        self.limits = isiw.Limits.of_space(SPACE, max_pulses=trials)
+        self.limits = replace(self.limits, max_coil_c=40.0, max_block_pulses=12, rest_s=120.0)
+        self.guards = isiw.Safeguards(
+            deadlines=isiw.Deadlines(stage_s=0.3, stop_s=0.2, unstage_s=0.3, stop_attempts=4), retries=2
+        )
+        info = isiw.DeviceInfo("faulty", "valve", simulated=True)
+        self.device = FaultyDevice(
+            isiw.CallbackDevice(answer, info), seed, self.clock, rate=rate, late_s=0.3, on_fire=self.check_intent
+        )
+        self.runs = 0
+
+    def check_intent(self, stimulus: isiw.Stimulus) -> None:
+        """What is about to be fired is on disk already; looked at in every tenth session, as it means reading it."""
+        if self.seed % 10 == 0:
+            last = isiw.read_session(self.log).intents[-1]
+            assert (last.trial, last.isi_ms) == (stimulus.trial, stimulus.isi_ms)  # noqa: S101 - what is tried here
+
+    def run(self) -> isiw.log.SessionRecord:
+        """Run and resume until the strategy stops; the log at the end."""
+        while not self.ended():
+            self.runs += 1
+            try:
+                self.session().run()
+            except (isiw.errors.IsiwError, TypeError, ValueError):
+                pass  # what the device did; the log must stand it
+            finally:
+                self.device.release()
+            if self.device.armed:
+                sys.exit(f"session {self.seed} ended armed")
+        return isiw.read_session(self.log)
+
+    def ended(self) -> bool:
+        """Whether all stimuli are used up."""
+        return self.log.exists() and len(isiw.read_session(self.log).table) >= self.trials
+
+    def session(self) -> isiw.Session:
+        """The session, new or resumed."""
+        own = strategy(self.trials, self.seed)
+        times = {"clock": self.clock, "timeout_s": 0.2, "safeguards": self.guards, "limits": self.limits}
+        if self.log.exists():
+            return isiw.resume(self.log, self.device, own, **times)
+        return isiw.Session(self.device, own, log=self.log, **times)
+
+
+def check(soaked: Soaked, record: isiw.log.SessionRecord) -> None:
+    """End the program where anything is lost, given twice, or asked differently."""
+    if record.losses or not record.finished:
+        sys.exit(f"the log of session {soaked.seed} is damaged: {record.losses}")
+    check_ledger(soaked.device.ledger, record, soaked.limits)
+    isiw.resume(soaked.log, soaked.device, strategy(soaked.trials, soaked.seed))  # raises where it asks differently
+
+
+def main() -> None:
+    """Run the sessions and print the counts."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sessions", type=int, default=2000)
+    parser.add_argument("--trials", type=int, default=30)
+    parser.add_argument("--rate", type=float, default=0.08, help="share of calls that fail")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--minutes", type=float, default=math.inf, help="stop after so long, and say how many there were"
+    )
+    arguments = parser.parse_args()
+    torch.set_num_threads(1)
+    began_s, happened = time.monotonic(), Counter[Fault]()
+    counts = Counter[str]()
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in track(
+            range(arguments.seed, arguments.seed + arguments.sessions), "soaking", console=Console(stderr=True)
+        ):
+            faulthandler.dump_traceback_later(STUCK_S, exit=True)
+            soaked = Soaked(Path(folder), seed, arguments.trials, arguments.rate)
+            record = soaked.run()
+            check(soaked, record)
+            soaked.log.unlink()
+            happened += soaked.device.happened
+            counts += Counter(
+                sessions=1,
+                runs=soaked.runs,
+                trials=len(record.table),
+                fired=len(soaked.device.ledger),
+                told=len(record.table.told),
+                refused=sum(event.kind == "refused" for event in record.events),
+                late=sum(event.kind == "late" for event in record.events),
+            )
+            if time.monotonic() - began_s > 60 * arguments.minutes:
+                break
+    faulthandler.cancel_dump_traceback_later()
+    versions = {name: importlib.metadata.version(name) for name in ("mcap", "numpy", "torch")}
+    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.soak', *sys.argv[1:]])}`")
+    print(f"- python {platform.python_version()}, {', '.join(f'{name} {v}' for name, v in versions.items())}\n")
+    print(
+        f"{counts['sessions']:,} sessions of {arguments.trials} trials, run {counts['runs']:,} times in all: "
+        f"{counts['fired']:,} pairs fired, {counts['trials']:,} trials logged, {counts['told']:,} of them told, "
+        f"{counts['refused']:,} refusals, {counts['late']:,} late answers. No pair without an intent before it, none "
+        "twice, no limit passed, none missing in a log, no log damaged, no session left armed, every ask the same "
+        "again.\n"
+    )
+    print("| fault | times |\n|---|---|")
+    for fault in Fault:
+        print(f"| {fault} | {happened[fault]:,} |")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,312 @@
+"""A wrapper around any device that keeps a deadline for each of its verbs, and disarms it whatever it does."""
+
+from __future__ import annotations
+
+import contextvars
+import queue
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Generic, TypeVar
+
+from isiw.checks import check_numbers, check_wholes
+from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness
+from isiw.errors import DeviceTimeoutError, StillArmedError, told
+from isiw.trials import Stimulus
+
+__all__ = ["Deadlines", "PunctualDevice"]
+
+_T = TypeVar("_T")
+
+_GLANCE_S = 0.05  # Windows lets no signal interrupt a wait, so none is longer
+
+
+@dataclass(frozen=True)
+class Deadlines:
+    """How long each verb of a device may take; how long a delivery may is the session's `timeout_s`.
+
+    Args:
+        describe_s: `describe` [s].
+        stage_s: `stage` [s].
+        readiness_s: `readiness` [s].
+        stop_s: each attempt at `stop` [s].
+        unstage_s: `unstage` [s].
+        stop_attempts: how often `stop` is tried before the device counts as still armed.
+
+    Raises:
+        InvalidValueError: a time that is not positive, or no attempt.
+    """
+
+    describe_s: float = 10.0
+    stage_s: float = 60.0
+    readiness_s: float = 5.0
+    stop_s: float = 5.0
+    unstage_s: float = 10.0
+    stop_attempts: int = 3
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "describe_s", "stage_s", "readiness_s", "stop_s", "unstage_s", above=0)
+        check_wholes(self, "stop_attempts", least=1)
+
+
+class _Call(Generic[_T]):
+    """One verb that another thread works on."""
+
+    def __init__(self, verb: Callable[[], _T]) -> None:
+        self._verb, self._context = verb, contextvars.copy_context()
+        self._began_s, self._ended_s = time.monotonic(), 0.0
+        self._ended = threading.Event()
+        self._result: _T
+        self._error: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            self._result = self._context.run(self._verb)
+        except BaseException as error:  # noqa: BLE001 - handed over to whoever waits for the result
+            self._error = error
+        self._ended_s = time.monotonic()
+        self._ended.set()
+
+    @property
+    def ended(self) -> bool:
+        return self._ended.is_set()
+
+    @property
+    def age_s(self) -> float:
+        return time.monotonic() - self._began_s
+
+    def kept(self, deadline_s: float) -> bool:
+        """Whether it ended in time."""
+        return self.ended and self._ended_s - self._began_s <= deadline_s
+
+    def wait(self, deadline_s: float, given_up: Callable[[], bool] = lambda: False) -> None:
+        """Wait until it ends, or so long after it began [s], or until nobody waits any more."""
+        while not self.ended and (left_s := self._began_s + deadline_s - time.monotonic()) > 0 and not given_up():
+            self._ended.wait(min(left_s, _GLANCE_S))
+
+    def result(self) -> _T:
+        """What it returned; what it raised is raised."""
+        if self._error is not None:
+            raise self._error
+        return self._result
+
+
+class _Worker:
+    """A thread that works on one verb after the other; it does not keep the process from ending."""
+
+    def __init__(self) -> None:
+        self._calls: queue.SimpleQueue[_Call[Any] | None] = queue.SimpleQueue()
+        self._last: _Call[Any] | None = None
+        threading.Thread(target=self._work, name="isiw device", daemon=True).start()
+
+    @property
+    def idle(self) -> bool:
+        return self._last is None or self._last.ended
+
+    def begin(self, verb: Callable[[], _T]) -> _Call[_T]:
+        call = self._last = _Call(verb)
+        self._calls.put(call)
+        return call
+
+    def end(self) -> None:
+        self._calls.put(None)
+
+    def _work(self) -> None:
+        while (call := self._calls.get()) is not None:
+            call.run()
+
+
+class PunctualDevice:
+    """A device whose verbs end in time, or are given up and followed by `stop` from outside.
+
+    All verbs run in one thread of their own, one after the other. A verb that is given up may still be busy; when it
+    ends, the device is stopped once more, in case it armed it. `stop` is tried several times, from another thread where
+    the device's own is busy.
+
+    Args:
+        device: the device.
+        deadlines: how long each verb may take.
+        given_up: whether nobody waits any more for a delivery; asked while it lasts.
+        report: is told what went wrong and was overcome, in words; called from any thread.
+
+    Raises:
+        DeviceTimeoutError: the device does not say what it is.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        deadlines: Deadlines | None = None,
+        *,
+        given_up: Callable[[], bool] = lambda: False,
+        report: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self._device, self._deadlines = device, deadlines or Deadlines()
+        self._given_up, self._report = given_up, report
+        self._stopping = threading.RLock()
+        self._disarmed = False
+        self._late: _Call[Answer] | None = None
+        self._worker: _Worker | None = None
+        self._owner = threading.get_ident()
+        self._info = self._within("describe", device.describe, self._deadlines.describe_s)
+
+    def describe(self) -> DeviceInfo:
+        """What the device is, as it said at first."""
+        return self._info
+
+    def stage(self) -> None:
+        """Get ready and arm.
+
+        Raises:
+            DeviceTimeoutError: not within its deadline.
+        """
+        self._disarmed = False
+        self._within("stage", self._device.stage, self._deadlines.stage_s)
+
+    def readiness(self) -> Readiness:
+        """What the device says about its state; ready, where it cannot say.
+
+        Raises:
+            DeviceTimeoutError: not within its deadline.
+        """
+        if not isinstance(self._device, ReportsReadiness):
+            return Readiness()
+        return self._within("readiness", self._device.readiness, self._deadlines.readiness_s)
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
+        """Deliver one pair of stimuli.
+
+        Args:
+            stimulus: what to deliver.
+            timeout_s: the longest the device may take [s].
+
+        Raises:
+            DeviceTimeoutError: no answer in time; `late_answer` may have it.
+        """
+        call = self._begun(partial(self._device.deliver, stimulus, timeout_s))
+        self._late = call
+        return self._awaited("deliver", call, timeout_s, self._given_up)
+
+    def late_answer(self, wait_s: float) -> Answer | None:
+        """What came of the last delivery after its deadline; None where nothing did.
+
+        Args:
+            wait_s: how long to wait for it from now on [s].
+        """
+        late = self._late
+        if late is None:
+            return None
+        late.wait(late.age_s + wait_s)
+        try:
+            return late.result() if late.ended else None
+        except Exception as error:  # noqa: BLE001 - whatever a device fails with too late is told
+            self._report(f"After its deadline the delivery failed: {told(error)}")
+            return None
+
+    def stop(self) -> None:
+        """Disarm, unless it is disarmed and no other verb is busy.
+
+        Raises:
+            StillArmedError: the device could not be disarmed, however often it was tried.
+        """
+        with self._stopping:
+            if not self._disarmed:
+                idle = self._idle
+                self._stop()
+                self._disarmed = idle
+
+    def _stop(self) -> None:
+        failure = None
+        for attempt in range(1, self._deadlines.stop_attempts + 1):
+            failure = self._failure_to_stop()
+            if failure is None:
+                return
+            self._report(f"Attempt {attempt} to disarm failed: {failure}")
+        raise StillArmedError(
+            "the device cannot be disarmed",
+            got=f"{self._info.name}: {failure}",
+            remedy="Cut its power or open the interlock now.",
+        )
+
+    @property
+    def _idle(self) -> bool:
+        return self._worker is None or self._worker.idle
+
+    def unstage(self) -> None:
+        """Let go of what `stage` took.
+
+        Raises:
+            DeviceTimeoutError: not within its deadline.
+        """
+        self._within("unstage", self._device.unstage, self._deadlines.unstage_s)
+
+    def release_thread(self) -> None:
+        """Let the thread end; a verb that follows gets a new one."""
+        if self._worker is not None:
+            self._worker.end()
+            self._worker = None
+
+    def _begun(self, verb: Callable[[], _T]) -> _Call[_T]:
+        self._owner = threading.get_ident()
+        self._worker = self._worker or _Worker()
+        return self._worker.begin(verb)
+
+    def _within(self, name: str, verb: Callable[[], _T], deadline_s: float) -> _T:
+        return self._awaited(name, self._begun(verb), deadline_s)
+
+    def _awaited(
+        self, name: str, call: _Call[_T], deadline_s: float, given_up: Callable[[], bool] = lambda: False
+    ) -> _T:
+        try:
+            call.wait(deadline_s, given_up)
+        finally:
+            if not call.ended:
+                self._give_up()
+        if call.kept(deadline_s):
+            return call.result()
+        error = DeviceTimeoutError(
+            f"the device was given up: {name} took too long",
+            got=self._info.name if name != "describe" else None,
+            expected=f"an answer within {deadline_s:g} s",
+            remedy="It is disarmed. See to it, then go on with the session's log.",
+        )
+        if name != "describe":
+            self._stop_after(error)
+        raise error
+
+    def _stop_after(self, error: DeviceTimeoutError) -> None:
+        try:
+            self.stop()
+        except StillArmedError as armed:
+            raise armed from error
+
+    def _give_up(self) -> None:
+        """Leave the thread to the verb it is busy with; when that ends it stops the device once more, and ends."""
+        if self._worker is not None:
+            self._worker.begin(self._device.stop)
+        self.release_thread()
+
+    def _failure_to_stop(self) -> str | None:
+        """Why an attempt to disarm failed; None where it did not."""
+        own = self._idle and self._owner == threading.get_ident()
+        call = self._begun(self._device.stop) if own else _outside(self._device.stop)
+        call.wait(self._deadlines.stop_s)
+        if not call.ended:
+            if own:
+                self._give_up()
+            return f"no return within {self._deadlines.stop_s:g} s"
+        try:
+            call.result()
+        except BaseException as error:  # noqa: BLE001 - whatever it is, the device may still be armed
+            return told(error)
+        return None
+
+
+def _outside(verb: Callable[[], _T]) -> _Call[_T]:
+    """A verb in a thread that does nothing else."""
+    worker = _Worker()
+    call = worker.begin(verb)
+    worker.end()
+    return call

@@ -1,0 +1,180 @@
+"""A wrapper around any device that delivers nothing beyond its limits."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+from collections.abc import Callable, Sequence
+
+from isiw.devices.clock import Clock, VirtualClock
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness, require_staged
+from isiw.errors import DeviceError, LimitExceededError, NotDelivered
+from isiw.trials import Stimulus
+
+__all__ = ["LimitedDevice", "require_real_time"]
+
+_ROUNDING_S = 1e-6  # who sleeps for exactly `wait_s` may wake up a rounding error early
+
+
+def require_real_time(info: DeviceInfo, clock: Clock) -> None:
+    """Raise where a device that may stimulate somebody would not wait between its stimuli.
+
+    Args:
+        info: what the device says about itself.
+        clock: tells the time, and waits.
+
+    Raises:
+        DeviceError: a virtual clock for a device that does not declare that it is simulated.
+    """
+    if isinstance(clock, VirtualClock) and not info.simulated:
+        raise DeviceError(
+            "a virtual clock does not wait between stimuli, so it is for simulated devices only",
+            got=info.name,
+            remedy="Leave the clock out, or describe a device that stimulates nobody with simulated=True.",
+        )
+
+
+class LimitedDevice:
+    """A device that refuses what exceeds its limits, before anything is delivered. Safe to use from several threads.
+
+    A delivery that fails counts like any other, because nobody knows whether the pulse left; only what was refused
+    before firing does not. The inter-trial interval runs from the moment the last attempt ended. The first delivery
+    waits a whole interval, too: nobody knows what came before. Nothing loosens once the device is made: it keeps a copy
+    of its limits, and an intensity that is reported at `stage` may not change any more.
+
+    Args:
+        device: the device to guard.
+        limits: what it may deliver.
+        clock: tells the time between deliveries; a virtual one for simulated devices only.
+        delivered: deliveries of this session so far.
+        earlier_s: how long ago each earlier delivery was to the same person [s], as far as they count for a block or a
+            period.
+        dead_man: is called before each delivery; anything but True refuses it.
+
+    Raises:
+        DeviceError: a virtual clock, which waits for nobody, for a device that is not simulated.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        limits: Limits,
+        clock: Clock,
+        *,
+        delivered: int = 0,
+        earlier_s: Sequence[float] = (),
+        dead_man: Callable[[], bool] | None = None,
+    ) -> None:
+        info = device.describe()
+        require_real_time(info, clock)
+        self._device, self._info, self._clock, self._dead_man = device, info, clock, dead_man
+        self._limits = Limits(**dataclasses.asdict(limits))
+        self._delivered = delivered
+        now_s = clock.now_s()
+        self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
+        self._not_before_s = now_s + self._limits.min_iti_s
+        self._staged = False
+        self._one_at_a_time = threading.Lock()
+
+    @property
+    def limits(self) -> Limits:
+        """What it may deliver."""
+        return self._limits
+
+    @property
+    def pulses_left(self) -> int:
+        """How many deliveries are still allowed."""
+        return max(0, self._limits.max_pulses - self._delivered)
+
+    def wait_s(self) -> float:
+        """How long until the interval, the rest and the period allow the next delivery [s]."""
+        earliest_s = max(self._not_before_s, self._limits.earliest_s(self._times_s))
+        return max(0.0, earliest_s - self._clock.now_s())
+
+    def check(self, stimulus: Stimulus) -> None:
+        """Raise where this stimulus must not be delivered now.
+
+        Raises:
+            LimitExceededError: the number of pulses, the ISI, the time since earlier ones, the coil, the intensity, or
+                the dead man's switch.
+            NotDelivered: the device is not ready.
+        """
+        if not self.pulses_left:
+            raise LimitExceededError(
+                f"the limit of {self._limits.max_pulses} pulses is reached",
+                remedy="Nothing was delivered. End the session, or start one with a higher max_pulses.",
+            )
+        if stimulus.isi_ms is not None:
+            self._limits.require_isi(stimulus.isi_ms)
+        if (wait_s := self.wait_s()) > _ROUNDING_S:
+            raise LimitExceededError(
+                "the next stimulus comes too early",
+                got=f"{wait_s:.3f} s before its time",
+                expected=f"at least {self._limits.min_iti_s:g} s between stimuli, and the rests of the limits",
+                remedy="Nothing was delivered. Sleep for wait_s() first.",
+            )
+        self._check_state()
+        if self._dead_man is not None and self._dead_man() is not True:
+            raise LimitExceededError(
+                "the dead man's switch is not held", remedy="Nothing was delivered. Resume the session when it is."
+            )
+
+    def _check_state(self) -> None:
+        state = self._readiness()
+        if not state.ready:
+            raise NotDelivered(f"the device is not ready: {state.reason or 'it does not say why'}")
+        self._limits.require_state(state)
+
+    def _readiness(self) -> Readiness:
+        return self._device.readiness() if isinstance(self._device, ReportsReadiness) else Readiness()
+
+    def describe(self) -> DeviceInfo:
+        """What the guarded device is."""
+        return self._info
+
+    def stage(self) -> None:
+        """Get ready and arm."""
+        self._device.stage()
+        if self._limits.intensity_pct_mso is None:
+            self._limits = dataclasses.replace(self._limits, intensity_pct_mso=self._readiness().intensity_pct_mso)
+        self._staged = True
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
+        """Deliver one pair of stimuli, if the limits allow it.
+
+        Args:
+            stimulus: what to deliver.
+            timeout_s: the longest the device may take [s].
+
+        Raises:
+            LimitExceededError: refused; nothing was delivered.
+            NotDelivered: the device refused before firing; nothing was delivered.
+            DeviceError: not staged, or the device failed.
+        """
+        with self._one_at_a_time:
+            require_staged(self._info.name, staged=self._staged)
+            self.check(stimulus)
+            self._delivered += 1
+            self._times_s.append(self._clock.now_s())
+            try:
+                answer = self._device.deliver(stimulus, timeout_s)
+            except (NotDelivered, LimitExceededError):
+                self._delivered -= 1
+                self._times_s.pop()
+                raise
+            except BaseException:
+                self._times_s[-1] = self._clock.now_s()
+                raise
+            self._times_s[-1] = self._clock.now_s()
+            return answer
+
+    def stop(self) -> None:
+        """Disarm; from here on nothing is delivered until the next `stage`."""
+        self._staged = False
+        self._device.stop()
+
+    def unstage(self) -> None:
+        """Let go of the device."""
+        self._staged = False
+        self._device.unstage()

@@ -1,0 +1,35 @@
+"""The operator at the terminal, where there is one."""
+
+from __future__ import annotations
+
+import sys
+
+__all__ = ["alarm", "goes_on"]
+
+
+def goes_on(reason: str) -> bool:
+    """Ask in the terminal whether to go on; no, where there is no terminal.
+
+    Args:
+        reason: why the session has paused.
+    """
+    if not (_is_terminal(sys.stdin) and _is_terminal(sys.stderr)):
+        return False
+    alarm(f"\n{reason} The device is disarmed. Go on? [y/N] ", end="")
+    return sys.stdin.readline().strip().lower() in {"y", "yes"}
+
+
+def alarm(text: str, *, end: str = "\n") -> None:
+    """Say something on the screen at once.
+
+    Args:
+        text: what to say.
+        end: what to put behind it.
+    """
+    if sys.stderr is not None:  # as under pythonw
+        sys.stderr.write(f"{text}{end}")
+        sys.stderr.flush()
+
+
+def _is_terminal(stream: object) -> bool:
+    return bool(getattr(stream, "isatty", lambda: False)())

@@ -1,0 +1,183 @@
+"""A session's device: driven by this session alone, limited, punctual, and disarmed whatever happens."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
+from isiw.devices.deadlines import PunctualDevice
+from isiw.devices.limited import LimitedDevice
+from isiw.devices.limits import Limits
+from isiw.devices.lock import driven
+from isiw.devices.protocol import Answer, Device, DeviceInfo
+from isiw.errors import DeviceError, StillArmedError, told
+from isiw.log.schema import waveform_topic
+from isiw.log.writer import LogWriter
+from isiw.session.interrupts import Interrupts
+from isiw.session.lastresort import INTERRUPTED, STILL_ARMED, end_process
+from isiw.session.safeguards import Safeguards
+from isiw.signals.judgement import EMG_UNITS_MV, require_unit
+from isiw.strategy.strategy import Strategy
+from isiw.trials import Stimulus
+
+__all__ = ["Rig", "require_matching"]
+
+
+class Rig:
+    """A device as a session drives it.
+
+    Args:
+        device: the device.
+        limits: what it may deliver.
+        clock: tells the time between stimuli; a virtual one by default where the device is simulated.
+        safeguards: deadlines and the dead man's switch.
+
+    Raises:
+        DeviceError: it does not say what it is in time, or is not simulated and has a virtual clock.
+    """
+
+    def __init__(self, device: Device, limits: Limits, clock: Clock | None, safeguards: Safeguards) -> None:
+        self.interrupts = Interrupts(self.disarm, self._end_stuck)
+        self.faults: deque[str] = deque()
+        self.log: LogWriter | None = None
+        self.staged_once = False
+        self._raw, self._limits, self._safeguards = device, limits, safeguards
+        self._punctual = PunctualDevice(
+            device, safeguards.deadlines, given_up=lambda: self.interrupts.insisted, report=self.faults.append
+        )
+        self.clock = clock or (VirtualClock() if self.info.simulated else MonotonicClock())
+        self._limited = self._anew()
+        self._punctual.release_thread()
+
+    def _anew(self, delivered: int = 0, earlier_s: Sequence[float] = ()) -> LimitedDevice:
+        return LimitedDevice(
+            self._punctual,
+            self._limits,
+            self.clock,
+            delivered=delivered,
+            earlier_s=earlier_s,
+            dead_man=self._safeguards.dead_man,
+        )
+
+    @property
+    def info(self) -> DeviceInfo:
+        """What the device is."""
+        return self._punctual.describe()
+
+    @property
+    def pulses_left(self) -> int:
+        """How many deliveries are still allowed."""
+        return self._limited.pulses_left
+
+    @contextmanager
+    def driven(self) -> Iterator[None]:
+        """Within, no other session drives the device, and every signal disarms it.
+
+        Raises:
+            DeviceError: another session drives it.
+        """
+        with driven(self._raw, self.info), self.interrupts:
+            yield
+
+    @contextmanager
+    def armed(self, delivered: int, earlier_s: Sequence[float]) -> Iterator[None]:
+        """Within, the device is staged; behind it, it is disarmed and let go of, whatever happened.
+
+        Args:
+            delivered: deliveries of this session so far.
+            earlier_s: how long ago each earlier delivery was to the same person [s].
+        """
+        self._limited = self._anew(delivered, earlier_s)
+        try:
+            self.stage()
+            yield
+        except BaseException as error:
+            self._release(error)
+            raise
+        self._release(None)
+
+    def stage(self) -> None:
+        """Get ready and arm."""
+        with self.interrupts.allowed():
+            self._limited.stage()
+        self.staged_once = True
+
+    def disarm(self) -> None:
+        """Disarm, from any thread; where that cannot be done, the process ends."""
+        try:
+            self._limited.stop()
+        except StillArmedError as error:
+            end_process(told(error), self.log, STILL_ARMED)
+
+    def wait_s(self) -> float:
+        """How long until the limits allow the next delivery [s]."""
+        return self._limited.wait_s()
+
+    def check(self, stimulus: Stimulus) -> None:
+        """Raise where this stimulus must not be delivered now, as `LimitedDevice.check` does."""
+        with self.interrupts.allowed():
+            self._limited.check(stimulus)
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
+        """Deliver one pair of stimuli, as `LimitedDevice.deliver` does.
+
+        Args:
+            stimulus: what to deliver.
+            timeout_s: the longest the device may take [s].
+        """
+        return self._limited.deliver(stimulus, timeout_s)
+
+    def late_answer(self) -> Answer | None:
+        """What came of a delivery after its deadline; None where nothing comes as long as `stop` may take."""
+        return self._punctual.late_answer(self._safeguards.deadlines.stop_s)
+
+    def _release(self, error: BaseException | None) -> None:
+        """Disarm and let go; what fails besides an error is told with it."""
+        self.disarm()
+        try:
+            self._limited.unstage()
+        except Exception as another:
+            if error is None:
+                raise
+            self.faults.append(f"unstage failed, too: {told(another)}")
+            error.add_note(self.faults[-1])
+        finally:
+            self._punctual.release_thread()
+
+    def _end_stuck(self) -> None:
+        end_process("The session does not react. The device is disarmed.", self.log, INTERRUPTED)
+
+
+def require_matching(info: DeviceInfo, strategy: Strategy) -> None:
+    """Raise where the strategy would misread the device's answers.
+
+    Args:
+        info: what the device says about itself.
+        strategy: the strategy.
+
+    Raises:
+        DeviceError: another reference, or another detection limit.
+        InvalidValueError: a channel whose name or unit a session cannot use.
+    """
+    if info.reference != strategy.space.reference:
+        raise DeviceError(
+            "the device and the design space count ISIs from different events",
+            got=info.reference,
+            expected=strategy.space.reference,
+            remedy="Give the DesignSpace the device's reference.",
+        )
+    for name in info.channels:
+        waveform_topic(name)
+    if "emg" in info.channels:  # an acceleration is not read where the device itself knows the time of the hit
+        require_unit("emg", info.channels["emg"], EMG_UNITS_MV)
+    limit_mv, assumed_mv = info.detection_limit_mv, strategy.recipe.settings.get("detection_limit_mv")
+    if limit_mv is not None and assumed_mv is not None and not math.isclose(limit_mv, assumed_mv):
+        raise DeviceError(
+            "the device and the strategy have different detection limits, so an MEP of 0 would be misunderstood",
+            got=f"{limit_mv:g} mV from the device",
+            expected=f"{assumed_mv:g} mV, as the strategy assumes",
+            remedy=f"Make the strategy with the device's: make_strategy(..., detection_limit_mv={limit_mv:g}).",
+        )

@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+import pytest
+
+from isiw.devices.dry_run import DryRun
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import Readiness
+from isiw.errors import LimitExceededError
+from isiw.log.reader import read_session
+from isiw.session.loop import Session
+from isiw.testing import check_device
+
+
+def test_a_rehearsal_arms_and_fires_nothing(scripted_strategy, scripted_device, tmp_path) -> None:
+    device = scripted_device(simulated=False)
+    result = Session(DryRun(device), scripted_strategy(4), log=tmp_path / "s.mcap").run()
+    assert device.delivered == []
+    assert device.calls == []
+    assert {trial.mep_mv for trial in result.trials} == {0.0}
+    assert read_session(tmp_path / "s.mcap").header.device.name == "dry run of scripted"
+
+
+def test_a_rehearsal_keeps_the_limits_on_what_the_device_reports(scripted_strategy, scripted_device, tmp_path) -> None:
+    device = scripted_device(simulated=False)
+    device.readiness = lambda: Readiness(coil_c=50.0)
+    session = Session(
+        DryRun(device), scripted_strategy(4), log=tmp_path / "s.mcap", limits=Limits(0, 200, max_coil_c=40.0)
+    )
+    with pytest.raises(LimitExceededError, match="50 °C"):
+        session.run()
+
+
+def test_a_rehearsal_is_a_device(scripted_device, space) -> None:
+    check_device(lambda: DryRun(scripted_device(simulated=False)), space)

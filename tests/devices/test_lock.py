@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from isiw.devices.lock import driven
+from isiw.devices.protocol import DeviceInfo
+from isiw.errors import DeviceError
+
+PLAIN = DeviceInfo("rig", "valve")
+PORT = DeviceInfo("rig", "valve", address="port of this test")
+
+
+def test_one_device_is_driven_once_at_a_time(scripted_device) -> None:
+    device = scripted_device()
+    with driven(device, PLAIN):
+        with pytest.raises(DeviceError, match="driven by another session"), driven(device, PLAIN):
+            pass
+        with driven(scripted_device(), PLAIN):
+            pass
+    with driven(device, PLAIN):
+        pass
+
+
+def test_a_device_is_free_again_after_an_error(scripted_device) -> None:
+    device = scripted_device()
+    with pytest.raises(ZeroDivisionError), driven(device, PORT):
+        raise ZeroDivisionError
+    with driven(device, PORT):
+        pass
+
+
+def test_two_objects_of_one_address_are_one_device(scripted_device) -> None:
+    with (
+        driven(scripted_device(), PORT),
+        pytest.raises(DeviceError, match="rig at port of this test"),
+        driven(scripted_device(), PORT),
+    ):
+        pass
+
+
+HOLDER = """
+import sys
+from isiw.devices.lock import driven
+from isiw.devices.protocol import DeviceInfo
+with driven(object(), DeviceInfo("rig", "valve", address="port of this test")):
+    print("held", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_an_address_is_driven_by_one_process(scripted_device) -> None:
+    with subprocess.Popen(  # noqa: S603
+        [sys.executable, "-c", HOLDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as holder:
+        assert holder.stdout.readline() == "held\n"
+        with pytest.raises(DeviceError, match="driven by another session"), driven(scripted_device(), PORT):
+            pass
+        holder.kill()  # as a crash would: what it held is free again
+        holder.wait()
+        with driven(scripted_device(), PORT):
+            pass

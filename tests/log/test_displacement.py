@@ -1,0 +1,165 @@
+"""A log whose file is taken away, replaced or shortened while it is written."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from pathlib import Path
+from typing import Never
+
+import pytest
+
+from isiw.errors import LogError
+from isiw.log.durable import DurableFile
+from isiw.log.reader import read_session
+from isiw.log.salvage import salvage
+from isiw.log.writer import LogWriter
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows does not let an open file be moved or deleted")
+
+
+def delete(part) -> None:
+    part.unlink()
+
+
+def move(part) -> None:
+    part.rename(part.with_name("elsewhere"))
+
+
+def delete_folder(part) -> None:
+    shutil.rmtree(part.parent)
+
+
+def move_folder(part) -> None:
+    part.parent.rename(part.parent.with_name("elsewhere"))
+
+
+def replace(part) -> None:
+    content = part.read_bytes()
+    part.unlink()
+    part.write_bytes(content)
+
+
+def truncate(part) -> None:
+    os.truncate(part, part.stat().st_size // 2)
+
+
+def lengthen(part) -> None:
+    with part.open("ab") as file:
+        file.write(b"more")
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "folder" / "s.mcap"
+
+
+@pytest.fixture
+def log(path, header, writes):
+    log = LogWriter.create(path, header)
+    writes(log, range(5))
+    return log
+
+
+def kept(error: LogError) -> Path:
+    """The copy that an error's message names."""
+    return Path(error.remedy.removeprefix("What the session still held of it is in ").removesuffix("."))
+
+
+def test_a_log_in_its_place_is_accepted(log) -> None:
+    log.require_in_place()
+    log.close()
+
+
+@pytest.mark.parametrize("happen", [delete, move, delete_folder, move_folder, replace, truncate, lengthen])
+def test_a_log_that_is_not_as_it_was_written_is_an_error(log, path, happen) -> None:
+    happen(path.with_name("s.mcap.part"))
+    with pytest.raises(LogError, match="no longer as it was written"):
+        log.require_in_place()
+    with pytest.raises(LogError, match="no longer as it was written"):
+        log.close()
+
+
+@pytest.mark.parametrize("happen", [delete, move, delete_folder, move_folder, replace, lengthen])
+def test_all_that_the_open_file_holds_is_saved_and_the_message_says_where(log, path, happen) -> None:
+    happen(path.with_name("s.mcap.part"))
+    with pytest.raises(LogError) as caught:
+        log.close()
+    assert kept(caught.value).parent == path.parent
+    assert len(read_session(kept(caught.value)).table) == 5
+
+
+def test_a_log_that_was_shortened_before_more_was_written_is_an_error(log, path, writes) -> None:
+    truncate(path.with_name("s.mcap.part"))
+    writes(log, [5])
+    with pytest.raises(LogError, match="bytes instead of"):
+        log.require_in_place()
+    with pytest.raises(LogError, match="bytes instead of"):
+        log.close()
+
+
+def test_a_copy_replaces_no_other_copy(log, path) -> None:
+    path.with_name("s.rescued.mcap").write_bytes(b"precious")
+    delete(path.with_name("s.mcap.part"))
+    with pytest.raises(LogError) as caught:
+        log.close()
+    assert kept(caught.value).name == "s.rescued1.mcap"
+    assert path.with_name("s.rescued.mcap").read_bytes() == b"precious"
+
+
+def test_where_the_folder_cannot_be_made_again_the_copy_is_among_the_temporary_files(
+    log, path, tmp_path, monkeypatch
+) -> None:
+    delete_folder(path.with_name("s.mcap.part"))
+    path.parent.write_text("a file in the folder's place")
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(temporary))
+    with pytest.raises(LogError) as caught:
+        log.close()
+    assert kept(caught.value).parent == temporary
+    assert len(read_session(kept(caught.value)).table) == 5
+
+
+def no_rename(path, target) -> Never:
+    raise OSError(errno.EACCES, os.strerror(errno.EACCES), path, target)
+
+
+def test_a_log_that_cannot_be_renamed_says_where_it_is(log, path, monkeypatch) -> None:
+    monkeypatch.setattr(Path, "replace", no_rename)
+    with pytest.raises(LogError, match=r"cannot be given its name.*s\.mcap\.part"):
+        log.close()
+    assert read_session(path).finished
+    assert len(read_session(path).table) == 5
+
+
+def test_a_log_that_cannot_go_on_for_its_name_stays_as_it_was(finished_log, header, monkeypatch) -> None:
+    before = finished_log.read_bytes()
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "replace", no_rename)
+        with pytest.raises(LogError, match="cannot be given its name"):
+            LogWriter.continuing(finished_log, salvage(finished_log), header)
+    assert finished_log.read_bytes() == before
+    assert list(finished_log.parent.iterdir()) == [finished_log]
+
+
+def test_a_discarded_log_leaves_nothing_and_can_be_made_again(log, path, header) -> None:
+    log.discard()
+    assert list(path.parent.iterdir()) == []
+    LogWriter.create(path, header).close()
+
+
+def test_a_log_is_closed_once(log, path) -> None:
+    log.close()
+    path.unlink()
+    log.close()
+    assert not path.exists()
+
+
+def test_the_size_of_a_file_that_is_being_written_is_its_own(tmp_path) -> None:
+    file = DurableFile(tmp_path / "file")
+    file.write(b"some")
+    file.sync()
+    assert file.displacement() is None
+    file.close()

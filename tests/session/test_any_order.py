@@ -1,0 +1,172 @@
+"""Whatever happens to a session, in whatever order, nothing is lost, given twice, or asked differently."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from conftest import SPACE, ScriptedDevice, make_scripted_strategy
+from isiw.devices.clock import VirtualClock
+from isiw.devices.limits import Limits
+from isiw.errors import DeviceError, NotDelivered
+from isiw.log.reader import read_session
+from isiw.session.loop import Session
+from isiw.session.resume import exclude, resume
+from isiw.session.safeguards import Safeguards
+from isiw.testing import Fired, check_ledger
+from isiw.trials import Measurement
+
+TRIALS = 40
+LIMITS = Limits.of_space(SPACE, max_pulses=TRIALS)
+
+
+class KilledError(Exception):
+    """The process ends here; what is on disk is all that is left."""
+
+
+class SessionsInAnyOrder(RuleBasedStateMachine):
+    """One session, run, disturbed, killed, resumed, and looked at."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.folder = Path(tempfile.mkdtemp())
+        self.log, self.clock = self.folder / "s.mcap", VirtualClock()
+        self.ledger: list[Fired] = []
+        self.excluded: set[int] = set()
+
+    def teardown(self) -> None:
+        shutil.rmtree(self.folder)
+
+    def go_on(self, answer, *, pause_at=None, on_pause=None) -> None:
+        """Run or resume with a device that answers so, until something ends it."""
+
+        def fire(stimulus):
+            # What is fired has its intent on disk already.
+            last = read_session(self.log).intents[-1]
+            assert (last.trial, last.isi_ms) == (stimulus.trial, stimulus.isi_ms)
+            self.ledger.append(Fired(stimulus.trial, stimulus.isi_ms, self.clock.now_s()))
+            return Measurement(0.01 + stimulus.isi_ms / 1e4, stimulus.isi_ms)
+
+        def on_trial(update) -> None:
+            if update.trial.index == pause_at:
+                session.pause("a break")
+
+        device = ScriptedDevice(lambda stimulus: answer(stimulus, fire))
+        settings = {
+            "clock": self.clock,
+            "limits": LIMITS,
+            "on_trial": on_trial,
+            "safeguards": Safeguards(retries=1, on_pause=on_pause),
+        }
+        strategy = make_scripted_strategy(TRIALS)
+        if self.log.exists() or self.log.with_name("s.mcap.part").exists():
+            session = resume(self.log, device, strategy, **settings)
+        else:
+            session = Session(device, strategy, log=self.log, **settings)
+        with suppress(DeviceError, KilledError):
+            session.run()
+        assert device.calls[-2:] == ["stop", "unstage"]
+
+    @property
+    def next_trial(self) -> int:
+        known = [self.log, self.log.with_name("s.mcap.part")]
+        return len(read_session(self.log).table) if any(path.exists() for path in known) else 0
+
+    @rule(trials=st.integers(1, 4))
+    def deliver(self, trials) -> None:
+        """Deliver some trials, then pause where nobody is there to go on."""
+        self.go_on(lambda stimulus, fire: fire(stimulus), pause_at=self.next_trial + trials - 1)
+
+    @rule(trials=st.integers(1, 3))
+    def pause_and_go_on(self, trials) -> None:
+        """Pause, go on where the operator says so, and fail later."""
+        first = self.next_trial
+
+        def answer(stimulus, fire):
+            if stimulus.trial == first + trials + 1:
+                raise DeviceError("unplugged")
+            return fire(stimulus)
+
+        self.go_on(answer, pause_at=first + trials - 1, on_pause=lambda _: True)
+
+    @rule(fired=st.booleans(), trials=st.integers(0, 3))
+    def fault(self, fired, trials) -> None:
+        """Fail before or after firing; the outcome is unknown."""
+        last = self.next_trial + trials
+
+        def answer(stimulus, fire):
+            if stimulus.trial == last:
+                if fired:
+                    fire(stimulus)
+                raise DeviceError("unplugged")
+            return fire(stimulus)
+
+        self.go_on(answer)
+
+    @rule(refusals=st.integers(1, 3), trials=st.integers(0, 2))
+    def refuse(self, refusals, trials) -> None:
+        """Refuse before firing: once is tried again, twice ends the session."""
+        at, left = self.next_trial + trials, [refusals]
+
+        def answer(stimulus, fire):
+            if stimulus.trial == at and left[0]:
+                left[0] -= 1
+                raise NotDelivered("charging")
+            if stimulus.trial == at + 1:
+                raise DeviceError("unplugged")
+            return fire(stimulus)
+
+        self.go_on(answer)
+
+    @rule(fired=st.booleans(), trials=st.integers(0, 3))
+    def kill(self, fired, trials) -> None:
+        """End the process in the middle of a delivery: only what was synced is left."""
+        last, part, kept = self.next_trial + trials, self.log.with_name("s.mcap.part"), self.folder / "kept"
+
+        def answer(stimulus, fire):
+            if stimulus.trial == last:
+                if fired:
+                    fire(stimulus)
+                shutil.copy(part, kept)
+                raise KilledError
+            return fire(stimulus)
+
+        self.go_on(answer)
+        if kept.exists():
+            self.log.unlink()
+            kept.rename(part)
+
+    @precondition(lambda self: self.next_trial > 0)
+    @rule(data=st.data())
+    def exclude(self, data) -> None:
+        """Exclude a trial that counts."""
+        told = [trial.index for trial in read_session(self.log).table.told]
+        if told:
+            trial = data.draw(st.sampled_from(told))
+            exclude(self.log, trial, "sneezed")
+            self.excluded.add(trial)
+
+    @invariant()
+    def nothing_is_lost_or_given_twice(self) -> None:
+        if self.next_trial:
+            record = read_session(self.log)
+            assert record.losses == ()
+            check_ledger(self.ledger, record, LIMITS)
+            assert {trial.index for trial in record.table if trial.excluded} == self.excluded
+
+    @invariant()
+    def every_ask_is_the_same_again(self) -> None:
+        if self.next_trial:
+            resume(self.log, ScriptedDevice(), make_scripted_strategy(TRIALS))  # raises where it asks differently
+
+
+TestSessionsInAnyOrder = SessionsInAnyOrder.TestCase
+TestSessionsInAnyOrder.settings = settings(
+    max_examples=10, stateful_step_count=6, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
+)

@@ -1,0 +1,278 @@
+"""Faults of the device: what is not the end, what is, and that all of it is told."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Never
+
+import numpy as np
+import pytest
+
+from isiw.devices.deadlines import Deadlines
+from isiw.devices.limits import Limits
+from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LogError, NotDelivered
+from isiw.log.pulses import pulses_s
+from isiw.log.reader import read_session
+from isiw.log.salvage import salvage
+from isiw.session.lastresort import STILL_ARMED
+from isiw.session.loop import Session
+from isiw.session.resume import resume
+from isiw.session.safeguards import Safeguards
+from isiw.trials import Channel, Measurement, MistrialReason, Sweep
+
+TESTS = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def log(tmp_path):
+    return tmp_path / "s.mcap"
+
+
+@pytest.fixture
+def released():
+    """What hangs, hangs until this is set, at the end of the test."""
+    event = threading.Event()
+    yield event
+    event.set()
+
+
+def refusing(refusals, error=None):
+    """Answers after so many refusals of each trial."""
+    left = {}
+
+    def answer(stimulus):
+        left[stimulus.trial] = left.get(stimulus.trial, refusals) - 1
+        if left[stimulus.trial] >= 0:
+            raise error or NotDelivered("the stimulator is charging")
+        return Measurement(0.01 + stimulus.isi_ms / 1e4, stimulus.isi_ms)
+
+    return answer
+
+
+def test_what_the_device_refused_before_firing_is_tried_again_and_does_not_count(
+    scripted_strategy, scripted_device, log, tmp_path
+) -> None:
+    undisturbed = Session(scripted_device(), scripted_strategy(4), log=tmp_path / "undisturbed.mcap").run()
+    limits = Limits(0, 200, 5.0, max_pulses=4)
+    result = Session(scripted_device(refusing(2)), scripted_strategy(4), log=log, limits=limits).run()
+    assert result.trials == undisturbed.trials
+    record = read_session(log)
+    assert [event.kind for event in record.events] == ["refused"] * 8
+    assert [event.trial for event in record.events] == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert len(record.intents) == 12
+    assert record.unknown == ()
+
+
+def test_each_retry_waits_twice_as_long(scripted_strategy, scripted_device, log) -> None:
+    guards = Safeguards(retries=3, backoff_s=2.0)
+    Session(scripted_device(refusing(3)), scripted_strategy(1), log=log, safeguards=guards).run()
+    assert [intent.t_s for intent in read_session(log).intents] == [5.0, 7.0, 11.0, 19.0]
+
+
+def test_a_device_that_goes_on_refusing_ends_the_session_and_it_can_be_resumed(
+    scripted_strategy, scripted_device, log
+) -> None:
+    with pytest.raises(NotDelivered, match="charging"):
+        Session(scripted_device(refusing(99)), scripted_strategy(4), log=log).run()
+    record = read_session(log)
+    assert len(record.intents) == 4
+    assert record.unknown == ()
+    assert len(record.table) == 0
+    assert pulses_s(salvage(log)) == []
+    resumed = resume(log, scripted_device(), scripted_strategy(4)).run()
+    assert [trial.told for trial in resumed.trials] == [True] * 4
+
+
+def test_a_device_that_cannot_be_staged_is_stopped_and_leaves_no_log_in_the_way(
+    scripted_strategy, scripted_device, log
+) -> None:
+    device = scripted_device()
+
+    def stage() -> Never:
+        raise DeviceError("no air pressure")
+
+    device.stage = stage
+    with pytest.raises(DeviceError, match="no air pressure"):
+        Session(device, scripted_strategy(), log=log).run()
+    assert device.calls == ["stop", "unstage"]
+    assert list(log.parent.iterdir()) == []
+    assert len(Session(scripted_device(), scripted_strategy(3), log=log).run().trials) == 3
+
+
+def test_a_resumption_that_cannot_be_staged_leaves_its_log(scripted_strategy, scripted_device, log) -> None:
+    with pytest.raises(NotDelivered):
+        Session(scripted_device(refusing(99)), scripted_strategy(4), log=log).run()
+    device = scripted_device()
+
+    def stage() -> Never:
+        raise DeviceError("no air pressure")
+
+    device.stage = stage
+    with pytest.raises(DeviceError, match="no air pressure"):
+        resume(log, device, scripted_strategy(4)).run()
+    assert "no air pressure" in read_session(log).events[-1].text
+
+
+def test_a_delivery_past_its_deadline_ends_the_session_disarmed(
+    scripted_strategy, scripted_device, log, released
+) -> None:
+    device = scripted_device(lambda stimulus: released.wait(60) and Measurement(0.1, stimulus.isi_ms))
+    guards = Safeguards(deadlines=Deadlines(stop_s=0.2))
+    with pytest.raises(DeviceTimeoutError, match="deliver took too long"):
+        Session(device, scripted_strategy(), log=log, timeout_s=0.05, safeguards=guards).run()
+    assert device.calls[:2] == ["stage", "stop"]
+    record = read_session(log)
+    assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert "DeviceTimeoutError" in record.events[-1].text
+
+
+def test_an_answer_past_its_deadline_is_logged_as_late_with_its_waveforms_and_not_told(
+    scripted_strategy, scripted_device, log, released
+) -> None:
+    def answer(stimulus):
+        released.wait(60)
+        emg = Channel(np.zeros(300), 3000.0, "mV", -50.0)
+        return Sweep({"emg": emg}, t_valve_ms=-stimulus.isi_ms, t_tms_ms=0.0)
+
+    device = scripted_device(answer)
+    device.stop = released.set
+    strategy = scripted_strategy()
+    with pytest.raises(DeviceTimeoutError):
+        Session(device, strategy, log=log, timeout_s=0.05).run()
+    record = read_session(log)
+    assert [(event.kind, event.trial) for event in record.events] == [("late", 0), ("fault", 0)]
+    assert record.sweep(0)["emg"].values.shape == (300,)
+    assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert strategy.posterior.told == ()
+
+
+def test_where_delivering_and_disarming_and_letting_go_fail_all_of_it_is_logged(
+    scripted_strategy, scripted_device, log
+) -> None:
+    def answer(_) -> Never:
+        raise DeviceError("coil too hot")
+
+    device = scripted_device(answer)
+    failures = [OSError("port busy")]
+
+    def stop() -> None:
+        if failures:
+            raise failures.pop()
+
+    def unstage() -> Never:
+        raise OSError("port gone")
+
+    device.stop, device.unstage = stop, unstage
+    with pytest.raises(DeviceError, match="coil too hot") as caught:
+        Session(device, scripted_strategy(), log=log).run()
+    assert "port gone" in caught.value.__notes__[0]
+    texts = [event.text for event in read_session(log).events]
+    assert sum("port busy" in text for text in texts) == 1
+    assert sum("port gone" in text for text in texts) == 1
+    assert sum("coil too hot" in text for text in texts) == 1
+
+
+class SpeechlessError(Exception):
+    def __str__(self) -> str:
+        raise UnicodeDecodeError("utf-8", b"\xff", 0, 1, "no text")
+
+
+@pytest.mark.parametrize(
+    "error", [SpeechlessError(), DeviceError("half a sign: \ud83d"), RuntimeError("\x00 " + "x" * 10**6)]
+)
+def test_a_fault_is_told_whatever_its_text(scripted_strategy, scripted_device, log, error) -> None:
+    def answer(_) -> Never:
+        raise error
+
+    with pytest.raises(type(error)):
+        Session(scripted_device(answer), scripted_strategy(), log=log).run()
+    record = read_session(log)
+    assert record.losses == ()
+    assert type(error).__name__ in record.events[-1].text
+    assert len(record.table) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("left\ud800", "mV"), ("a\nb", "mV"), ("force", "N\udfff"), ("event", "mV")]
+)
+def test_a_channel_that_json_cannot_hold_is_an_error_and_the_log_stays_whole(
+    scripted_strategy, scripted_device, log, name, unit
+) -> None:
+    def answer(stimulus):
+        channels = {"emg": Channel(np.zeros(300), 3000.0, "mV", -50.0), name: Channel(np.zeros(3), 100.0, unit)}
+        return Sweep(channels, t_valve_ms=-stimulus.isi_ms, t_tms_ms=0.0)
+
+    with pytest.raises(InvalidValueError, match=r"cannot have this name|cannot be written as JSON"):
+        Session(scripted_device(answer), scripted_strategy(), log=log).run()
+    record = read_session(log)
+    assert record.losses == ()
+    assert record.finished
+    assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
+
+
+def test_two_sessions_do_not_drive_one_device_at_once(scripted_strategy, scripted_device, tmp_path) -> None:
+    second = []
+
+    def answer(stimulus):
+        if stimulus.trial == 1:
+            with pytest.raises(DeviceError, match="driven by another session"):
+                Session(device, scripted_strategy(3), log=tmp_path / "b.mcap").run()
+            second.append(device.calls.count("stage"))
+        return Measurement(0.1, stimulus.isi_ms)
+
+    device = scripted_device(answer)
+    assert len(Session(device, scripted_strategy(3), log=tmp_path / "a.mcap").run().trials) == 3
+    assert second == [1]
+    assert not list(tmp_path.glob("b.mcap*"))
+
+
+LOST = """
+import sys, threading
+sys.path.insert(0, {tests!r})
+from conftest import ScriptedDevice, make_scripted_strategy
+from isiw.devices.deadlines import Deadlines
+from isiw.session.loop import Session
+from isiw.session.safeguards import Safeguards
+
+device = ScriptedDevice()
+def stop():
+    if {how!r} == "hangs":
+        threading.Event().wait()
+    raise OSError("port gone")
+device.stop = stop
+guards = Safeguards(deadlines=Deadlines(stop_s=0.3, stop_attempts=2))
+Session(device, make_scripted_strategy(3), log={log!r}, safeguards=guards).run()
+print("went on")
+"""
+
+
+@pytest.mark.parametrize("how", ["hangs", "fails"])
+def test_where_a_device_cannot_be_disarmed_the_process_ends_with_the_reason_on_screen_and_in_the_log(
+    log, how, scripted_strategy, scripted_device
+) -> None:
+    script = LOST.format(tests=str(TESTS), how=how, log=str(log))
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)  # noqa: S603
+    assert ended.returncode == STILL_ARMED
+    assert "went on" not in ended.stdout
+    assert "cannot be disarmed" in ended.stderr
+    assert "interlock" in ended.stderr
+    record = read_session(log)
+    assert record.losses == ()
+    assert len(record.table) == 3
+    assert "cannot be disarmed" in record.events[-1].text
+    assert resume(log, scripted_device(), scripted_strategy(3)).run().decision.stop
+
+
+def test_only_what_can_be_resumed_is_suggested_to_be_resumed(scripted_strategy, scripted_device, log) -> None:
+    log.write_bytes(b"no log at all")
+    with pytest.raises(LogError) as caught:
+        Session(scripted_device(), scripted_strategy(3), log=log).run()
+    assert "resume" not in caught.value.remedy
+    log.unlink()
+    Session(scripted_device(), scripted_strategy(3), log=log).run()
+    with pytest.raises(LogError, match=r"isiw\.resume"):
+        Session(scripted_device(), scripted_strategy(3), log=log).run()
+    resume(log, scripted_device(), scripted_strategy(3)).run()
