@@ -108,6 +108,11 @@ def test_a_space_that_cannot_be_is_refused(fields: dict[str, object]) -> None:
         DesignSpace(**fields)
 
 
+def test_a_space_in_seconds_is_named() -> None:
+    with pytest.raises(InvalidValueError, match=r"In seconds\? Then DesignSpace\(0, 320\)"):
+        DesignSpace(0, 0.32)
+
+
 def test_the_grid_cannot_be_written_to() -> None:
     with pytest.raises(ValueError, match="read-only"):
         VALVE_SPACE.grid_ms[0] = 1.0

@@ -15,6 +15,7 @@ from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
     "EDGE_LEVEL",
+    "ENOUGH_PAIRS",
     "MIN_EXCESS_MV",
     "MIN_EXCESS_OF_BASELINE",
     "Interval",
@@ -30,6 +31,9 @@ EDGE_LEVEL = 0.135
 
 MIN_EXCESS_MV = 0.002
 MIN_EXCESS_OF_BASELINE = 0.10
+
+ENOUGH_PAIRS = 3
+"""With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
 
 Interval = tuple[float, float]
 
@@ -161,6 +165,7 @@ class WindowEstimate:
         split_probability: probability that the window has more than one segment, given that there is one.
         hypotheses: which of the model's hypotheses, such as the kind of noise, each of `edge_samples_ms` belongs to,
             shape (s,).
+        pairs: how many pairs of stimuli it rests on; None where that is not known.
 
     Raises:
         InvalidValueError: a probability outside 0–1, a window reported against it, or not one hypothesis a sample.
@@ -176,6 +181,7 @@ class WindowEstimate:
     spread_ms: float | None = None
     split_probability: float | None = None
     hypotheses: IntArray | None = field(default=None, repr=False)
+    pairs: int | None = None
 
     def __post_init__(self) -> None:
         samples = () if self.edge_samples_ms is None else self.edge_samples_ms
@@ -188,6 +194,11 @@ class WindowEstimate:
         check_probabilities(self, "probability")
         if self.window is not None and self.probability < 0.5:
             raise InvalidValueError("a window is reported although none is more probable", got=self.probability)
+
+    @property
+    def rests_on_data(self) -> bool:
+        """Whether enough was measured to speak of a window; with less it is what was believed beforehand."""
+        return self.pairs is None or self.pairs >= ENOUGH_PAIRS
 
     def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:
         """Credible intervals of start and end, given that there is a window [ms].

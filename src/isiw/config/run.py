@@ -116,6 +116,7 @@ class LimitsConfig(_Section):
 
     min_iti_s: float = Field(default=5.0, ge=0.0, allow_inf_nan=False)
     max_pulses: int = Field(default=200, ge=1)
+    max_consecutive_mistrials: int = Field(default=3, ge=1)
 
 
 class RunConfig(_Section):

@@ -51,8 +51,8 @@ __all__ = [
     "topic_of",
 ]
 
-SCHEMA_VERSION = 2
-"""2 since 0.1.0: other settings of the strategies, hypotheses by name. Versions before the first release wrote 1."""
+SCHEMA_VERSION = 3
+"""3 since 0.1.0: pauses, and an ISI whose trial was lost is asked again twice only. Earlier versions wrote 1 and 2."""
 
 PROFILE_DECIMALS = 6  # a nanovolt; the profile is a picture of the posterior, not a measurement
 
@@ -209,7 +209,7 @@ def _rounded(values: FloatArray) -> tuple[float, ...]:
     return tuple(np.asarray(values, dtype=np.float64).round(PROFILE_DECIMALS).tolist())
 
 
-EventKind: TypeAlias = Literal["exclusion", "limit", "fault", "resume", "fallback", "fit"]
+EventKind: TypeAlias = Literal["exclusion", "limit", "fault", "resume", "fallback", "fit", "pause"]
 
 
 class Event(_Record):
