@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer
-from isiw.signals.faults import likely_fault
+from isiw.signals.faults import likely_fault, too_early_by_chance
 from isiw.signals.judgement import SignalLimits
-from isiw.signals.plausibility import DoubtKind, doubt_of, off_by
+from isiw.signals.plausibility import DoubtKind, doubt_of
 from isiw.trials import Trial, TrialTable
 
 __all__ = ["Watch"]
@@ -49,7 +49,7 @@ class Watch:
             trial: the trial.
             answer: what the device answered.
         """
-        if _too_early_by_chance(trial, self.space):
+        if too_early_by_chance(trial, self.space):
             return self
         fault = likely_fault(answer, trial, self.signals)
         if fault is not None:
@@ -67,9 +67,3 @@ def _with_amplitude(watch: Watch, mep_mv: float) -> Watch:
     if doubt is None or doubt.kind in watch.settled:
         return replace(watch, meps_mv=meps_mv)
     return replace(watch, meps_mv=meps_mv, settled=watch.settled | {doubt.kind}, reason=watch.reason or doubt.text)
-
-
-def _too_early_by_chance(trial: Trial, space: DesignSpace) -> bool:
-    """Whether the pulse came before the impact by no more than the tolerance: no rig is to blame for that."""
-    early = trial.reason is not None and trial.isi_ms is not None and trial.isi_ms < 0
-    return early and not off_by(trial.isi_ms or 0.0, trial.commanded_isi_ms or 0.0, space)

@@ -13,14 +13,14 @@ from types import MappingProxyType
 
 import numpy as np
 
+from isiw.design import DesignSpace
 from isiw.signals.impact import impact_time
 from isiw.signals.judgement import SignalLimits
-from isiw.signals.plausibility import implausible_amplitude
+from isiw.signals.plausibility import implausible_amplitude, off_by
 from isiw.signals.waveforms import is_recording
 from isiw.trials import Channel, Measurement, MistrialReason, Sweep, Trial
-from isiw.types import FloatArray
 
-__all__ = ["Fault", "likely_fault", "remedy_for"]
+__all__ = ["Fault", "likely_fault", "remedy_for", "steepest_edge", "too_early_by_chance"]
 
 TOO_LOUD_UV, TOO_QUIET_UV = 400.0, 0.05
 """EMG before the pulse [µV RMS] that is no muscle's at rest or at work, and no amplifier's."""
@@ -69,6 +69,18 @@ _REMEDIES: Mapping[MistrialReason, str] = MappingProxyType(
 def remedy_for(reason: MistrialReason) -> str:
     """What to do about a mistrial of this reason."""
     return _REMEDIES[reason]
+
+
+def too_early_by_chance(trial: Trial, space: DesignSpace) -> bool:
+    """Whether the pulse came before the impact by no more than the tolerance: no rig is to blame for that.
+
+    Args:
+        trial: a trial.
+        space: the design space.
+    """
+    if trial.reason is not MistrialReason.TMS_BEFORE_IMPACT or trial.isi_ms is None or trial.commanded_isi_ms is None:
+        return False
+    return not off_by(trial.isi_ms, trial.commanded_isi_ms, space)
 
 
 def likely_fault(answer: Sweep | Measurement, trial: Trial, limits: SignalLimits | None = None) -> Fault | None:
@@ -133,13 +145,11 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
     """The steepest edge of an EMG is the pulse's artefact, or belongs to what it evokes, or to the tap."""
     if trial.t_tms_ms is None:
         return None
-    steps = np.abs(np.diff(emg.values - np.median(emg.values)))
-    steepest_ms = emg.t0_ms + 1000 * float(steps.argmax()) / emg.rate_hz
+    steepest_ms = steepest_edge(emg)
     spans = [(trial.t_tms_ms + PULSE_SPAN_MS[0], trial.t_tms_ms + PULSE_SPAN_MS[1])]
     if trial.t_hit_ms is not None:
         spans.append((trial.t_hit_ms - 2.0, trial.t_hit_ms + TAP_SPAN_MS))
-    expected = any(first <= steepest_ms <= last for first, last in spans)
-    if expected or not _stands_out(steps):
+    if steepest_ms is None or any(first <= steepest_ms <= last for first, last in spans):
         return None
     return Fault(
         f"the pulse shows in the EMG at {steepest_ms:.0f} ms, not at {trial.t_tms_ms:.0f} ms as the device says",
@@ -147,10 +157,17 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
     )
 
 
-def _stands_out(steps: FloatArray) -> bool:
-    """Whether there is one steep edge of a few samples; spikes all over are another trouble."""
-    usual = float(np.median(steps))
-    return bool(usual > 0 and steps.max() > CLEAR * usual and (steps > 0.5 * steps.max()).mean() < 0.01)
+def steepest_edge(emg: Channel) -> float | None:
+    """When the EMG rises or falls most steeply [ms on the sweep's clock]; None where no edge stands out.
+
+    Args:
+        emg: the channel; an edge lasts a few samples, and spikes all over are none.
+    """
+    steps = np.abs(np.diff(emg.values))
+    usual = float(np.median(steps)) if steps.size else 0.0
+    if usual == 0 or steps.max() <= CLEAR * usual or (steps > 0.5 * steps.max()).mean() >= 0.01:
+        return None
+    return emg.t0_ms + 1000 * float(steps.argmax()) / emg.rate_hz
 
 
 def _fault_of_level(trial: Trial) -> Fault | None:
