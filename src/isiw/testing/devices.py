@@ -137,8 +137,8 @@ def _check_delivery(device: Device, rules: _Rules, pace: _Pace) -> list[Delivery
     _check_refusal(device, "before stage()", pace)
     device.stage()
     space = rules.space
-    middle_ms = float(space.grid_ms[len(space.grid_ms) // 2])
-    stimuli = [Stimulus(trial, isi) for trial, isi in enumerate((space.low_ms, None, middle_ms, space.high_ms))]
+    between_ms = float(space.grid_ms[(len(space.grid_ms) - 1) // 3])
+    stimuli = [Stimulus(trial, isi) for trial, isi in enumerate((space.low_ms, None, between_ms, space.high_ms))]
     deliveries = []
     for stimulus in stimuli:
         answer, took_s = pace.timed(device, stimulus)
