@@ -24,33 +24,38 @@ class Limits:
         high_ms: longest ISI [ms].
         min_iti_s: shortest time between two deliveries [s].
         max_pulses: largest number of deliveries in a session, failed ones included.
+        max_consecutive_mistrials: after so many mistrials in a row a session pauses, so that a person can look.
 
     Raises:
-        InvalidValueError: values that are not finite or limit nothing, or a number of pulses that is not whole.
+        InvalidValueError: values that are not finite or limit nothing, or a number that is not whole.
     """
 
     low_ms: float
     high_ms: float
     min_iti_s: float = 5.0
     max_pulses: int = 200
+    max_consecutive_mistrials: int = 3
 
     def __post_init__(self) -> None:
         check_numbers(self, "low_ms", "high_ms")
         check_numbers(self, "min_iti_s", least=0)
-        check_wholes(self, "max_pulses", least=1)
+        check_wholes(self, "max_pulses", "max_consecutive_mistrials", least=1)
         if self.low_ms > self.high_ms:
             raise InvalidValueError("the limits of the ISI must ascend", got=(self.low_ms, self.high_ms))
 
     @classmethod
-    def of_space(cls, space: DesignSpace, *, min_iti_s: float = 5.0, max_pulses: int = 200) -> Limits:
+    def of_space(
+        cls, space: DesignSpace, *, min_iti_s: float = 5.0, max_pulses: int = 200, max_consecutive_mistrials: int = 3
+    ) -> Limits:
         """Limits that allow exactly the ISIs of a design space.
 
         Args:
             space: the design space.
-            min_iti_s: least time between two stimuli [s].
-            max_pulses: most stimuli in the session.
+            min_iti_s: shortest time between two deliveries [s].
+            max_pulses: largest number of deliveries in a session.
+            max_consecutive_mistrials: after so many mistrials in a row a session pauses.
         """
-        return cls(space.low_ms, space.high_ms, min_iti_s, max_pulses)
+        return cls(space.low_ms, space.high_ms, min_iti_s, max_pulses, max_consecutive_mistrials)
 
 
 class LimitedDevice:

@@ -26,6 +26,7 @@ from isiw.log.durable import log_of
 from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform, waveform_topic
 from isiw.log.writer import LogWriter
 from isiw.session.interrupts import DeferredInterrupts
+from isiw.session.watch import Watch
 from isiw.signals.judgement import EMG_UNITS_MV, SignalLimits, judge, judge_measurement, require_unit
 from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
@@ -90,7 +91,7 @@ def learn(strategy: Strategy, trial: Trial) -> None:
         trial: the trial.
     """
     if trial.told:
-        strategy.tell(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
+        strategy.learn(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
     else:
         strategy.count_mistrial()
 
@@ -185,6 +186,7 @@ class Session:
         )
         self._open_log: Callable[[Header], LogWriter] = partial(LogWriter.create, log)
         self._first_records: Sequence[Record] = ()
+        self._watch = Watch(space, self._signals, self._limits.max_consecutive_mistrials)
 
     def continue_from(
         self, trials: TrialTable, open_log: Callable[[Header], LogWriter], first_records: Sequence[Record]
@@ -197,9 +199,13 @@ class Session:
             first_records: what it holds next.
         """
         self.trials, self._open_log, self._first_records = trials, open_log, first_records
+        self._watch = self._watch.resumed(trials)
 
     def run(self) -> SessionResult:
         """Run to the end, and close the log whatever happens.
+
+        Where trials are rejected again and again, or the data look like a slip of unit, it ends before its time with a
+        decision that does not stop: its reason says what to do before the session is resumed.
 
         Raises:
             DeviceError: the device failed; it is stopped, and the trial is a mistrial "outcome unknown".
@@ -257,6 +263,9 @@ class Session:
             if not self._device.pulses_left:
                 return self._stop_at_limit()
             decision = self._one_trial()
+            if not decision.stop and self._watch.reason is not None:
+                self._log_event("pause", decision.reason)
+                return decision
         return decision
 
     def _stop_at_limit(self) -> StopDecision:
@@ -281,11 +290,17 @@ class Session:
 
     def _log_estimate(self, trial: int) -> tuple[StopDecision, float | None]:
         """Put what is believed after a trial on disk; the decision and the next ISI [ms]."""
-        estimate, decision = self.strategy.estimate(), self.strategy.decision()
+        estimate, decision = self.strategy.estimate(), self._decision()
         next_isi_ms = None if decision.stop else self.strategy.ask(self._ask_deadline_s)
         self._log.append(Estimate.of(trial, estimate, decision, next_isi_ms))
         self._log.sync()
         return decision, next_isi_ms
+
+    def _decision(self) -> StopDecision:
+        """The strategy's decision; none is made on data that a person should look at first."""
+        if self._watch.reason is None or not self._stimuli_left():
+            return self.strategy.decision()
+        return StopDecision(stop=False, reason=f"The session is paused: {self._watch.reason}")
 
     def _stimuli_left(self) -> int:
         budget = stimuli_left(self.strategy.stopping, len(self.trials))
@@ -304,6 +319,7 @@ class Session:
                 answer = self._device.deliver(stimulus, self._timeout_s)
             self._log_waveforms(stimulus, answer)
             trial = self._judged(stimulus, answer)
+            self._watch = self._watch.after(trial, answer)
         finally:
             self._log.append(trial)
             self._log.sync()
