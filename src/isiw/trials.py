@@ -36,6 +36,7 @@ class MistrialReason(StrEnum):
     MISSING_CHANNEL = "missing channel"
     ISI_OFF = "ISI off by more than the tolerance"
     IMPLAUSIBLE = "implausible amplitude"
+    REJECTED = "rejected"
     OUTCOME_UNKNOWN = "outcome unknown"
 
 

@@ -243,7 +243,7 @@ def _rounded(values: FloatArray) -> tuple[float, ...]:
     return tuple(np.asarray(values, dtype=np.float64).round(PROFILE_DECIMALS).tolist())
 
 
-EventKind: TypeAlias = Literal["exclusion", "limit", "fault", "resume", "fallback", "fit", "pause"]
+EventKind: TypeAlias = Literal["exclusion", "limit", "fault", "resume", "fallback", "fit", "pause", "doubt", "note"]
 
 
 class Event(_Record):

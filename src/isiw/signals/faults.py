@@ -61,6 +61,7 @@ _REMEDIES: Mapping[MistrialReason, str] = MappingProxyType(
         MistrialReason.MISSING_CHANNEL: "Check that the EMG is recorded from 50 ms before to 50 ms after the pulse.",
         MistrialReason.ISI_OFF: "Check how the rig times the pulse, the reference of its ISIs, and the sampling rate.",
         MistrialReason.IMPLAUSIBLE: "Check the unit and the gain of the EMG.",
+        MistrialReason.REJECTED: "See the notes in the log.",
         MistrialReason.OUTCOME_UNKNOWN: "Check whether the device is connected and answers.",
     }
 )
