@@ -19,6 +19,7 @@ from scipy.stats import gamma, norm
 from isiw.design import DesignSpace
 from isiw.studies import SimulatedSession, play
 from isiw.subjects.cohorts import WIDTHS_KIM_MS
+from isiw.subjects.labs import LABS, lab
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import OUTLIERS_MV, SimulatedSubject
@@ -69,6 +70,12 @@ _USUAL: Final = _any_with_any(_STARTS, _log_normal(100.0, 0.42, 40.0, 230.0))
 _LATE: Final = _any_with_any(_uniform(80, 200, 3), _log_normal(100.0, 0.42, 40.0, 230.0))
 _VERY_WIDE: Final = _any_with_any(_uniform(0, 60, 3), _log_normal(200.0, 0.25, 120.0, 320.0))
 
+_QUANTILES: Final = (np.arange(60) + 0.5) / 60
+_SHIFTED: Final = _any_with_any(
+    np.sort((_uniform(5, 110, 7)[:, None] + norm.ppf(_QUANTILES[1::3], scale=12.0)).ravel()),
+    _log_normal(100.0, 0.42, 40.0, 230.0),
+)
+
 SPANS: Final[Mapping[str, Spans]] = {
     **dict.fromkeys(
         ("gaussian", "low-response", "outliers", "drift", "jitter", "jitter-untold", "recruitment"), _USUAL
@@ -80,16 +87,24 @@ SPANS: Final[Mapping[str, Spans]] = {
     "late": _LATE,
     "very-wide": _VERY_WIDE,
     "odd": _either((5 / 7, _USUAL), (1 / 7, _LATE), (1 / 7, _VERY_WIDE)),
+    "another-day": _either((0.65, _USUAL), (0.35, _SHIFTED)),  # second days are half of all, and .7 of them shifted
 }
 """What `cohorts` says of start and width, of the cohorts whose profiles the oracle knows: one symmetric peak."""
 
 
-def spans_of(cohort: str) -> Spans:
+def spans_of(cohort: str, seed: int) -> Spans:
     """The windows of a cohort.
+
+    Args:
+        cohort: its name.
+        seed: seed of its people, which says of what lab they are.
 
     Raises:
         ValueError: the oracle does not know its profiles.
     """
+    if cohort in LABS:
+        law = lab(cohort, seed)
+        return _any_with_any(norm.ppf(_QUANTILES, *law.start_ms), _log_normal(*law.width_ms, 40.0, 230.0))
     if cohort not in SPANS:
         raise ValueError(f"the oracle does not know the windows of {cohort}; it knows {', '.join(SPANS)}")
     return SPANS[cohort]
@@ -206,4 +221,4 @@ class Oracle:
 
 def simulate_oracle(session: SimulatedSession) -> pd.DataFrame:
     """Run one session of a study with the oracle."""
-    return play(session, Oracle(session.subject(), session.space, spans_of(session.cohort)))
+    return play(session, Oracle(session.subject(), session.space, spans_of(session.cohort, session.seed)))

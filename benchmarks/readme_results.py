@@ -25,9 +25,10 @@ GUESS = "guess without any trial"
 
 def f1_by_trial(cohort: str) -> pd.DataFrame:
     """Mean F1 after each marked trial (rows) of each method (columns)."""
-    own = _table(f"acquisition_{cohort}.json")
+    default = _table("people_stated.json", "By trial").assign(strategy="default")
+    oracle = _table(f"acquisition_{cohort}.json").query("strategy == 'oracle'")
     others = _table("acquisition.json").query("strategy == 'gpr'")
-    rows = pd.concat([own, others]).query("cohort == @cohort")
+    rows = pd.concat([default, oracle, others]).query("cohort == @cohort")
     return rows.pivot_table(index="trial", columns="strategy", values="f1")[list(METHODS)]
 
 
@@ -67,8 +68,8 @@ def picture() -> Figure:
     return figure
 
 
-def _table(name: str) -> pd.DataFrame:
-    return pd.DataFrame(json.loads((RESULTS / name).read_text(encoding="utf-8"))["F1 by trial"])
+def _table(name: str, title: str = "F1 by trial") -> pd.DataFrame:
+    return pd.DataFrame(json.loads((RESULTS / name).read_text(encoding="utf-8"))[title])
 
 
 def _short(value: float) -> str:

@@ -66,7 +66,7 @@ def test_what_is_compared_is_the_plain_number() -> None:
         ({"above": 0, "below": 1}, (0.5,), (0, 1), "above 0 and below 1"),
     ],
 )
-def test_bounds_are_kept_and_said(
+def test_bounds_are_kept_and_named_in_the_message(
     bounds: dict[str, float], inside: tuple[float, ...], outside: tuple[float, ...], words: str
 ) -> None:
     for value in inside:

@@ -200,6 +200,6 @@ def test_a_study_of_nothing_is_an_error() -> None:
         study_sweeps("nothing", [], [])
 
 
-def test_a_seed_that_is_none_is_refused() -> None:
+def test_an_invalid_seed_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="seed"):
         study_preset("subject1", taps=1, seed=-1)

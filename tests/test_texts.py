@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import unicodedata
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -26,12 +27,12 @@ from isiw.texts import plain
         ("\x1b", ""),
     ],
 )
-def test_what_a_terminal_would_obey_is_taken_out_and_the_rest_stays(text, shown) -> None:
+def test_what_a_terminal_would_obey_is_taken_out_and_the_rest_stays(text: str, shown: Any) -> None:
     assert plain(text) == shown
 
 
 @given(st.text())
-def test_what_is_left_can_be_printed(text) -> None:
+def test_what_is_left_can_be_printed(text: str) -> None:
     assert not any(unicodedata.category(character) in ("Cf", "Cs") for character in plain(text))
     assert "\x1b" not in plain(text)
     assert plain(plain(text)) == plain(text)

@@ -39,7 +39,7 @@ def test_trials_count_from_0() -> None:
 
 @pytest.mark.parametrize("name", ["mep_mv", "isi_sd_ms", "background_rms_uv"])
 @pytest.mark.parametrize("value", [*NOT_FINITE, -0.001])
-def test_an_amplitude_that_cannot_be_is_named(name: str, value: float) -> None:
+def test_an_invalid_amplitude_is_named(name: str, value: float) -> None:
     values: dict[str, Any] = {"mep_mv": 0.1, name: value}
     with pytest.raises(InvalidValueError, match=name):
         Measurement(isi_ms=10.0, **values)
@@ -66,7 +66,7 @@ def test_a_channel_keeps_its_samples_as_floats() -> None:
     ("values", "rate_hz", "t0_ms"),
     [([[1.0]], 1000.0, 0.0), ([1.0], 0.0, 0.0), ([1.0], math.nan, 0.0), ([1.0], math.inf, 0.0), ([1.0], 1e3, math.nan)],
 )
-def test_a_channel_that_is_no_waveform_is_refused(values: list[object], rate_hz: float, t0_ms: float) -> None:
+def test_a_channel_that_is_not_a_waveform_is_refused(values: list[object], rate_hz: float, t0_ms: float) -> None:
     with pytest.raises(InvalidValueError):
         Channel(np.array(values), rate_hz, "mV", t0_ms)
 

@@ -6,6 +6,7 @@ from . import log as log
 from . import metrics as metrics
 from . import models as models
 from . import plots as plots
+from . import priors as priors
 from . import repeatability as repeatability
 from . import report as report
 from . import response_counts as response_counts

@@ -197,7 +197,7 @@ def test_the_suite_waits_in_real_time_for_a_device_that_is_not_simulated(space: 
 
 
 @pytest.mark.parametrize("iti_s", [-1.0, np.nan, np.inf])
-def test_an_interval_that_nobody_can_wait_for_is_an_error(space: DesignSpace, iti_s: float) -> None:
+def test_an_invalid_interval_is_an_error(space: DesignSpace, iti_s: float) -> None:
     device = Hardware()
     with pytest.raises(InvalidValueError, match="iti_s"):
         check_device(lambda: device, space, iti_s=iti_s)

@@ -88,7 +88,7 @@ def test_a_folder_without_recordings_is_refused_with_the_way_out(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"trial,0.0\n0,1.0\n", gzip.compress(b"trial,0.0\n0,none\n"), gzip.compress(b"")]
+    "content", [b"", b"trial,0.0\n0,1.0\n", gzip.compress(b"trial,0.0\n0,none\n", mtime=0), gzip.compress(b"", mtime=0)]
 )
 def test_a_damaged_recording_is_named(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "uef_1_ECR_epochs_uV_3kHz.csv.gz").write_bytes(content)

@@ -7,7 +7,7 @@ import os
 import shutil
 import threading
 from pathlib import Path
-from typing import Never
+from typing import Any, Never
 
 import pytest
 
@@ -21,7 +21,7 @@ from isiw.session.resume import exclude
 
 
 @pytest.fixture
-def another(tmp_path, header, writes):
+def another(tmp_path: Path, header: Any, writes: Any) -> Any:
     """The bytes of another person's finished log."""
     with LogWriter.create(tmp_path / "elsewhere" / "s.mcap", header.model_copy(update={"subject": "P02"})) as log:
         writes(log, range(3))
@@ -30,13 +30,13 @@ def another(tmp_path, header, writes):
     return content
 
 
-def go_on(path):
+def go_on(path: Path) -> Any:
     salvaged = salvage(path)
     return LogWriter.continuing(path, salvaged, read_session(path).header)
 
 
 @pytest.mark.parametrize("name", ["s.mcap", "s.mcap.part"])
-def test_a_session_does_not_go_on_where_another_ones_log_has_its_name(broken_log, another, name) -> None:
+def test_a_session_does_not_go_on_where_another_ones_log_has_its_name(broken_log: Any, another: Any, name: str) -> None:
     finished = broken_log.with_suffix("")
     finished.write_bytes(another)
     before = broken_log.read_bytes()
@@ -47,20 +47,22 @@ def test_a_session_does_not_go_on_where_another_ones_log_has_its_name(broken_log
 
 
 @pytest.mark.parametrize("name", ["s.mcap", "s.mcap.part"])
-def test_a_trial_is_not_excluded_where_that_would_replace_another_ones_log(broken_log, another, name) -> None:
+def test_a_trial_is_not_excluded_where_that_would_replace_another_ones_log(
+    broken_log: Any, another: Any, name: str
+) -> None:
     broken_log.with_suffix("").write_bytes(another)
     with pytest.raises(LogError, match="another session's file"):
         exclude(broken_log.with_name(name), 1, "sneezed")
     assert broken_log.with_suffix("").read_bytes() == another
 
 
-def test_each_of_two_sessions_files_is_read_by_its_name(broken_log, another) -> None:
+def test_each_of_two_sessions_files_is_read_by_its_name(broken_log: Any, another: Any) -> None:
     broken_log.with_suffix("").write_bytes(another)
     assert read_session(broken_log).header.subject == "P07"
     assert read_session(broken_log.with_suffix("")).header.subject == "P02"
 
 
-def test_what_takes_the_logs_place_while_it_goes_on_is_not_replaced(finished_log, another) -> None:
+def test_what_takes_the_logs_place_while_it_goes_on_is_not_replaced(finished_log: Path, another: Any) -> None:
     log = go_on(finished_log)
     finished_log.unlink()
     finished_log.write_bytes(another)
@@ -73,14 +75,14 @@ def test_what_takes_the_logs_place_while_it_goes_on_is_not_replaced(finished_log
     assert read_session(f"{finished_log}.part").finished
 
 
-def test_a_log_that_was_taken_away_while_it_goes_on_is_made_anew(finished_log) -> None:
+def test_a_log_that_was_taken_away_while_it_goes_on_is_made_anew(finished_log: Path) -> None:
     log = go_on(finished_log)
     finished_log.unlink()
     log.close()
     assert len(read_session(finished_log).table) == 8
 
 
-def test_a_log_and_its_own_continuation_are_one_log(finished_log) -> None:
+def test_a_log_and_its_own_continuation_are_one_log(finished_log: Path) -> None:
     log = go_on(finished_log)
     log.append(Event(kind="resume", trial=8))
     log.sync()
@@ -93,12 +95,14 @@ def test_a_log_and_its_own_continuation_are_one_log(finished_log) -> None:
     assert not Path(f"{finished_log}.part").exists()
 
 
-def _no_links(new, old) -> Never:
+def _no_links(new: Any, old: Any) -> Never:
     raise OSError(errno.EPERM, f"no link from {new} to {old}")
 
 
 @pytest.mark.parametrize("links", [True, False])
-def test_a_taken_name_is_left_alone_and_a_free_one_taken(tmp_path, monkeypatch, links) -> None:
+def test_a_taken_name_is_left_alone_and_a_free_one_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: Any
+) -> None:
     if not links:  # as on a memory stick
         monkeypatch.setattr(Path, "hardlink_to", _no_links)
     for name in ("ours", "theirs"):
@@ -110,17 +114,19 @@ def test_a_taken_name_is_left_alone_and_a_free_one_taken(tmp_path, monkeypatch, 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["free", "theirs"]
 
 
-def test_a_name_that_leads_nowhere_is_taken_too(tmp_path) -> None:
+def test_a_name_that_leads_nowhere_is_taken_too(tmp_path: Path) -> None:
     (tmp_path / "ours").write_text("ours")
     (tmp_path / "link").symlink_to(tmp_path / "nowhere")
     with pytest.raises(FileExistsError):
         take_free_place(tmp_path / "ours", tmp_path / "link")
 
 
-def test_a_disk_that_knows_no_locks_is_refused_and_nothing_is_left_on_it(tmp_path, header, monkeypatch) -> None:
+def test_a_disk_that_knows_no_locks_is_refused_and_nothing_is_left_on_it(
+    tmp_path: Path, header: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fcntl = pytest.importorskip("fcntl")
 
-    def no_locks(*_) -> Never:
+    def no_locks(*_: Any) -> Never:
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
     monkeypatch.setattr(fcntl, "flock", no_locks)
@@ -130,13 +136,15 @@ def test_a_disk_that_knows_no_locks_is_refused_and_nothing_is_left_on_it(tmp_pat
 
 
 @pytest.mark.parametrize("kind", ["finished_log", "broken_log"])
-def test_of_two_that_go_on_at_once_one_does_and_the_other_is_told_why(kind, request) -> None:
+def test_of_two_that_go_on_at_once_one_does_and_the_other_is_told_why(
+    kind: Any, request: pytest.FixtureRequest
+) -> None:
     log, start = request.getfixturevalue(kind), threading.Barrier(2)
     whole, finished = log.read_bytes(), log.parent / "s.mcap"
     won: list[str] = []
     told: list[str] = []
 
-    def resume(name) -> None:
+    def resume(name: str) -> None:
         salvaged, header = salvage(log), read_session(log).header
         start.wait()
         try:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -107,7 +108,7 @@ def test_without_its_first_block_a_log_still_has_its_header(finished_log: Path) 
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAP0\r\n", bytes(5000)])
-def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_what_is_not_a_log_is_refused(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "s.mcap").write_bytes(content)
     with pytest.raises(DamagedLogError):
         read_session(tmp_path / "s.mcap")
@@ -126,7 +127,7 @@ def test_the_part_is_read_where_there_are_both(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", ["", ".", "/", 300 * "s"])
-def test_what_can_be_no_file_is_an_error_of_its_own(path: str) -> None:
+def test_a_name_that_cannot_be_a_file_is_an_error_of_its_own(path: str) -> None:
     with pytest.raises(LogError):
         salvage(path)
 
@@ -150,7 +151,7 @@ def test_a_channel_of_the_devices_own_is_known_without_the_block_that_defines_it
     assert [sorted(record.sweep(trial)) for trial in range(3)] == [[], ["grip"], ["grip"]]
 
 
-def blocks_of(content):
+def blocks_of(content: Any) -> Any:
     """Where each block of a log begins, and where the record behind it does."""
     starts = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", content)]
     ends = [start + 9 + int.from_bytes(content[start + 1 : start + 9], "little") for start in starts]
@@ -158,7 +159,7 @@ def blocks_of(content):
 
 
 @pytest.mark.parametrize("block", [1, 5, 12])
-def test_a_closed_log_that_was_cut_at_a_records_end_is_damaged(finished_log, block) -> None:
+def test_a_closed_log_that_was_cut_at_a_records_end_is_damaged(finished_log: Path, block: Any) -> None:
     whole = finished_log.read_bytes()
     finished_log.write_bytes(whole[: blocks_of(whole)[block][1]])
     record = read_session(finished_log)
@@ -169,7 +170,7 @@ def test_a_closed_log_that_was_cut_at_a_records_end_is_damaged(finished_log, blo
     assert not record.finished
 
 
-def test_the_index_tells_how_many_stimuli_a_lost_block_told_of(finished_log) -> None:
+def test_the_index_tells_how_many_stimuli_a_lost_block_told_of(finished_log: Path) -> None:
     whole = bytearray(finished_log.read_bytes())
     for start, _ in blocks_of(whole)[-2:]:  # the last intent, and its trial
         whole[start + 60] ^= 0xFF
@@ -181,7 +182,7 @@ def test_the_index_tells_how_many_stimuli_a_lost_block_told_of(finished_log) -> 
     assert any("Records" in loss and "lost" in loss for loss in record.losses)
 
 
-def test_what_a_closed_log_lost_with_its_index_nobody_knows(finished_log) -> None:
+def test_what_a_closed_log_lost_with_its_index_nobody_knows(finished_log: Path) -> None:
     whole = bytearray(finished_log.read_bytes())
     whole[blocks_of(whole)[-1][0] + 60] ^= 0xFF
     finished_log.write_bytes(whole[:-60])
@@ -190,7 +191,9 @@ def test_what_a_closed_log_lost_with_its_index_nobody_knows(finished_log) -> Non
 
 @pytest.mark.parametrize("kind", ["finished_log", "broken_log"])
 @pytest.mark.parametrize("block", [0, 3, 16])
-def test_a_block_that_is_there_twice_counts_once_and_is_reported(kind, block, request) -> None:
+def test_a_block_that_is_there_twice_counts_once_and_is_reported(
+    kind: Any, block: Any, request: pytest.FixtureRequest
+) -> None:
     log = request.getfixturevalue(kind)
     original, whole = content(read_session(log)), log.read_bytes()
     start, end = blocks_of(whole)[block]
@@ -201,7 +204,7 @@ def test_a_block_that_is_there_twice_counts_once_and_is_reported(kind, block, re
     assert any("in the file twice" in loss for loss in record.losses)
 
 
-def test_blocks_that_changed_places_are_read_in_their_order_and_reported(broken_log) -> None:
+def test_blocks_that_changed_places_are_read_in_their_order_and_reported(broken_log: Any) -> None:
     original, whole = content(read_session(broken_log)), broken_log.read_bytes()
     (first, middle), (again, last) = blocks_of(whole)[4:6]
     broken_log.write_bytes(whole[:first] + whole[again:last] + whole[middle:again] + whole[first:middle] + whole[last:])
@@ -210,7 +213,7 @@ def test_blocks_that_changed_places_are_read_in_their_order_and_reported(broken_
     assert any("out of order" in loss for loss in record.losses)
 
 
-def test_a_second_record_of_a_trial_is_left_out_and_reported(tmp_path, header, writes) -> None:
+def test_a_second_record_of_a_trial_is_left_out_and_reported(tmp_path: Path, header: Any, writes: Any) -> None:
     with LogWriter.create(tmp_path / "s.mcap", header) as log:
         writes(log, [0, 1])
         log.append(Trial(1, Status.ACCEPTED, 5.0, isi_ms=5.0, mep_mv=9.0))

@@ -117,6 +117,6 @@ def test_a_record_from_a_later_version_with_more_keys_is_read() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"{}", b'{"trial": "x", "isi_ms": 1}', b"\xff\xfe"])
-def test_what_is_no_record_is_refused(data: bytes) -> None:
+def test_what_is_not_a_record_is_refused(data: bytes) -> None:
     with pytest.raises(ValueError, match="validation error"):
         decode("/intent", data)

@@ -60,7 +60,7 @@ def test_a_file_that_appears_meanwhile_is_not_overwritten_at_the_end(tmp_path: P
     assert len(read_session(tmp_path / "s.mcap.part").table) == 2
 
 
-def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path, header: Header) -> None:
+def test_a_folder_that_cannot_be_created_is_named(tmp_path: Path, header: Header) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(LogError, match="cannot be created"):
         LogWriter.create(tmp_path / "file" / "s.mcap", header)
@@ -208,7 +208,7 @@ def test_a_running_session_cannot_be_resumed_beside_itself(tmp_path: Path, heade
 
 
 @pytest.mark.parametrize("name", ["s.mcap.part", "", "folder", 300 * "s"])
-def test_a_name_that_no_log_can_have_is_refused_and_leaves_nothing(tmp_path: Path, header: Header, name: str) -> None:
+def test_an_invalid_name_of_a_log_is_refused_and_leaves_nothing(tmp_path: Path, header: Header, name: str) -> None:
     (tmp_path / "folder").mkdir()
     before = sorted(tmp_path.iterdir())
     with pytest.raises(LogError):

@@ -9,6 +9,7 @@ import shutil
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,6 +17,7 @@ from isiw.errors import LogError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.session.loop import Session
 from isiw.session.resume import exclude, resume
+from scripted import ScriptedDevice, scripted_strategy
 from session.crashes import Ending, run_until
 
 if not hasattr(os, "fork"):
@@ -31,30 +33,28 @@ class Bench:
 
     folder: Path
     ledger: Path
-    strategy: object
-    device: object
 
     @property
     def log(self) -> Path:
         return self.folder / "s.mcap"
 
-    def session_device(self):
+    def session_device(self) -> Any:
         """A device that writes down each delivery, where no power cut reaches it."""
 
-        def answer(stimulus):
+        def answer(stimulus: Any) -> Any:
             with open(self.ledger, "a") as file:  # noqa: PTH123 - not one of the operations that are counted
                 file.write(f"{stimulus.trial}\n")
             return usual(stimulus)
 
-        device = self.device()
+        device = ScriptedDevice()
         usual, device.answer = device.answer, answer
         return device
 
-    def run(self, on_trial=None):
-        return Session(self.session_device(), self.strategy(TRIALS), log=self.log, on_trial=on_trial).run()
+    def run(self, on_trial: Any = None) -> Any:
+        return Session(self.session_device(), scripted_strategy(TRIALS), log=self.log, on_trial=on_trial).run()
 
-    def resume(self):
-        return resume(self.log, self.session_device(), self.strategy(TRIALS)).run()
+    def resume(self) -> Any:
+        return resume(self.log, self.session_device(), scripted_strategy(TRIALS)).run()
 
     def exclude(self) -> None:
         exclude(self.log, 1, "sneezed")
@@ -65,7 +65,7 @@ class Bench:
 
 
 def one_trial(bench: Bench) -> None:
-    def stop(update) -> None:
+    def stop(update: Any) -> None:
         if update.trial.index == 0:
             raise KeyboardInterrupt
 
@@ -98,12 +98,12 @@ SCENARIOS = {
 
 
 @pytest.fixture
-def bench(tmp_path, scripted_strategy, scripted_device, monkeypatch):
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Makes the bench of one scenario, again and again the same."""
     monkeypatch.setattr(os, "fsync", lambda _: None)  # which bytes stay is said by the test, not by this disk
-    made = Bench(tmp_path / "bench" / "logs", tmp_path / "bench" / "ledger", scripted_strategy, scripted_device)
+    made = Bench(tmp_path / "bench" / "logs", tmp_path / "bench" / "ledger")
 
-    def make(prepare) -> Bench:
+    def make(prepare: Any) -> Bench:
         if not (tmp_path / "prepared").exists():
             (tmp_path / "bench" / "shadow").mkdir(parents=True)
             made.folder.mkdir()
@@ -119,9 +119,9 @@ def bench(tmp_path, scripted_strategy, scripted_device, monkeypatch):
 
 
 @pytest.fixture
-def asks(scripted_strategy, scripted_device, tmp_path):
+def asks(tmp_path: Path) -> Any:
     """What an undisturbed session asks."""
-    result = Session(scripted_device(), scripted_strategy(TRIALS), log=tmp_path / "undisturbed.mcap").run()
+    result = Session(ScriptedDevice(), scripted_strategy(TRIALS), log=tmp_path / "undisturbed.mcap").run()
     return [trial.commanded_isi_ms for trial in result.trials]
 
 
@@ -162,7 +162,9 @@ def require_it_goes_on(bench: Bench, asks: list[float]) -> None:
 
 @pytest.mark.parametrize("ending", Ending)
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_whenever_it_dies_nothing_is_lost_or_replaced_and_it_goes_on(scenario, ending, bench, asks) -> None:
+def test_whenever_it_dies_nothing_is_lost_or_replaced_and_it_goes_on(
+    scenario: Any, ending: Any, bench: Any, asks: Any
+) -> None:
     prepare, act = SCENARIOS[scenario]
     made, before, original = bench(prepare), None, None
     if existing := next(made.folder.glob("s.mcap*"), None):

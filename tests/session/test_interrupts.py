@@ -68,7 +68,7 @@ def test_an_interrupt_that_found_no_moment_comes_at_the_end() -> None:
     assert done == ["all"]
 
 
-def test_a_second_interrupt_does_not_cut_the_clearing_up_short() -> None:
+def test_a_second_interrupt_does_not_interrupt_the_cleanup() -> None:
     done = []
 
     def work() -> None:

@@ -241,7 +241,7 @@ def test_an_impossible_isi_is_an_error_that_names_it(log: Path, isi_ms: float) -
 
 
 @pytest.mark.parametrize("answer", [None, 0.1, (50.0, 0.1)])
-def test_an_answer_that_is_none_is_an_error(log: Path, answer: object) -> None:
+def test_an_answer_of_another_type_is_an_error(log: Path, answer: object) -> None:
     _, message = run_failing(Session(ScriptedDevice(lambda _: answer), scripted_strategy(), log=log), DeviceError)
     assert "Sweep or a Measurement" in message
 
@@ -367,7 +367,7 @@ def test_a_strategy_that_knows_of_other_trials_is_refused_before_anything_is_del
 
 
 @pytest.mark.parametrize("times", [{"timeout_s": 0.0}, {"timeout_s": math.nan}, {"ask_deadline_s": -1.0}])
-def test_times_that_nobody_can_keep_are_refused(log: Path, times: dict[str, Any]) -> None:
+def test_invalid_times_are_refused(log: Path, times: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"timeout_s|deadline_s"):
         Session(ScriptedDevice(), scripted_strategy(3), log=log, **times)
 

@@ -326,7 +326,7 @@ def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted: Path) 
     assert len(read_session(interrupted).table) == 10
 
 
-def test_what_is_no_log_cannot_be_resumed(tmp_path: Path) -> None:
+def test_what_is_not_a_log_cannot_be_resumed(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="no such log"):
         resume(tmp_path / "nothing.mcap", ScriptedDevice())
 
@@ -415,7 +415,7 @@ def test_a_measured_zero_and_its_uncertainty_are_replayed(log: Path) -> None:
     assert [trial.isi_sd_ms for trial in session.trials] == [2.0, 2.0]
 
 
-def cut_at_a_records_end(log, trials) -> None:
+def cut_at_a_records_end(log: Path, trials: int) -> None:
     """What is left of a closed log that was copied in part: so many trials, and no end."""
     whole = log.read_bytes()
     blocks = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
@@ -423,31 +423,27 @@ def cut_at_a_records_end(log, trials) -> None:
 
 
 @pytest.fixture
-def cut(scripted_strategy, scripted_device, log):
+def cut(log: Path) -> Any:
     """A closed log of six trials, of which the last two were cut off."""
-    Session(scripted_device(), scripted_strategy(6), log=log).run()
+    Session(ScriptedDevice(), scripted_strategy(6), log=log).run()
     cut_at_a_records_end(log, 4)
     assert len(read_session(log).table) == 4
     return log
 
 
-def test_a_log_without_its_end_does_not_go_on_before_somebody_says_how_many_stimuli_it_lost(
-    cut, scripted_strategy, scripted_device
-) -> None:
+def test_a_log_without_its_end_does_not_go_on_before_somebody_says_how_many_stimuli_it_lost(cut: Path) -> None:
     before = cut.read_bytes()
     with pytest.raises(DamagedLogError, match=r"end is missing.*stimulator's counter.*--lost-pulses"):
-        resume(cut, scripted_device(), scripted_strategy(10))
+        resume(cut, ScriptedDevice(), scripted_strategy(10))
     with pytest.raises(DamagedLogError, match="end is missing"):
         exclude(cut, 1, "sneezed")
     assert cut.read_bytes() == before
 
 
-def test_the_stimuli_of_a_lost_end_are_counted_and_their_numbers_not_used_again(
-    cut, scripted_strategy, scripted_device
-) -> None:
-    device = scripted_device()
+def test_the_stimuli_of_a_lost_end_are_counted_and_their_numbers_not_used_again(cut: Path) -> None:
+    device = ScriptedDevice()
     result = resume(cut, device, scripted_strategy(10), lost_pulses=2).run()
-    assert [trial.reason for trial in result.trials[4:6]] == [MistrialReason.OUTCOME_UNKNOWN] * 2
+    assert [trial.reason for trial in list(result.trials)[4:6]] == [MistrialReason.OUTCOME_UNKNOWN] * 2
     assert [stimulus.trial for stimulus in device.delivered] == [6, 7, 8, 9]
     after = read_session(cut)
     assert (len(after.table), after.losses, after.end_lost) == (10, (), False)
@@ -455,17 +451,17 @@ def test_the_stimuli_of_a_lost_end_are_counted_and_their_numbers_not_used_again(
 
 
 @pytest.mark.parametrize("pulses", [-1, 1.5, "2", True, 10**9])
-def test_lost_pulses_are_a_number_of_stimuli(cut, scripted_strategy, scripted_device, pulses) -> None:
+def test_lost_pulses_are_a_number_of_stimuli(cut: Path, pulses: Any) -> None:
     with pytest.raises(InvalidValueError, match="lost_pulses"):
-        resume(cut, scripted_device(), scripted_strategy(10), lost_pulses=pulses)
+        resume(cut, ScriptedDevice(), scripted_strategy(10), lost_pulses=pulses)
 
 
-def test_a_log_with_its_end_has_lost_no_pulses(interrupted, scripted_strategy, scripted_device) -> None:
+def test_a_log_with_its_end_has_lost_no_pulses(interrupted: Any) -> None:
     with pytest.raises(InvalidValueError, match="this one's is there"):
-        resume(interrupted, scripted_device(), scripted_strategy(10), lost_pulses=1)
+        resume(interrupted, ScriptedDevice(), scripted_strategy(10), lost_pulses=1)
 
 
-def test_excluding_a_trial_of_a_damaged_log_says_in_the_log_what_was_lost(interrupted) -> None:
+def test_excluding_a_trial_of_a_damaged_log_says_in_the_log_what_was_lost(interrupted: Any) -> None:
     whole = bytearray(interrupted.read_bytes())
     block = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)][6]
     whole[block + 30] ^= 1

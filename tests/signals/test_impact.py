@@ -87,7 +87,7 @@ def test_other_sampling_rates_find_the_same_impact(rate_hz: float) -> None:
         (np.ones((2, 2, 5000)), 5000.0, "vector"),
     ],
 )
-def test_what_is_no_recording_is_an_error_and_never_a_number(waves: FloatArray, rate_hz: float, what: str) -> None:
+def test_what_is_not_a_recording_is_an_error_and_never_a_number(waves: FloatArray, rate_hz: float, what: str) -> None:
     with pytest.raises(InvalidValueError, match=what):
         impact_time(waves, rate_hz)
 

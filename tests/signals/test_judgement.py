@@ -156,7 +156,7 @@ def test_an_impact_that_the_device_only_predicts_carries_its_uncertainty() -> No
     assert (judged.isi_ms, judged.isi_sd_ms) == (98.0, 2.5)
 
 
-def test_the_artefact_of_the_tap_counts_neither_as_background_nor_as_mep() -> None:
+def test_the_artefact_of_the_tap_counts_neither_as_background_nor_as_an_mep() -> None:
     for isi_ms in (5.0, 40.0, 100.0):
         emg = 0.002 * np.random.default_rng(5).standard_normal(5000)
         emg[3500:3530] += 0.5  # 20 ms after the impact
@@ -206,7 +206,7 @@ def test_where_tap_and_mep_coincide_at_least_half_of_the_mep_is_told(
 
 @pytest.mark.parametrize("name", ["subject1", "subject2"])
 @pytest.mark.parametrize("isi_ms", [0, 3, 6, 9, 12, 15])
-def test_the_tap_of_a_trial_without_a_response_is_never_told_as_a_mep(isi_ms: float, name: str) -> None:
+def test_the_tap_of_a_trial_without_a_response_is_never_told_as_an_mep(isi_ms: float, name: str) -> None:
     assert told_mv(isi_ms, 0.0, 0.1, name).max() < 0.01
 
 
@@ -240,7 +240,7 @@ def test_a_sweep_with_too_little_rest_is_a_missing_channel() -> None:
 @pytest.mark.parametrize(
     "wrong", [{"background_uv": 0.0}, {"tap_artefact_ms": np.nan}, {"mep_window_ms": (35.0, 15.0)}]
 )
-def test_limits_that_cannot_be_are_errors(wrong: dict[str, Any]) -> None:
+def test_invalid_limits_are_errors(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match="SignalLimits"):
         SignalLimits(**wrong)
 

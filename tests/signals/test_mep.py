@@ -134,7 +134,7 @@ def test_a_pulse_beyond_the_sweep_has_no_background(pulse_ms: float) -> None:
         (np.ones((2, 1500)), RATE_HZ, 150.0, "vector"),
     ],
 )
-def test_what_is_no_recording_is_an_error_and_never_a_number(
+def test_what_is_not_a_recording_is_an_error_and_never_a_number(
     emg: FloatArray, rate_hz: float, pulse_ms: float, what: str
 ) -> None:
     with pytest.raises(InvalidValueError, match=what):

@@ -27,7 +27,7 @@ def recorded(request: pytest.FixtureRequest, recordings_folder: Path) -> Recorde
     return sweeps.to_numpy() / 1000, reference, MEP_WINDOWS_MS[muscles]
 
 
-def test_amplitudes_agree_within_2_percent_in_95_of_100_sweeps_with_a_mep(recorded: Recorded) -> None:
+def test_amplitudes_agree_within_2_percent_in_95_of_100_sweeps_with_an_mep(recorded: Recorded) -> None:
     emg_mv, reference, window_ms = recorded
     theirs = reference["feature_amp_uV"].to_numpy()
     held = theirs > 50
@@ -52,7 +52,7 @@ def test_onsets_agree_within_1_and_a_half_ms_in_90_of_100(recorded: Recorded) ->
     assert np.mean(np.abs(ours[held] - theirs[held]) <= 1.5) >= 0.90
 
 
-def test_a_mep_is_present_exactly_where_the_reference_found_one(recorded: Recorded) -> None:
+def test_an_mep_is_present_exactly_where_the_reference_found_one(recorded: Recorded) -> None:
     emg_mv, reference, window_ms = recorded
     present = mep_present(emg_mv, RATE_HZ, PULSE_MS, window_ms)
     assert np.mean(present == (reference["feature_amp_uV"].to_numpy() > 50)) >= 0.97

@@ -164,7 +164,7 @@ def test_an_unknown_setting_of_the_prior_names_the_known_ones() -> None:
     ],
 )
 @pytest.mark.parametrize("name", ["default", "random"])
-def test_a_setting_that_cannot_be_is_refused_when_the_strategy_is_made(
+def test_an_invalid_setting_is_refused_when_the_strategy_is_made(
     name: str, settings: dict[str, Any], what: str
 ) -> None:
     with pytest.raises(InvalidValueError, match=what):
@@ -215,8 +215,6 @@ def test_a_regression_gives_up_after_99_iterations(name: str) -> None:
         ("incremental", {"quiet_ms": -1.0}, "quiet_ms"),
     ],
 )
-def test_a_setting_of_the_dissertations_that_cannot_be_is_refused(
-    name: str, settings: dict[str, Any], what: str
-) -> None:
+def test_an_invalid_setting_of_the_dissertations_is_refused(name: str, settings: dict[str, Any], what: str) -> None:
     with pytest.raises(InvalidValueError, match=what):
         make_strategy(name, **settings)

@@ -106,7 +106,7 @@ def test_a_choice_that_fails_within_the_deadline_is_an_error_not_a_fallback() ->
 
 
 @pytest.mark.parametrize("deadline_s", [-1.0, float("nan")])
-def test_a_deadline_that_cannot_be_is_refused(held_up: Strategy, deadline_s: float | None) -> None:
+def test_an_invalid_deadline_is_refused(held_up: Strategy, deadline_s: float | None) -> None:
     with pytest.raises(InvalidValueError, match="deadline_s"):
         held_up.ask(deadline_s=deadline_s)
 

@@ -175,7 +175,7 @@ def test_every_reason_is_a_full_sentence(decide: Callable[[Progress], StopDecisi
 
 
 @pytest.mark.parametrize("width_ms", [0, -1, math.nan, math.inf])
-def test_a_width_that_cannot_be_is_refused(width_ms: float) -> None:
+def test_an_invalid_width_is_refused(width_ms: float) -> None:
     with pytest.raises(InvalidValueError, match="width_ms"):
         CredibleWidth(width_ms)
 
@@ -199,7 +199,7 @@ def test_no_window_needs_a_probability(probability: float) -> None:
 
 
 @pytest.mark.parametrize("max_trials", [0, -1, math.nan, math.inf, 3.0, True])
-def test_a_budget_that_is_no_count_of_at_least_1_is_refused(max_trials: int) -> None:
+def test_a_budget_below_1_or_not_whole_is_refused(max_trials: int) -> None:
     with pytest.raises(InvalidValueError, match="whole number of at least 1"):
         Budget(max_trials)
 
@@ -287,6 +287,6 @@ def test_a_sweep_without_a_window_goes_on() -> None:
         (SweptPast, {"quiet_ms": math.nan}),
     ],
 )
-def test_a_rule_that_cannot_be_is_refused(rule: type, settings: dict[str, object]) -> None:
+def test_an_invalid_rule_is_refused(rule: type, settings: dict[str, object]) -> None:
     with pytest.raises(InvalidValueError):
         rule(**settings)

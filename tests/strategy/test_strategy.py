@@ -136,7 +136,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("told", "error", "what"), REFUSED)
-def test_what_cannot_be_is_refused_and_changes_nothing(
+def test_invalid_values_are_refused_and_change_nothing(
     told: dict[str, Any], error: type[Exception], what: str, particles: Strategy
 ) -> None:
     play(particles, [0.05])

@@ -95,12 +95,12 @@ def test_an_unknown_strategy_is_told_with_the_known_ones(tmp_path: Path) -> None
         load_study(tmp_path / "study.toml")
 
 
-def test_from_python_what_cannot_be_is_refused_as_well() -> None:
+def test_from_python_invalid_values_are_refused_as_well() -> None:
     with pytest.raises(InvalidValueError, match="engine is unknown"):
         Study((StudyStrategy("even"),), ("wide",), engine=cast("Any", "fast"))
 
 
 @pytest.mark.parametrize("changed", [{"people": 10**9}, {"trials": 10**9}, {"batch": 10**9}, {"people": 300_000}])
-def test_a_study_that_could_not_even_be_listed_is_refused(changed) -> None:
+def test_a_study_that_could_not_even_be_listed_is_refused(changed: Any) -> None:
     with pytest.raises(InvalidValueError, match="at most"):
         tiny(**changed)

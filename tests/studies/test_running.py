@@ -18,6 +18,7 @@ import psutil
 import pytest
 
 from isiw.errors import ConfigError, StudyError
+from isiw.log import durable
 from isiw.studies import (
     Processes,
     Study,
@@ -248,7 +249,7 @@ def swept(people: int = 2) -> Study:
     return tiny(strategies=(StudyStrategy("incremental"),), cohorts=("gaussian",), people=people)
 
 
-def test_no_flipped_bit_of_a_part_gives_other_values_silently(tmp_path) -> None:
+def test_no_flipped_bit_of_a_part_gives_other_values_silently(tmp_path: Path) -> None:
     store = conduct(swept(people=1), tmp_path)
     part = next((tmp_path / "parts").glob("*.parquet"))
     whole, usual = part.read_bytes(), store.rows()
@@ -262,7 +263,7 @@ def test_no_flipped_bit_of_a_part_gives_other_values_silently(tmp_path) -> None:
     pd.testing.assert_frame_equal(store.rows(), usual)
 
 
-def test_a_part_without_a_checksum_in_its_name_is_no_part(tmp_path) -> None:
+def test_a_part_without_a_checksum_in_its_name_is_no_part(tmp_path: Path) -> None:
     store = conduct(swept(people=1), tmp_path)
     part = next((tmp_path / "parts").glob("*.parquet"))
     part.rename(part.with_name("even.gaussian.00000.parquet"))
@@ -270,10 +271,10 @@ def test_a_part_without_a_checksum_in_its_name_is_no_part(tmp_path) -> None:
         store.rows()
 
 
-def test_a_folder_that_is_being_written_takes_no_second_writer_and_is_still_read(tmp_path) -> None:
+def test_a_folder_that_is_being_written_takes_no_second_writer_and_is_still_read(tmp_path: Path) -> None:
     refused: list[str] = []
 
-    def try_it_too(unit, _result) -> None:
+    def try_it_too(unit: Any, _result: Any) -> None:
         with pytest.raises(StudyError, match=r"run by another process.*Wait for it") as caught:
             conduct(swept(), tmp_path)
         refused.append(str(caught.value))
@@ -284,10 +285,12 @@ def test_a_folder_that_is_being_written_takes_no_second_writer_and_is_still_read
     assert keys_run(swept(), tmp_path) == []
 
 
-def test_who_begins_a_folder_at_the_same_moment_goes_on_with_the_same_study_only(tmp_path, monkeypatch) -> None:
-    usual = store_module.put
+def test_who_begins_a_folder_at_the_same_moment_goes_on_with_the_same_study_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = durable.put
 
-    def put_late(path, content, **how) -> None:
+    def put_late(path: Path, content: Any, **how: Any) -> None:
         monkeypatch.setattr(store_module, "put", usual)
         begin_store(tiny(people=4), tmp_path)
         usual(path, content, **how)
@@ -298,12 +301,14 @@ def test_who_begins_a_folder_at_the_same_moment_goes_on_with_the_same_study_only
     assert open_store(tmp_path).study.people == 4
 
 
-def no_room(_) -> Never:
+def no_room(_: Any) -> Never:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def test_a_full_disk_is_an_error_of_the_study_and_all_that_is_finished_is_kept(tmp_path, monkeypatch) -> None:
-    def fill(_unit, _result) -> None:
+def test_a_full_disk_is_an_error_of_the_study_and_all_that_is_finished_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fill(_unit: Any, _result: Any) -> None:
         monkeypatch.setattr(os, "fsync", no_room)
 
     with pytest.raises(StudyError, match=r"No space left.*make room"):
@@ -316,7 +321,7 @@ def test_a_full_disk_is_an_error_of_the_study_and_all_that_is_finished_is_kept(t
     assert len(keys_run(swept(), tmp_path)) == 1
 
 
-def test_a_folder_that_cannot_be_made_is_an_error_of_the_study(tmp_path) -> None:
+def test_a_folder_that_cannot_be_made_is_an_error_of_the_study(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(StudyError, match="cannot be written"):
         begin_store(tiny(), tmp_path / "file")

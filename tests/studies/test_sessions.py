@@ -101,7 +101,7 @@ def test_paired_sessions_cross_strategies_cohorts_and_people() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"trials": 0}, {"person": -1}])
-def test_a_session_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
+def test_an_invalid_session_is_refused(wrong: dict[str, Any]) -> None:
     values: dict[str, Any] = {
         "strategy": "even",
         "cohort": "gaussian",

@@ -17,6 +17,8 @@ from scipy import stats
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.subjects.cohorts import COHORTS, cohort
+from isiw.subjects.days import another_day
+from isiw.subjects.labs import LABS, lab
 from isiw.subjects.profiles import PeakProfile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
 from isiw.subjects.subject import Drift, SimulatedSubject
@@ -26,11 +28,15 @@ from known import instance, known
 PEOPLE = 400
 KS_LEVEL = 1e-5
 OFF_THE_MAP = ("other-rig", "late", "very-wide", "steep", "flat", "weak", "rmt-off", "hand")
-USUAL_START = [name for name in COHORTS if name not in {"late", "very-wide", "odd", "kim11"}]
-USUAL_DELAY = [name for name in COHORTS if name not in {"other-rig", "odd", "kim11"}]
-USUAL_WIDTH = [name for name in COHORTS if name not in {"narrow", "wide", "very-wide", "odd", "kim11"}]
-GAIN = [name for name in COHORTS if name not in {"recruitment", "nonresponder", "kim11", "odd", *OFF_THE_MAP}]
-SOME_WITHOUT_A_WINDOW = {"nonresponder": 0.0, "steep": 0.9, "weak": 0.9, "rmt-off": 0.9, "odd": 0.9}
+OTHER_LAWS = {"odd", "kim11", "another-day", *LABS}
+USUAL_START = [name for name in COHORTS if name not in {"late", "very-wide", *OTHER_LAWS}]
+USUAL_DELAY = [name for name in COHORTS if name not in {"other-rig", *OTHER_LAWS}]
+USUAL_WIDTH = [name for name in COHORTS if name not in {"narrow", "wide", "very-wide", *OTHER_LAWS}]
+GAIN = [name for name in COHORTS if name not in {"recruitment", "nonresponder", *OTHER_LAWS, *OFF_THE_MAP}]
+SOME_WITHOUT_A_WINDOW = {
+    "nonresponder": 0.0,
+    **dict.fromkeys(("steep", "weak", "rmt-off", "odd", "another-day", *LABS), 0.9),
+}
 SPACES = [VALVE_SPACE, IMPACT_SPACE]
 
 NO_FLOOR = EmgFloor(1e-12, 0.1)
@@ -60,6 +66,10 @@ GOLDEN = {  # person 3 of seed 7: start, width, hit delay [ms]; baseline, one ME
     "odd": (90.440553468, 45.837527776, 184.314130489, 194.289659538, 464.222031414),
     "nonresponder": (26.795763804, 200.583631934, 171.477980223, 17.537323509, 27.809842272),
     "kim11": (29.786337130, 70.000000000, 183.644876006, 27.459353025, 130.665956671),
+    "lab": (43.607468962, 98.778181474, 185.045472366, 16.924413868, 55.411189166),
+    "lab-late": (138.189661220, 85.013381303, 177.032057023, 55.153055983, 134.267019245),
+    "lab-rig": (-1.656078453, 138.533150191, 45.954129384, 17.539448992, 24.883362277),
+    "another-day": (86.347281970, 48.950264038, 184.314189247, 13.879170544, 14.421862001),
 }
 
 
@@ -135,7 +145,8 @@ def test_a_person_depends_neither_on_how_many_are_drawn_nor_on_earlier_draws(nam
 
 @pytest.mark.parametrize("name", COHORTS)
 def test_people_differ_within_a_cohort(name: str) -> None:
-    assert len({subject.hit_delay_ms for subject in cohort(name, 11, 5)}) == 11
+    sessions = cohort(name, 11, 5)[:: 2 if name == "another-day" else 1]
+    assert len({subject.hit_delay_ms for subject in sessions}) == len(sessions)
 
 
 @pytest.mark.parametrize("name", [name for name in COHORTS if name != "kim11"])
@@ -349,6 +360,63 @@ def test_kim11_has_the_eleven_widths_of_table_4_1_in_order() -> None:
 def test_kim11_cycles_over_its_eleven_people_and_ignores_the_seed() -> None:
     assert cohort("kim11", 25, 0) == cohort("kim11", 25, 10_000)
     assert cohort("kim11", 25, 0)[11:22] == cohort("kim11", 11, 0)
+
+
+def peak(subject: SimulatedSubject) -> PeakProfile:
+    return instance(PeakProfile, subject.profile)
+
+
+def curve(subject: SimulatedSubject) -> RecruitmentResponse:
+    return instance(RecruitmentResponse, subject.response)
+
+
+@pytest.mark.parametrize("name", LABS)
+def test_the_people_of_a_lab_have_its_law(name: str) -> None:
+    law, drawn = lab(name, 3), people(name)
+    normal = {
+        law.start_ms: [peak(s).start_ms for s in drawn],
+        law.hit_delay_ms: [s.hit_delay_ms for s in drawn],
+    }
+    for (mean, sd), values in normal.items():
+        assert stats.kstest(values, stats.norm(mean, sd).cdf).pvalue > KS_LEVEL
+    assert_clipped_log_normal([peak(s).width_ms for s in drawn], *law.width_ms, (40, 230))
+    assert_log_normal([curve(s).amplitude_mv for s in drawn], *law.amplitude_mv)
+    assert_log_normal([curve(s).boost_pct_rmt for s in drawn], *law.boost_pct_rmt)
+    assert_log_normal([curve(s).sigma_x_pct_rmt for s in drawn], *law.sigma_x_pct_rmt)
+    assert_log_normal([s.response.floor.median_mv for s in drawn], *law.floor_mv)
+
+
+def test_labs_differ_in_where_windows_start_and_rigs_in_when_they_hit() -> None:
+    laws = {name: [lab(name, seed) for seed in range(PEOPLE)] for name in LABS}
+    for name, (start_ms, hit_delay_ms) in LABS.items():
+        assert_uniform([law.start_ms[0] for law in laws[name]], *start_ms)
+        assert_uniform([law.hit_delay_ms[0] for law in laws[name]], *hit_delay_ms)
+
+
+def test_sessions_of_another_day_come_in_pairs_of_one_person() -> None:
+    first, second = people("another-day")[::2], people("another-day")[1::2]
+    for kept in ("hit_delay_ms", "hit_delay_sd_ms", "input_correlation"):
+        assert [getattr(s, kept) for s in first] == [getattr(s, kept) for s in second]
+    assert [curve(s).boost_pct_rmt for s in first] == [curve(s).boost_pct_rmt for s in second]
+
+
+def test_another_day_the_window_has_shifted_or_is_anyones() -> None:
+    first, second = cohort("another-day", 2 * PEOPLE, 3)[::2], cohort("another-day", 2 * PEOPLE, 3)[1::2]
+    stayed = np.array([peak(a).width_ms == peak(b).width_ms for a, b in zip(first, second, strict=True)])
+    assert stayed.mean() == pytest.approx(0.7, abs=4 * math.sqrt(0.21 / PEOPLE))
+    shift_ms = np.array([peak(b).start_ms - peak(a).start_ms for a, b in zip(first, second, strict=True)])
+    assert stats.kstest(shift_ms[stayed] / 12.0, stats.norm.cdf).pvalue > KS_LEVEL
+    assert_uniform([peak(b).start_ms for b, same in zip(second, stayed, strict=True) if not same], 5, 110)
+    x50 = [curve(b).x50_pct_rmt - curve(a).x50_pct_rmt for a, b in zip(first, second, strict=True)]
+    assert stats.kstest(np.array(x50) / 3.0, stats.norm.cdf).pvalue > KS_LEVEL
+    amplitude = [curve(b).amplitude_mv / curve(a).amplitude_mv for a, b in zip(first, second, strict=True)]
+    assert_log_normal(amplitude, 1.0, 0.4)
+
+
+def test_only_people_with_a_recruitment_curve_come_back_another_day() -> None:
+    (person,), rng = cohort("gaussian", 1, 3), np.random.default_rng(1)
+    with pytest.raises(TypeError, match="GainResponse"):
+        another_day(person, person, rng)
 
 
 # What is true of them

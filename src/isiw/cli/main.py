@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import isiw
-from isiw.cli import study
+from isiw.cli import prior, study
 from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show, show_entry
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.add_typer(prior.app, name="prior")
 app.add_typer(study.app, name="study")
 new = typer.Typer(help="Write a starting point of your own.", no_args_is_help=True)
 app.add_typer(new, name="new")
@@ -67,11 +68,18 @@ def run(
     strategy: Annotated[str | None, typer.Option(help="A name that isiw strategies lists.", **NO_DEFAULT)] = None,
     seed: Seed = None,
     log: Annotated[Path | None, typer.Option(help="The log's file; by default a new one in isiw-sessions.")] = None,
+    lab: Annotated[
+        Path | None, typer.Option("--prior", help="A lab's prior, as isiw prior learn writes it.", **NO_DEFAULT)
+    ] = None,
+    after: Annotated[
+        list[Path] | None,
+        typer.Option(help="The log of an earlier session of the same person; of several, the first one first."),
+    ] = None,
 ) -> None:
     """Run a session with a simulated person, or with the device of a configuration, and say what was found."""
     with errors_reported(_INTERRUPTED):
         settings = isiw.config.load_config(config).with_overrides(
-            seed=seed, log=log, subject=subject, data=data, strategy=strategy
+            seed=seed, log=log, subject=subject, data=data, strategy=strategy, prior=lab, after=after
         )
         _run_to_the_end(isiw.config.session_for(settings, on_trial=_show_progress))
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import datetime as dt
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -29,7 +29,8 @@ from isiw.devices.protocol import Device
 from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import ConfigError
-from isiw.log.reader import SessionRecord
+from isiw.log.reader import SessionRecord, read_session
+from isiw.priors import after, load
 from isiw.session.loop import Session, SessionUpdate
 from isiw.signals.judgement import SignalLimits
 from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
@@ -144,6 +145,8 @@ class RunConfig(_Section):
 
     seed: int = Field(default=0, ge=0)
     log: Path | None = None
+    prior: Path | None = None
+    after: tuple[Path, ...] = ()
     device: DeviceConfig | None = None
     visit: VisitConfig = VisitConfig()
     subject: SubjectConfig = SubjectConfig()
@@ -175,6 +178,8 @@ class RunConfig(_Section):
         subject: str | None = None,
         data: Path | None = None,
         strategy: str | None = None,
+        prior: Path | None = None,
+        after: Sequence[Path] | None = None,
     ) -> RunConfig:
         """The same, with what was given on the command line; another strategy keeps the settings that were given.
 
@@ -184,9 +189,12 @@ class RunConfig(_Section):
             subject: `"simulated"` or `"recorded"`.
             data: the folder with the recorded EMG.
             strategy: one of `list_strategies()`.
+            prior: a lab's prior.
+            after: logs of earlier sessions of the same person, the first one first.
         """
         values = self.model_dump()
-        values |= {key: value for key, value in {"seed": seed, "log": log}.items() if value is not None}
+        given = {"seed": seed, "log": log, "prior": prior, "after": after or None}
+        values |= {key: value for key, value in given.items() if value is not None}
         about = {"kind": subject, "data": data}
         values["subject"] |= {key: value for key, value in about.items() if value is not None}
         values["strategy"] |= {} if strategy is None else {"name": strategy}
@@ -284,12 +292,17 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
     Args:
         config: the configuration.
         on_trial: called after each trial.
+
+    Raises:
+        ConfigError: no recordings, or no prior, where the configuration says.
+        LogError: an earlier session of the person that cannot be read, or has no accepted trial.
+        StrategyError: a prior for a strategy that has none of this kind.
     """
     space = config.space.design()
     log = config.log or fresh_log_path(config)
     device = device_for(config)
     known = {"hit_delay_ms": device.describe().hit_delay_ms}
-    settings = known_settings(config.strategy.name, known) | config.strategy.settings
+    settings = known_settings(config.strategy.name, known) | _settings_for(config)
     return Session(
         device,
         make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),
@@ -303,12 +316,29 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
     )
 
 
+def _settings_for(config: RunConfig) -> dict[str, Any]:
+    """The strategy's settings, with what earlier sessions taught as its prior."""
+    settings = dict(config.strategy.settings)
+    if config.prior is None and not config.after:
+        return settings
+    if "prior" in settings:
+        raise ConfigError(
+            "strategy.settings.prior and a prior from earlier sessions exclude each other",
+            remedy="Give only one of them.",
+        )
+    lab = None if config.prior is None else load(config.prior)
+    return settings | {"prior": after(*map(read_session, config.after), prior=lab)}
+
+
 def _code(config: RunConfig) -> str:
     return f"{config.subject.cohort}-{config.seed}-{config.subject.number}"
 
 
 def _kept(config: RunConfig) -> dict[str, Any]:
-    """What a log keeps to simulate the same person again; never what names code to import."""
+    """What a log keeps to simulate the same person again; never what names code to import.
+
+    What a prior came to is in the strategy's recipe; where it came from is kept for whoever reads the log.
+    """
     kept = config.model_dump(mode="json", exclude_none=True, exclude={"log", "device", "signals"})
     if config.subject.data is not None:
         kept["subject"]["data"] = str(config.subject.data.resolve())

@@ -363,7 +363,7 @@ def decode(topic: str, data: bytes) -> Record:
 
 def json_schema(topic: str) -> tuple[str, bytes]:
     """Name and JSON schema of a topic's records; the root is an object."""
-    return _schema_of(_KINDS.get(topic, Waveform))
+    return _schema_of(_KINDS.get(topic, Waveform))  # type: ignore[arg-type] # a class can be hashed
 
 
 @cache

@@ -1,16 +1,20 @@
 """Simulated people: the cohorts on which strategies are compared, and the truth about each person."""
 
 from isiw.subjects.cohorts import COHORTS, WIDTHS_KIM_MS, cohort
+from isiw.subjects.days import another_day
+from isiw.subjects.labs import LABS, Lab, lab
 from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.subjects.subject import Drift, Responder, Response, SimulatedSubject
 
 __all__ = [
     "COHORTS",
+    "LABS",
     "WIDTHS_KIM_MS",
     "Drift",
     "EmgFloor",
     "GainResponse",
+    "Lab",
     "PeakProfile",
     "Profile",
     "RecruitmentResponse",
@@ -20,5 +24,7 @@ __all__ = [
     "SimulatedSubject",
     "TrialNoise",
     "TwoPeakProfile",
+    "another_day",
     "cohort",
+    "lab",
 ]

@@ -12,6 +12,8 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from isiw.checks import choice, whole
+from isiw.subjects.days import another_day
+from isiw.subjects.labs import LABS, lab
 from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import Drift, SimulatedSubject
@@ -174,6 +176,13 @@ def _kim_subject(index: int) -> SimulatedSubject:
     return replace(subject, input_correlation=float(rng.uniform(0, 0.2)))
 
 
+def _on_either_day(seed: int, number: int) -> SimulatedSubject:
+    """Even numbers are people on the first day, and the next one is the same person on the second."""
+    rng = np.random.default_rng([zlib.crc32(b"another-day"), seed, number // 2])
+    person, stranger = _USUAL.subject(rng), _USUAL.subject(rng)
+    return another_day(person, stranger, rng) if number % 2 else person
+
+
 _DRAW: Final[dict[str, Callable[[np.random.Generator], SimulatedSubject]]] = {
     "gaussian": _gain_subject,
     "skewed": partial(_gain_subject, shape=_skewed),
@@ -191,7 +200,7 @@ _DRAW: Final[dict[str, Callable[[np.random.Generator], SimulatedSubject]]] = {
     "odd": _odd,
 }
 
-COHORTS: Final = (*_DRAW, "nonresponder", "kim11")
+COHORTS: Final = (*_DRAW, "nonresponder", "kim11", *LABS, "another-day")
 """The names that `cohort` knows."""
 
 
@@ -200,8 +209,10 @@ def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
 
     Args:
         name: one of `COHORTS`.
-        n: how many people. `kim11` has eleven, and cycles: its sessions differ in trial noise only.
-        seed: seed of the people; 0–999 are for development, reported figures use 10,000 and above.
+        n: how many people. `kim11` has eleven, and cycles: its sessions differ in trial noise only. Of `another-day`
+            every two, from the first on, are one person on two days.
+        seed: seed of the people, and of the lab in a cohort of one lab; 0–999 are for development, reported figures use
+            10,000 and above.
 
     Raises:
         InvalidValueError: an unknown name, or a negative number.
@@ -210,7 +221,10 @@ def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
     n, seed = whole("n", n, least=0), whole("seed", seed, least=0)
     if name == "kim11":
         return [_kim_subject(i % len(WIDTHS_KIM_MS)) for i in range(n)]
+    if name == "another-day":
+        return [_on_either_day(seed, i) for i in range(n)]
     generators = [np.random.default_rng([zlib.crc32(name.encode()), seed, i]) for i in range(n)]
     if name == "nonresponder":
         return [_nonresponder(rng, kind=i % 2 == 0) for i, rng in enumerate(generators)]
-    return [_DRAW[name](rng) for rng in generators]
+    draw = lab(name, seed).subject if name in LABS else _DRAW[name]
+    return [draw(rng) for rng in generators]

@@ -40,7 +40,7 @@ def test_without_noise_the_measured_window_by_the_share_is_the_true_one() -> Non
     assert (measured.start_ms, measured.end_ms) == pytest.approx((230.0, 330.0), abs=5)
 
 
-def test_who_does_not_respond_shows_no_window() -> None:
+def test_a_non_responder_shows_no_window() -> None:
     nobody = replace(CLEAR, response=GainResponse(EmgFloor(0.01, 0.3), gain_mv=0.0, cv=0.5))
     nonresponder = record(nobody, seed=2)
     assert nonresponder.windows == {"true": None, "measured, .135": None, "measured, baseline": None}

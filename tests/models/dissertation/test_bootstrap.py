@@ -195,6 +195,6 @@ def test_the_model_conforms(space: DesignSpace) -> None:
     "settings",
     [{"particles": 1}, {"particles": 2.5}, {"diffusion_ms": -1.0}, {"lattice_ms": 0.0}, {"half_width_ms": math.nan}],
 )
-def test_a_setting_that_cannot_be_is_refused(settings: dict[str, Any]) -> None:
+def test_an_invalid_setting_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(settings))):
         BootstrapFilter(**settings)

@@ -82,6 +82,6 @@ def test_the_model_conforms(space: DesignSpace) -> None:
 @pytest.mark.parametrize(
     "settings", [{"length_ms": 10.0}, {"min_length_ms": 0.0}, {"noise": 0.0}, {"max_fit_iterations": 0}, {"samples": 1}]
 )
-def test_a_setting_that_cannot_be_is_refused(settings: dict[str, Any]) -> None:
+def test_an_invalid_setting_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"length_ms|noise|iterations|samples"):
         GaussianProcessRegression(**settings)

@@ -182,6 +182,6 @@ def test_the_model_conforms(space: DesignSpace) -> None:
         {"neighbours": 2},
     ],
 )
-def test_a_setting_that_cannot_be_is_refused(settings: dict[str, Any]) -> None:
+def test_an_invalid_setting_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"step_ms|trials_per_isi|discarded|rule|evidence_se|neighbours"):
         SweepModel(**settings)

@@ -159,7 +159,7 @@ def test_where_no_amplitude_is_known_beforehand_it_starts_from_the_largest_mep(s
         {"samples": 1},
     ],
 )
-def test_a_setting_that_cannot_be_is_refused(settings: dict[str, Any]) -> None:
+def test_an_invalid_setting_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"peaks|width_ms|amplitude_mv|evaluations|samples"):
         NonlinearRegression(**settings)
 

@@ -62,6 +62,6 @@ def test_the_model_conforms(space: DesignSpace) -> None:
     "settings",
     [{"c": 0.0}, {"length_ms": 0.0}, {"epsilon": -0.1}, {"committee": 1}, {"committee": 2.5}],
 )
-def test_a_setting_that_cannot_be_is_refused(settings: dict[str, Any]) -> None:
+def test_an_invalid_setting_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"c must|length_ms|epsilon|committee"):
         SupportVectorRegression(**settings)

@@ -20,7 +20,7 @@ def residuals(log_sd: torch.Tensor, seed: int = 0) -> torch.Tensor:
     return torch.exp(log_sd) * torch.as_tensor(np.random.default_rng(seed).standard_normal(len(log_sd)))
 
 
-def test_louder_isis_are_found() -> None:
+def test_isis_with_more_noise_are_found() -> None:
     # The noise SD is three times as large in the second half, a log variance higher by 2.2; half of it is found.
     found = profile_of(residuals(torch.where(ISIS_MS > 250, np.log(3.0), 0.0)))
     assert found[60:].mean() - found[:20].mean() > 1.1

@@ -44,7 +44,7 @@ def test_hyperparameters_there_and_back() -> None:
         ({"p_window": 1.1}, "p_window"),
     ],
 )
-def test_a_prior_that_cannot_be_is_refused(settings: dict[str, Any], what: str) -> None:
+def test_an_invalid_prior_is_refused(settings: dict[str, Any], what: str) -> None:
     with pytest.raises(InvalidValueError, match=what):
         HyperparameterPrior(**settings)
 
@@ -52,7 +52,7 @@ def test_a_prior_that_cannot_be_is_refused(settings: dict[str, Any], what: str) 
 @pytest.mark.parametrize(
     "changed", [{"length_ms": 0.0}, {"noise": -1.0}, {"noise": 0.001}, {"centre": math.inf}, {"unit": 0.0}]
 )
-def test_a_process_that_cannot_be_is_refused(changed: dict[str, float]) -> None:
+def test_an_invalid_process_is_refused(changed: dict[str, float]) -> None:
     usual = {"length_ms": 40.0, "amplitude": 1.0, "noise": 0.3, "centre": -4.0, "unit": 0.8}
     with pytest.raises(InvalidValueError):
         FixedProcess(**{**usual, **changed})

@@ -110,7 +110,7 @@ def test_however_odd_a_mep_its_likelihood_and_its_gradient_are_finite(likelihood
 
 
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
-def test_a_mep_is_seen_or_not(likelihood: Likelihood) -> None:
+def test_an_mep_is_seen_or_not(likelihood: Likelihood) -> None:
     least = math.log(0.02)
     both = torch.tensor([[-math.inf, least], [least, math.inf]], dtype=torch.double)
     for level in (0.0, 0.3, 1.0):

@@ -54,7 +54,7 @@ def test_with_noise_on_the_input_the_expected_mep_saturates_and_tms_alone_evokes
         {"outliers": (-3.5, 0.0)},
     ],
 )
-def test_a_prior_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
+def test_an_invalid_prior_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         WindowPrior(**wrong)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -34,9 +35,15 @@ class Mixture:
         return cls(shares / shares.sum(), laws[..., 0], laws[..., 1])
 
     def log_parts(self, x: Tensor) -> Tensor:
-        """Log density of each component times its share, but for a constant, at x (..., d), shape (..., k)."""
+        """Log density of each component times its share at x (..., d), shape (..., k)."""
         z = (x.unsqueeze(-2) - self.means) / self.sds
-        return self.shares.log() - self.sds.log().sum(-1) - 0.5 * z.square().sum(-1)
+        scale = self.sds.log().sum(-1) + 0.5 * math.log(2.0 * math.pi) * self.sds.shape[-1]
+        return self.shares.log() - scale - 0.5 * z.square().sum(-1)
+
+    def log_density(self, x: Tensor) -> Tensor:
+        """Log density at x (..., d), shape (...)."""
+        density: Tensor = torch.logsumexp(self.log_parts(x), dim=-1)
+        return density
 
     def component(self, x: Tensor) -> Tensor:
         """The component that most probably explains x (..., d), shape (...)."""

@@ -94,7 +94,17 @@ class ParticleModel:
         check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
-        """The posterior before the first trial."""
+        """The posterior before the first trial.
+
+        Args:
+            space: the design space.
+            seed: seed of all randomness.
+            people: how many people.
+
+        Raises:
+            InvalidValueError: the prior's places count from another event than the space.
+        """
+        self.prior.profile.require_space(space)
         latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0), space)
         size, device = latents.present.shape, latents.present.device
         return ParticlePosterior(

@@ -19,6 +19,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.particles.mixture import JointMixture, Mixture
 from isiw.models.particles.noise import NoiseKind, Response
+from isiw.models.particles.places import Place, mixture_of
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale, check_scales
@@ -215,18 +216,45 @@ class ProfilePrior:
         shapes: probabilities of the families.
         start: where windows start.
         widths: how wide they are; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
+        places: where and how wide they are as far as earlier sessions say; the rest of the probability is that of
+            `start` and `widths`.
 
     Raises:
-        InvalidValueError: an invalid probability.
+        InvalidValueError: an invalid probability, places that leave nothing to the rest, or that count from different
+            events.
     """
 
     p_window: float = 0.72
     shapes: ShapeShares = field(default_factory=ShapeShares)
     start: StartPrior = field(default_factory=StartPrior)
     widths: tuple[Width, ...] = (Width(0.8, Scale(100.0, 0.42)), Width(0.2, Scale(150.0, 0.6)))
+    places: tuple[Place, ...] = ()
 
     def __post_init__(self) -> None:
         check_probabilities(self, "p_window")
+        if self.p_place >= 1.0:
+            raise InvalidValueError("the shares of ProfilePrior.places must sum to less than 1", got=self.p_place)
+        if len(references := {place.reference for place in self.places}) > 1:
+            raise InvalidValueError("ProfilePrior.places must count from one event", got=sorted(references))
+
+    @property
+    def p_place(self) -> float:
+        """Probability that a window is where earlier sessions say."""
+        return math.fsum(place.share for place in self.places)
+
+    def require_space(self, space: DesignSpace) -> None:
+        """Check that the places mean something in a space.
+
+        Raises:
+            InvalidValueError: they count from another event than the space.
+        """
+        if self.places and self.places[0].reference != space.reference:
+            raise InvalidValueError(
+                "the prior's places and the design space count ISIs from different events",
+                got=f"{space.reference} in the space",
+                expected=self.places[0].reference,
+                remedy="Use the prior with the kind of space that it was learnt in.",
+            )
 
 
 @dataclass(frozen=True)
@@ -422,7 +450,7 @@ class Prior:
 
     @cached_property
     def mixtures(self) -> dict[str, Mixture]:
-        """What is believed of each block but the start."""
+        """What is believed of each block but the start, places aside."""
         switch, session = self.switch, self.session
         return {
             "width": _mixture([(w.share, [_log(w.width_ms)]) for w in self.profile.widths]),
@@ -458,9 +486,13 @@ class Prior:
         size = (people, particles)
         uniform = torch.rand((4, *size), generator=generator, device=generator.device)
         start_ms = self.profile.start.start_ms(uniform[3], space).unsqueeze(-1)
-        values = [start_ms, self._joint.sample(size, generator)]
+        values = torch.cat([start_ms, self._joint.sample(size, generator)], dim=-1)
+        if self.profile.p_place:
+            known = torch.rand((*size, 1), generator=generator, device=generator.device) < self.profile.p_place
+            place = JointMixture([self._places]).sample(size, generator)
+            values = torch.cat([torch.where(known, place, values[..., :2]), values[..., 2:]], dim=-1)
         shape, noise = _kinds(self.profile.shapes, uniform[0]), _kinds(self.noise, uniform[1])
-        return Latents(torch.cat(values, dim=-1), shape, noise, uniform[2] < self.profile.p_window)
+        return Latents(values, shape, noise, uniform[2] < self.profile.p_window)
 
     def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
         """Log density of latents but for a constant, shape (b, p).
@@ -469,23 +501,64 @@ class Prior:
             values: latents, shape (b, p, d).
             space: the design space that the window is in.
         """
-        return self.profile.start.log_density(values[..., 0], space) + self._joint.log_density(values[..., 1:])
+        if not self.profile.p_place:
+            return self.profile.start.log_density(values[..., 0], space) + self._joint.log_density(values[..., 1:])
+        return torch.logsumexp(self.log_places(values, space), dim=-1) + self._beside_place.log_density(values[..., 2:])
+
+    def log_densities(self, values: Tensor, space: DesignSpace) -> dict[str, Tensor]:
+        """Log density of the latents of each block, shape (b, p); start and width are one: `"place"`.
+
+        Args:
+            values: latents, shape (b, p, d).
+            space: the design space that the window is in.
+        """
+        sizes = [len(names) for names in BLOCKS.values()]
+        parts = dict(zip(BLOCKS, torch.split(values, sizes, dim=-1), strict=True))
+        others = {name: mixture for name, mixture in self.mixtures.items() if name != "width"}
+        place = {"place": torch.logsumexp(self.log_places(values, space), dim=-1)}
+        return place | {name: mixture.log_density(parts[name]) for name, mixture in others.items()}
+
+    def log_places(self, values: Tensor, space: DesignSpace) -> Tensor:
+        """Log density of start and width, times its probability: anywhere, and in each place, shape (b, p, 1 + k).
+
+        Args:
+            values: latents, shape (b, p, d).
+            space: the design space that the window is in.
+        """
+        start, width = self.profile.start.log_density(values[..., 0], space), self.mixtures["width"]
+        anywhere = (start + width.log_density(values[..., 1:2])).unsqueeze(-1)
+        share = self.profile.p_place
+        if not share:
+            return anywhere
+        places = math.log(share) + self._places.log_parts(values[..., :2])
+        return torch.cat([math.log1p(-share) + anywhere, places], dim=-1)
+
+    @cached_property
+    def _places(self) -> Mixture:
+        return mixture_of(self.profile.places)
+
+    @cached_property
+    def _beside_place(self) -> JointMixture:
+        return JointMixture([mixture for name, mixture in self.mixtures.items() if name != "width"])
 
     @property
     def possible_muscles(self) -> tuple[Muscle, ...]:
-        """The muscle that is known, and any other that has no name; all of them where none is known."""
-        possible = (self.muscle, OTHER_MUSCLE.name)
-        return tuple(m for m in self.muscles if self.muscle is None or m.name in possible)
+        """All muscles but, where one is known, the others that have a name of their own."""
+        others = set() if self.muscle is None else {FOREARM.name, HAND.name} - {self.muscle}
+        return tuple(m for m in self.muscles if m.name not in others)
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
         """What the kinds of responses are called: kinds of noise, and muscles."""
-        return (*_WITHOUT_CURVE.values(), *(f"recruitment curve, {muscle.name}" for muscle in self.possible_muscles))
+        names = dict.fromkeys(f"recruitment curve, {muscle.name}" for muscle in self.possible_muscles)
+        return (*_WITHOUT_CURVE.values(), *names)
 
     def hypothesis(self, latents: Latents) -> Tensor:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
         recruitment = latents.values[..., latents_of("recruitment", device=latents.values.device)]
-        kind = len(_WITHOUT_CURVE) + self.mixtures["recruitment"].component(recruitment)
+        names = [muscle.name for muscle in self.possible_muscles]
+        numbers = torch.tensor([list(dict.fromkeys(names)).index(name) for name in names], device=recruitment.device)
+        kind = len(_WITHOUT_CURVE) + numbers[self.mixtures["recruitment"].component(recruitment)]
         for number, noise in enumerate(_WITHOUT_CURVE):
             kind = torch.where(latents.noise == noise, number, kind)
         return kind

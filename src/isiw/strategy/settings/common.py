@@ -211,7 +211,7 @@ def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
         name: of the strategy, for messages.
 
     Raises:
-        StrategyError: a key that the family does not have.
+        StrategyError: a key that the family does not have, or an object of another family.
         ConfigError: a nested key or value that cannot be used.
         InvalidValueError: an invalid value.
     """
@@ -225,7 +225,8 @@ def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
                 remedy=f"{f'Did you mean {close[0]}? ' if close else ''}Correct it or remove it.",
             )
     settings = kind()
-    for key, value in values.items():
+    # What is deep in a part goes into the part that was given.
+    for key, value in sorted(values.items(), key=lambda item: len(known[item[0]].path)):
         _require_modest(value, f"the setting {key} of {name}")
         settings = _with(settings, known[key].path, _converted(known[key], value, f"the setting {key} of {name}"))
     return settings
@@ -248,11 +249,16 @@ def _with(owner: Any, path: tuple[str, ...], value: Any) -> Any:
 
 def _converted(setting: Setting, value: Any, source: str) -> Any:
     """The value as the field's type; nested ones are made from what is given and, for the rest, the default."""
-    kind = next((k for k in (setting.kind, *get_args(setting.kind)) if is_dataclass(k)), None)
+    kinds: tuple[Any, ...] = (setting.kind, *get_args(setting.kind))
+    kind = next((k for k in kinds if isinstance(k, type) and is_dataclass(k)), None)
+    if kind is not None and is_dataclass(value) and not isinstance(value, kind):
+        raise StrategyError(
+            f"{source} is of another kind of model", got=type(value).__module__, expected=kind.__module__
+        )
     if kind is None or not isinstance(value, Mapping):
         return value.item() if isinstance(value, np.generic) else value
     default = {} if setting.default is None else asdict(setting.default)
-    return checked(kind, _merged(default, value), source)  # type: ignore[arg-type] # a dataclass
+    return checked(kind, _merged(default, value), source)
 
 
 def _merged(default: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,0 +1,142 @@
+"""The eleventh person of a lab: what ten sessions of its own people are worth.
+
+    python benchmarks/lab.py --labs 20 --seed 100000 --out benchmarks/results/lab
+
+In each lab ten people are measured with the default, and a prior is learnt from their logs; then other people of the
+lab, and people who do not belong there, are measured with the built-in prior, with the learnt one, and with a prior
+that was told the lab's law.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import pandas as pd
+import torch
+import typer
+from rich.progress import Progress
+
+import isiw
+from earlier import logged_session
+from isiw.models.particles.places import Place
+from isiw.models.particles.prior import Floor, Muscle, NoiseShares, Prior, ShapeShares
+from isiw.models.shared.scales import Scale
+from isiw.priors import LabPrior
+from isiw.studies import Failure, Processes, SimulatedSession, simulate
+from isiw.subjects import LABS, Lab, cohort, lab
+
+MARKS = (1, 5, 10, 20, 40)
+TOLD_SHARE = 0.95
+LEARNT, EARLIER_TRIALS = 10, 40
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One lab.
+
+    Args:
+        name: of the kind of lab.
+        seed: of the lab.
+        people: how many are measured then.
+        misfits: how many people of `odd` are measured then.
+        trials: of each session that is measured then.
+    """
+
+    name: str
+    seed: int
+    people: int
+    misfits: int
+    trials: int
+
+
+def told(law: Lab) -> Prior:
+    """The prior of who was told a lab's law."""
+    floor_mv, ceiling_mv = law.floor_mv, law.amplitude_mv
+    start_ms = law.start_ms[0] + law.hit_delay_ms[0]
+    slope = 0.30
+    return LabPrior(
+        sessions=(),
+        p_window=0.98,
+        shapes=ShapeShares(0.97, 0.01, 0.01, 0.01),
+        noise=NoiseShares(0.02, 0.01, 0.96, 0.01),
+        place=Place(
+            TOLD_SHARE, Scale(start_ms, math.hypot(law.start_ms[1], law.hit_delay_ms[1])), Scale(*law.width_ms)
+        ),
+        floor=Floor(TOLD_SHARE, Scale(*floor_mv), Scale(*law.floor_log_sd)),
+        muscle=Muscle(
+            "as in the lab",
+            TOLD_SHARE,
+            ratio=Scale(ceiling_mv[0] / floor_mv[0], math.hypot(ceiling_mv[1], floor_mv[1])),
+            slope_per_pct=Scale(slope, 0.02),
+            input_sd=Scale(slope * law.sigma_x_pct_rmt[0], law.sigma_x_pct_rmt[1]),
+            sigma_y=Scale(*law.sigma_y),
+            boost_pct=Scale(*law.boost_pct_rmt),
+            rest_pct=Scale(-15.0, 1.2),
+        ),
+    ).joined()
+
+
+def examine(unit: Unit) -> pd.DataFrame:
+    """All sessions with later people of one lab; columns as in `isiw.studies.simulate`, and the kind of `people`."""
+    torch.set_num_threads(1)
+    with tempfile.TemporaryDirectory() as folder:
+        logs = [
+            logged_session(person, f"P{number}", unit.seed + number, EARLIER_TRIALS, Path(folder))
+            for number, person in enumerate(cohort(unit.name, LEARNT, unit.seed))
+        ]
+        learnt = isiw.priors.learn(logs).joined()
+    priors = {"built-in": Prior(), "learnt": learnt, "told": told(lab(unit.name, unit.seed))}
+    own = [(unit.name, number) for number in range(LEARNT, LEARNT + unit.people)]
+    odd = [("odd", number) for number in range(unit.misfits)]
+    marks = tuple(mark for mark in MARKS if mark <= unit.trials)
+    rows = []
+    for label, prior in priors.items():
+        for name, person in own + odd:
+            session = SimulatedSession(
+                "default", name, person, unit.seed, unit.trials, marks, settings=(("prior", prior),), label=label
+            )
+            rows.append(simulate(session).assign(lab=unit.name, people="misfits" if name == "odd" else "own"))
+    return pd.concat(rows, ignore_index=True)
+
+
+def summary(rows: pd.DataFrame) -> pd.DataFrame:
+    """Mean F1 over labs, its standard error between labs, and the coverage of the edges."""
+    by_lab = rows.groupby(["lab", "people", "strategy", "trial", "seed"])["f1"].mean()
+    table = by_lab.groupby(["lab", "people", "strategy", "trial"]).agg(f1="mean", se="sem", labs="count")
+    covered = rows.groupby(["lab", "people", "strategy", "trial"])[["start_covered", "end_covered"]].mean()
+    return table.join(covered).reset_index()
+
+
+def main(
+    kinds: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(LABS),
+    labs: Annotated[int, typer.Option(help="Labs of each kind.")] = 20,
+    people: Annotated[int, typer.Option(help="New people of each lab.")] = 10,
+    misfits: Annotated[int, typer.Option(help="People of `odd` in each lab.")] = 5,
+    trials: Annotated[int, typer.Option(help="Trials of each new session.")] = 20,
+    seed: Annotated[int, typer.Option(help="Seed of the first lab.")] = 100_000,
+    workers: Annotated[int, typer.Option(help="Processes.")] = 2,
+    out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("lab"),
+) -> None:
+    """Measure the eleventh person of a lab."""
+    seeds = range(seed, seed + 100 * labs, 100)  # people have seeds of their own
+    units = [Unit(kind, s, people, misfits, trials) for kind in kinds.split(",") for s in seeds]
+    tables = []
+    with Progress() as progress:
+        bar = progress.add_task("labs", total=len(units))
+        for _, result in Processes(workers).results(examine, units):
+            if isinstance(result, Failure):
+                raise SystemExit(f"a lab failed: {result.error}\n{result.details}")
+            tables.append(result)
+            pd.concat(tables).to_csv(out.with_suffix(".csv"), index=False)
+            progress.advance(bar)
+    text = summary(pd.concat(tables)).to_string(index=False, float_format="{:.3f}".format)
+    out.with_suffix(".txt").write_text(f"{text}\n")
+    print(text)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,59 @@
+"""The commands about a lab's prior."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+
+import isiw
+from isiw.cli.console import NO_DEFAULT, errors_reported, show
+
+if TYPE_CHECKING:
+    from isiw.priors import LabPrior
+
+__all__ = ["app"]
+
+app = typer.Typer(help="Learn from a lab's own people, for isiw run --prior.", no_args_is_help=True)
+
+LabFile = Annotated[Path, typer.Argument(help="A lab's prior (TOML).", **NO_DEFAULT)]
+
+
+@app.command()
+def learn(
+    logs: Annotated[list[Path], typer.Argument(help="The logs of sessions, one a person.", **NO_DEFAULT)],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Where to: .toml")],
+    again: Annotated[bool, typer.Option(help="Take further sessions of a person as further people.")] = False,  # noqa: FBT002 - a flag
+    seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 0,
+) -> None:
+    """Learn what a lab's people are like from sessions already run."""
+    with errors_reported("Interrupted: nothing was written."):
+        with Progress(console=Console(stderr=True)) as progress:
+            task = progress.add_task("sessions", total=len(logs))
+            lab = isiw.priors.learn(logs, again=again, seed=seed, on_done=lambda _record: progress.advance(task))
+        isiw.priors.write_lab_prior(lab, output)
+        _print(lab)
+        show(f"prior: {output}\nRun a session with it: isiw run --prior {output}")
+
+
+@app.command("show")
+def show_prior(
+    source: LabFile,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
+) -> None:
+    """Say what a lab's people are like, beside what is believed of people in general."""
+    with errors_reported():
+        lab = isiw.priors.read_lab_prior(source)
+        _print(lab)
+        if output is not None:
+            picture = isiw.plots.save_prior_plot(isiw.priors.densities(lab), output)
+            show(f"picture: {picture}")
+
+
+def _print(lab: LabPrior) -> None:
+    show(isiw.priors.compared(lab).to_string(float_format=lambda value: f"{value:.3g}", na_rep=""))
+    trials = sum(session.trials for session in lab.sessions)
+    show(f"Learnt from {len(lab.sessions)} sessions with {trials} trials.", style="bold")

@@ -1,0 +1,22 @@
+"""What earlier sessions teach: of a lab's own people, and of the same person another day."""
+
+from isiw.priors.comparison import compared, densities
+from isiw.priors.days import DayToDay, after, moved
+from isiw.priors.file import load, read_lab_prior, write_lab_prior
+from isiw.priors.lab import LabPrior, LearntSession, learn
+from isiw.priors.recall import recalled
+
+__all__ = [
+    "DayToDay",
+    "LabPrior",
+    "LearntSession",
+    "after",
+    "compared",
+    "densities",
+    "learn",
+    "load",
+    "moved",
+    "read_lab_prior",
+    "recalled",
+    "write_lab_prior",
+]

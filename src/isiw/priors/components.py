@@ -1,0 +1,104 @@
+"""Normal laws of latents as components of the particle model's prior, and how they stand beside those that it has."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import astuple, replace
+from typing import Final, TypeVar
+
+import torch
+
+from isiw.models.particles.places import Place
+from isiw.models.particles.prior import Floor, Gain, Muscle, NoiseShares, ShapeShares, latents_of
+from isiw.models.shared.scales import Scale
+from isiw.types import FloatArray, Reference
+
+__all__ = [
+    "LATENT_BLOCKS",
+    "Component",
+    "beside",
+    "columns",
+    "floor",
+    "gain",
+    "mixed",
+    "mixed_shares",
+    "muscle",
+    "place",
+]
+
+LATENT_BLOCKS: Final = {"place": ("start", "width"), "floor": ("floor",), "gain": ("gain",), "muscle": ("recruitment",)}
+"""What sessions teach laws of, and the blocks of latents in each."""
+
+Component = TypeVar("Component", Place, Floor, Gain, Muscle)
+_Shares = TypeVar("_Shares", ShapeShares, NoiseShares)
+
+
+def columns(name: str) -> list[int]:
+    """The latents that one of `LATENT_BLOCKS` is about, as columns of a particle's values."""
+    mask = latents_of(*LATENT_BLOCKS[name], device=torch.device("cpu"))
+    return [int(column) for column in torch.nonzero(mask)[:, 0]]
+
+
+def place(share: float, mean: FloatArray, sd: FloatArray, reference: Reference) -> Place:
+    """A law of start and log width.
+
+    Args:
+        share: its probability.
+        mean: shape (2,).
+        sd: shape (2,).
+        reference: the event that the start counts from.
+    """
+    (width,) = _log_scales(mean[1:], sd[1:])
+    return Place(share, Scale(float(mean[0]), float(sd[0])), width, reference)
+
+
+def floor(share: float, mean: FloatArray, sd: FloatArray) -> Floor:
+    """A law of the floor's logarithms; `mean` and `sd` of shape (2,)."""
+    return Floor(share, *_log_scales(mean, sd))
+
+
+def gain(share: float, mean: FloatArray, sd: FloatArray) -> Gain:
+    """A law of the gain's logarithms; `mean` and `sd` of shape (2,)."""
+    return Gain(share, *_log_scales(mean, sd))
+
+
+def muscle(share: float, mean: FloatArray, sd: FloatArray, name: str) -> Muscle:
+    """A law of recruitment curves.
+
+    Args:
+        share: its probability.
+        mean: of the latents, all but the last as logarithms, shape (6,).
+        sd: shape (6,).
+        name: what it is called among the hypotheses.
+    """
+    scales = [*_log_scales(mean[:-1], sd[:-1]), Scale(float(mean[-1]), float(sd[-1]))]
+    return Muscle(name, share, *scales)
+
+
+def _log_scales(mean: FloatArray, sd: FloatArray) -> list[Scale]:
+    return [Scale(math.exp(m), s) for m, s in zip(mean.tolist(), sd.tolist(), strict=True)]
+
+
+def beside(usual: tuple[Component, ...], learnt: Sequence[Component]) -> tuple[Component, ...]:
+    """Components that make room for further ones.
+
+    Args:
+        usual: the components that there are.
+        learnt: what stands beside them, with shares of less than 1 together.
+    """
+    left = 1.0 - math.fsum(component.share for component in learnt)
+    kept: list[Component] = [replace(component, share=left * component.share) for component in usual]
+    return tuple(itertools.chain(kept, learnt))
+
+
+def mixed(learnt: float, usual: float, share: float) -> float:
+    """A probability as learnt, with a share of the usual one."""
+    return (1.0 - share) * learnt + share * usual
+
+
+def mixed_shares(learnt: Sequence[float], usual: _Shares, share: float) -> _Shares:
+    """Shares of kinds as learnt, with a share of the usual ones."""
+    pairs = zip(learnt, astuple(usual), strict=True)
+    return type(usual)(*(mixed(float(new), old, share) for new, old in pairs))

@@ -1,0 +1,184 @@
+"""The same person another day: that day's posterior, widened by what changes from day to day.
+
+The window may have moved as a whole a little, or be anyone's (dissertation, appendix B). Electrodes lie elsewhere and
+thresholds change. The posterior is handed on as mixtures of normal laws, which are fitted to its particles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from typing import Final, TypeAlias
+
+import numpy as np
+import torch
+from sklearn.mixture import GaussianMixture
+
+from isiw.checks import check_numbers, check_probabilities
+from isiw.errors import InvalidValueError
+from isiw.log.reader import SessionRecord
+from isiw.models.particles import ParticlePosterior
+from isiw.models.particles.places import Place
+from isiw.models.particles.prior import LATENTS, Latents, Prior, used_by
+from isiw.models.protocol import Tensor
+from isiw.models.randomness import systematic
+from isiw.priors.components import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
+from isiw.priors.recall import recalled
+from isiw.types import FloatArray, Reference
+
+__all__ = ["DayToDay", "after", "moved"]
+
+_Normal: TypeAlias = tuple[float, FloatArray, FloatArray]
+
+COMPONENTS: Final = {"place": 6, "floor": 1, "gain": 2, "muscle": 4}
+"""Into how many normal laws each part of a posterior is put."""
+
+LEAST_PARTICLES: Final = 50
+"""Of fewer particles no laws are made: hardly anything speaks for their kind."""
+
+
+@dataclass(frozen=True)
+class DayToDay:
+    """How the same person differs from day to day.
+
+    Args:
+        p_stays: probability that the window is that of the day before, moved as a whole; else it is anyone's.
+        shift_sd_ms: SD of the move [ms].
+        amplitude_log_sd: SD of the change of MEPs, natural log.
+        x50_sd_pct: SD of the change of the input without a tap [% RMT].
+        floor_log_sd: SD of the change of the EMG floor, natural log.
+        p_other: probability that, beyond these changes, the rest of a person is anyone's.
+
+    Raises:
+        InvalidValueError: an invalid probability or SD.
+    """
+
+    p_stays: float = 0.7
+    shift_sd_ms: float = 12.0
+    amplitude_log_sd: float = 0.4
+    x50_sd_pct: float = 3.0
+    floor_log_sd: float = 0.1
+    p_other: float = 0.1
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "p_stays", "p_other")
+        check_numbers(self, "shift_sd_ms", "amplitude_log_sd", "x50_sd_pct", "floor_log_sd", above=0)
+
+    def added_sd(self) -> dict[str, float]:
+        """What the SDs of latents grow by, in squares."""
+        return {
+            "start_ms": self.shift_sd_ms,
+            "log_floor_mv": self.floor_log_sd,
+            "log_gain": self.amplitude_log_sd,
+            "log_ceiling": self.amplitude_log_sd,
+            "rest": self.x50_sd_pct,
+        }
+
+
+def after(*records: SessionRecord, prior: Prior | None = None, law: DayToDay | None = None) -> Prior:
+    """What is believed of a person after earlier sessions, for `isiw.make_strategy(prior=...)`.
+
+    Args:
+        *records: the person's sessions, the first one first.
+        prior: what is believed of people before them; by default the built-in prior.
+        law: how people differ from day to day.
+
+    Raises:
+        LogError: a session without an accepted trial.
+        InvalidValueError: sessions, or a prior, that count ISIs from different events.
+    """
+    prior, law = prior or Prior(), law or DayToDay()
+    for record in records:
+        prior = _another_day(recalled(record, prior), law)
+    return prior
+
+
+def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = None) -> float:
+    """How probable it is that a person's window moved between two sessions, beyond the usual shift as a whole.
+
+    Args:
+        first: the earlier session.
+        second: the later one.
+        law: how people differ from day to day.
+
+    Raises:
+        LogError: a session without an accepted trial.
+        InvalidValueError: sessions that count ISIs from different events, or one in which there is probably no window.
+    """
+    earlier = recalled(first, Prior())
+    _require_window(first, earlier)
+    before = _another_day(earlier, law or DayToDay())
+    later = recalled(second, before)
+    _require_window(second, later)
+    weights = (later.log_weights.exp() * later.latents.present)[0].double()
+    anywhere = before.log_places(later.latents.values, later.space)[0].double().softmax(-1)[:, 0]
+    return float((weights * anywhere).sum() / weights.sum())
+
+
+def _require_window(record: SessionRecord, posterior: ParticlePosterior) -> None:
+    probability = float((posterior.log_weights.exp() * posterior.latents.present).sum())
+    if probability < 0.5:
+        raise InvalidValueError(
+            "whether a window moved cannot be said of a session that probably has none",
+            got=f"a probability of a window of {probability:.2f} in {record.path}",
+            expected="at least 0.5",
+        )
+
+
+def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
+    """What a posterior says of the next day."""
+    usual = posterior.model.prior
+    picks = systematic(posterior.log_weights, posterior.model.particles)[0]
+    latents = Latents(*(field[:, picks] for field in posterior.latents))
+    p_window = float(latents.present.double().mean())
+    shapes, kinds = usual.profile.shapes, usual.noise
+    profile = replace(
+        usual.profile,
+        p_window=mixed(p_window, usual.profile.p_window, law.p_other),
+        shapes=mixed_shares(_shares(latents.shape[latents.present], len(fields(shapes))), shapes, law.p_other),
+        places=beside(usual.profile.places, _places(latents, law, posterior.space.reference)),
+    )
+    return replace(
+        usual,
+        profile=profile,
+        noise=mixed_shares(_shares(latents.noise, len(fields(kinds))), kinds, law.p_other),
+        floors=beside(usual.floors, _laws(latents, "floor", floor, law)),
+        gains=beside(usual.gains, _laws(latents, "gain", gain, law)),
+        muscles=beside(usual.muscles, _laws(latents, "muscle", partial(muscle, name="as before"), law)),
+    )
+
+
+def _shares(kinds: Tensor, of: int) -> list[float]:
+    """How often kinds come, counting one more particle that is of all kinds."""
+    counts = torch.bincount(kinds.flatten(), minlength=of).double() + 1.0 / of
+    shares: list[float] = (counts / counts.sum()).tolist()
+    return shares
+
+
+def _places(latents: Latents, law: DayToDay, reference: Reference) -> tuple[Place, ...]:
+    return tuple(place(law.p_stays * share, mean, sd, reference) for share, mean, sd in _normals(latents, "place", law))
+
+
+def _laws(
+    latents: Latents, name: str, component: Callable[[float, FloatArray, FloatArray], Component], law: DayToDay
+) -> tuple[Component, ...]:
+    keeps = 1.0 - law.p_other
+    return tuple(component(keeps * share, mean, sd) for share, mean, sd in _normals(latents, name, law))
+
+
+def _normals(latents: Latents, name: str, law: DayToDay) -> list[_Normal]:
+    """Normal laws of some latents on the next day; none where hardly a particle uses them."""
+    own = columns(name)
+    used = used_by(latents.noise, latents.present)[0][:, own].all(-1)
+    values = latents.values[0][used][:, own].double().numpy()
+    if len(values) < LEAST_PARTICLES:
+        return []
+    centre, spread = values.mean(0), values.std(0) + 1e-6
+    # The regularisation keeps a law from being narrower than a few of the particles that it stands for.
+    fit = GaussianMixture(COMPONENTS[name], covariance_type="diag", reg_covar=0.05, max_iter=1000, random_state=0)
+    fit.fit((values - centre) / spread)
+    added = law.added_sd()
+    grown = np.array([added.get(LATENTS[column], 0.0) for column in own])
+    means, sds = centre + spread * fit.means_, np.hypot(spread * np.sqrt(fit.covariances_), grown)
+    return list(zip(fit.weights_.tolist(), means, sds, strict=True))

@@ -1,0 +1,69 @@
+"""The file of a lab's prior: TOML with numbers and names, of which nothing is ever executed."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from isiw.errors import ConfigError
+from isiw.models.particles.prior import Prior
+from isiw.priors.lab import SCHEMA_VERSION, LabPrior
+from isiw.toml_files import checked, read_toml
+
+__all__ = ["load", "read_lab_prior", "write_lab_prior"]
+
+
+def write_lab_prior(lab: LabPrior, path: str | Path) -> Path:
+    """Write a lab's prior as TOML, into a folder that is made where it is missing.
+
+    Args:
+        lab: the lab's prior.
+        path: where to.
+    """
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(tomli_w.dumps(_plain(asdict(lab))), encoding="utf-8")
+    return target
+
+
+def read_lab_prior(path: str | Path) -> LabPrior:
+    """Read a lab's prior.
+
+    Args:
+        path: the file.
+
+    Raises:
+        ConfigError: it cannot be read, is not such a file, or was written by a newer version.
+    """
+    values = read_toml(path)
+    version = values.get("schema_version")
+    if isinstance(version, int) and version > SCHEMA_VERSION:
+        raise ConfigError(
+            "the prior was learnt with a newer isiw",
+            got=f"schema version {version} in {path}",
+            expected=f"{SCHEMA_VERSION} or older",
+            remedy="Upgrade isiw, or learn it again from the logs.",
+        )
+    return checked(LabPrior, values, str(path))
+
+
+def load(path: str | Path) -> Prior:
+    """A prior with a lab's laws in it, for `isiw.make_strategy(prior=...)`.
+
+    Args:
+        path: the file.
+
+    Raises:
+        ConfigError: as from `read_lab_prior`.
+    """
+    return read_lab_prior(path).joined()
+
+
+def _plain(value: Any) -> Any:
+    """As TOML has it: what is not known is left out."""
+    if isinstance(value, dict):
+        return {key: _plain(inner) for key, inner in value.items() if inner is not None}
+    return [_plain(inner) for inner in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,194 @@
+"""A lab's prior: what the sessions of its own people say, beside what is believed of people in general."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final, TypeVar
+
+import numpy as np
+
+import isiw
+from isiw.checks import check_probabilities
+from isiw.errors import LogError
+from isiw.log.reader import SessionRecord, read_session
+from isiw.models.particles.places import Place
+from isiw.models.particles.prior import Floor, Gain, Muscle, NoiseShares, Prior, ShapeShares
+from isiw.priors.components import beside, floor, gain, mixed, mixed_shares, muscle, place
+from isiw.priors.people import hyper_prior, people_of, usual_shares
+from isiw.priors.population import Law, Population, learnt
+from isiw.priors.recall import recalled
+from isiw.types import Reference
+
+__all__ = ["LabPrior", "LearntSession", "learn"]
+
+_T = TypeVar("_T")
+
+SCHEMA_VERSION: Final = 1
+
+LEAST_USUAL: Final = 0.1
+"""The share that the built-in prior keeps however many people were learnt from, so that an odd one is still found."""
+
+PEOPLE_FOR_HALF: Final = 2
+"""From how many people on a lab's own law has half of the probability."""
+
+
+@dataclass(frozen=True)
+class LearntSession:
+    """A session that was learnt from.
+
+    Args:
+        sha256: hash of its log's bytes.
+        subject: the person's identifier in it.
+        trials: how many accepted trials it has.
+    """
+
+    sha256: str
+    subject: str
+    trials: int
+
+
+@dataclass(frozen=True)
+class LabPrior:
+    """What a lab's people are like: numbers only. There is no law of what nobody was learnt from.
+
+    Args:
+        sessions: the sessions that it was learnt from.
+        p_window: probability that there is a window.
+        shapes: probabilities of the families of profiles.
+        noise: probabilities of the kinds of noise.
+        place: start and width of the window.
+        floor: the EMG floor.
+        gain: responses with noise of a constant CV.
+        muscle: recruitment curves.
+        schema_version: of the file.
+        isiw_version: the version that learnt it.
+
+    Raises:
+        InvalidValueError: an invalid probability.
+    """
+
+    sessions: tuple[LearntSession, ...]
+    p_window: float
+    shapes: ShapeShares
+    noise: NoiseShares
+    place: Place | None = None
+    floor: Floor | None = None
+    gain: Gain | None = None
+    muscle: Muscle | None = None
+    schema_version: int = SCHEMA_VERSION
+    isiw_version: str = isiw.__version__
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "p_window")
+
+    def joined(self, usual: Prior | None = None) -> Prior:
+        """A prior in which the lab's laws stand beside those of people in general.
+
+        Args:
+            usual: what is believed of people in general; by default the built-in prior.
+        """
+        usual = usual or Prior()
+        profile = replace(usual.profile, p_window=self.p_window, shapes=self.shapes, places=_given(self.place))
+        return replace(
+            usual,
+            profile=profile,
+            noise=self.noise,
+            floors=beside(usual.floors, _given(self.floor)),
+            gains=beside(usual.gains, _given(self.gain)),
+            muscles=beside(usual.muscles, _given(self.muscle)),
+        )
+
+
+def _given(component: _T | None) -> tuple[_T, ...]:
+    return () if component is None else (component,)
+
+
+def learn(
+    logs: Sequence[str | Path],
+    *,
+    again: bool = False,
+    seed: int = 0,
+    on_done: Callable[[SessionRecord], None] = lambda _record: None,
+) -> LabPrior:
+    """Learn a lab's prior from the logs of its sessions, one a person.
+
+    The trials are told to the built-in model whatever the sessions were run with, so that no person counts twice where
+    a session was run with an earlier prior of the lab.
+
+    Args:
+        logs: their paths.
+        again: whether a person may be in more than one; each session counts as a person of its own.
+        seed: seed of the sampler.
+        on_done: called after each session.
+
+    Raises:
+        LogError: no log, one that cannot be read or has no accepted trial, the same log or person twice, or sessions
+            that count ISIs from different events.
+    """
+    records = [read_session(path) for path in logs]
+    sessions = tuple(_learnt_session(record) for record in records)
+    _require_different(records, sessions, again=again)
+    prior, space = Prior(), records[0].header.space
+    posteriors = []
+    for record in records:
+        posteriors.append(recalled(record, prior))
+        on_done(record)
+    rng = np.random.default_rng(seed)
+    population = learnt(people_of(posteriors), hyper_prior(prior, space), usual_shares(prior), rng)
+    return _lab_prior(population, prior, sessions, space.reference)
+
+
+def _learnt_session(record: SessionRecord) -> LearntSession:
+    digest = hashlib.sha256(record.path.read_bytes()).hexdigest()
+    return LearntSession(digest, record.header.subject, len(record.table.told))
+
+
+def _require_different(records: Sequence[SessionRecord], sessions: Sequence[LearntSession], *, again: bool) -> None:
+    """Raise where one log or person would count twice, or where clocks differ."""
+    if not records:
+        raise LogError("there is no session to learn from", remedy="Name at least one log.")
+    hashes = [session.sha256 for session in sessions]
+    _require_once(records, hashes, "two logs are the same", "Name it once.")
+    if not again:
+        subjects = [session.subject for session in sessions]
+        remedy = "Leave one out, or count each session as a person of its own: again=True, or --again."
+        _require_once(records, subjects, "two logs are of the same person, or do not say of whom", remedy)
+    references = {record.header.space.reference for record in records}
+    if len(references) > 1:
+        remedy = "Learn a prior from each kind of session."
+        raise LogError("the sessions count ISIs from different events", got=sorted(references), remedy=remedy)
+
+
+def _require_once(records: Sequence[SessionRecord], keys: Sequence[str], what: str, remedy: str) -> None:
+    first: dict[str, Path] = {}
+    for record, key in zip(records, keys, strict=True):
+        if key in first:
+            raise LogError(what, got=f"{first[key]} and {record.path}", remedy=remedy)
+        first[key] = record.path
+
+
+def _lab_prior(
+    population: Population, usual: Prior, sessions: tuple[LearntSession, ...], reference: Reference
+) -> LabPrior:
+    laws, shares = population.laws, population.shares
+    return LabPrior(
+        sessions=sessions,
+        p_window=mixed(float(shares["window"][1]), usual.profile.p_window, LEAST_USUAL),
+        shapes=mixed_shares(shares["shape"].tolist(), usual.profile.shapes, LEAST_USUAL),
+        noise=mixed_shares(shares["noise"].tolist(), usual.noise, LEAST_USUAL),
+        place=_where_known(laws["place"], lambda share, mean, sd: place(share, mean, sd, reference)),
+        floor=_where_known(laws["floor"], floor),
+        gain=_where_known(laws["gain"], gain),
+        muscle=_where_known(laws["muscle"], lambda share, mean, sd: muscle(share, mean, sd, "as in the lab")),
+    )
+
+
+def _where_known(law: Law, component: Callable[..., _T]) -> _T | None:
+    """The law as a component of the prior; None where fewer than one person was learnt from."""
+    if law.members < 1.0:
+        return None
+    share = 1.0 - max(LEAST_USUAL, PEOPLE_FOR_HALF / (PEOPLE_FOR_HALF + law.members))
+    return component(share, law.mean, law.sd)

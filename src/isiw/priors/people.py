@@ -1,0 +1,83 @@
+"""Posterior particles of logged people, as the hierarchical law takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple
+from typing import Final, NamedTuple
+
+import numpy as np
+import torch
+
+from isiw.design import DesignSpace
+from isiw.models.particles import ParticlePosterior
+from isiw.models.particles.prior import Latents, Prior, used_by
+from isiw.models.randomness import systematic
+from isiw.priors.components import LATENT_BLOCKS, columns
+from isiw.priors.population import Block, HyperPrior, People
+from isiw.types import FloatArray, IntArray
+
+__all__ = ["hyper_prior", "people_of", "usual_shares"]
+
+PARTICLES: Final = 500
+HYPER_DRAWS: Final = 20_000
+
+
+class _Person(NamedTuple):
+    blocks: dict[str, Block]
+    kinds: dict[str, IntArray]
+
+
+def people_of(posteriors: Sequence[ParticlePosterior]) -> People:
+    """Equally weighted particles of some people.
+
+    Args:
+        posteriors: one a person.
+    """
+    each = [_person(posterior) for posterior in posteriors]
+    blocks = {name: Block(*map(np.stack, zip(*(p.blocks[name] for p in each), strict=True))) for name in each[0].blocks}
+    return People(blocks, {name: np.stack([person.kinds[name] for person in each]) for name in each[0].kinds})
+
+
+def _person(posterior: ParticlePosterior) -> _Person:
+    picks = systematic(posterior.log_weights, PARTICLES)[0]
+    latents = Latents(*(field[:, picks] for field in posterior.latents))
+    densities = posterior.model.prior.log_densities(latents.values, posterior.space)
+    values, used = latents.values[0].double().numpy(), used_by(latents.noise, latents.present)[0].numpy()
+    blocks = {
+        name: Block(
+            values[:, columns(name)],
+            densities["place" if name == "place" else LATENT_BLOCKS[name][0]][0].double().numpy(),
+            np.all(used[:, columns(name)], axis=-1),
+        )
+        for name in LATENT_BLOCKS
+    }
+    shape = torch.where(latents.present, latents.shape, -1)
+    kinds = {"window": latents.present.long(), "shape": shape, "noise": latents.noise}
+    return _Person(blocks, {name: kind[0].numpy() for name, kind in kinds.items()})
+
+
+def hyper_prior(prior: Prior, space: DesignSpace) -> dict[str, HyperPrior]:
+    """Labs differ as people in general do, and people of one lab as usual people do.
+
+    Args:
+        prior: what is believed of people in general.
+        space: the design space of the sessions.
+    """
+    drawn = prior.sample(1, HYPER_DRAWS, torch.Generator().manual_seed(0), space).values[0].double().numpy()
+    usual_sd = prior.spreads.double().numpy()
+    return {
+        name: HyperPrior(drawn[:, own].mean(0), drawn[:, own].std(0), usual_sd[own])
+        for name, own in ((name, columns(name)) for name in LATENT_BLOCKS)
+    }
+
+
+def usual_shares(prior: Prior) -> dict[str, FloatArray]:
+    """How often the kinds of people come in general."""
+    p_window = prior.profile.p_window
+    kinds = {
+        "window": (1.0 - p_window, p_window),
+        "shape": astuple(prior.profile.shapes),
+        "noise": astuple(prior.noise),
+    }
+    return {name: np.array(shares) for name, shares in kinds.items()}

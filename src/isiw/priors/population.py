@@ -1,0 +1,189 @@
+"""A hierarchical law of a lab's people, learnt from the posterior particles of their sessions.
+
+A person's likelihood under a law is the mean over their particles of the law's density over that of the prior that
+the particles were drawn with, so that no session is run again for it. In each block of latents a person is one of the
+lab's, of whom the law is normal, or comes from that prior like anyone: an odd one does not bend the law. Gibbs sampling
+draws laws, memberships and particles in turn; what is kept is the next person's law, wider the fewer people there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, NamedTuple, TypeAlias
+
+import numpy as np
+
+from isiw.types import BoolArray, FloatArray, IntArray
+
+__all__ = ["Block", "HyperPrior", "Law", "People", "Population", "learnt"]
+
+SWEEPS: Final = 1200
+BURN_IN: Final = 200
+
+P_OUTSIDER: Final = 0.15
+"""How often, in one block, a person is not one of the lab's."""
+
+SD_WEIGHT: Final = 3.0
+"""As how many people the usual spread counts in the law's."""
+
+KINDS_WEIGHT: Final = 4.0
+"""As how many people the usual shares of kinds count in the lab's."""
+
+
+class Block(NamedTuple):
+    """One block of latents of the people's particles.
+
+    Args:
+        values: the latents, shape (n, i, d).
+        log_density: under the prior that the particles were drawn with, shape (n, i).
+        used: whether they mean anything to the particle, shape (n, i).
+    """
+
+    values: FloatArray
+    log_density: FloatArray
+    used: BoolArray
+
+
+class HyperPrior(NamedTuple):
+    """What is believed of a block's law before any person, fields of shape (d,).
+
+    Args:
+        mean: where the law's mean is expected.
+        mean_sd: SD of the same from lab to lab.
+        sd: the usual SD over people.
+    """
+
+    mean: FloatArray
+    mean_sd: FloatArray
+    sd: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class People:
+    """Equally weighted particles of n people, i of each.
+
+    Args:
+        blocks: the latents that have a law, by name.
+        kinds: discrete latents by name: the kind, shape (n, i).
+    """
+
+    blocks: Mapping[str, Block]
+    kinds: Mapping[str, IntArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """The posterior predictive of one block.
+
+    Args:
+        mean: shape (d,).
+        sd: shape (d,).
+        members: how many people it was learnt from, expected.
+    """
+
+    mean: FloatArray
+    sd: FloatArray
+    members: float
+
+
+@dataclass(frozen=True, eq=False)
+class Population:
+    """What was learnt of a lab's people.
+
+    Args:
+        laws: by block.
+        shares: of the kinds, by discrete latent.
+    """
+
+    laws: Mapping[str, Law]
+    shares: Mapping[str, FloatArray]
+
+
+_Normal: TypeAlias = tuple[FloatArray, FloatArray]
+
+
+def learnt(
+    people: People, hyper: Mapping[str, HyperPrior], usual: Mapping[str, FloatArray], rng: np.random.Generator
+) -> Population:
+    """Learn a law from people.
+
+    Args:
+        people: their particles.
+        hyper: the hyper-prior of each block.
+        usual: the usual shares of each discrete latent's kinds.
+        rng: source of randomness.
+    """
+    laws = {name: (np.median(block.values, axis=(0, 1)), hyper[name].sd) for name, block in people.blocks.items()}
+    shares = dict(usual)
+    drawn: dict[str, list[tuple[FloatArray, FloatArray, int]]] = {name: [] for name in laws}
+    kept_shares: dict[str, list[FloatArray]] = {name: [] for name in shares}
+    for sweep in range(SWEEPS):
+        picks = _picked(people, laws, shares, usual, rng)
+        for name, block in people.blocks.items():
+            members = _members(block, laws[name], picks, rng)
+            laws[name] = _drawn_law(members, laws[name], hyper[name], rng)
+            if sweep >= BURN_IN:
+                drawn[name].append((*laws[name], len(members)))
+        for name, kinds in people.kinds.items():
+            chosen = np.take_along_axis(kinds, picks[:, None], axis=1)[:, 0]
+            counts = np.bincount(chosen[chosen >= 0], minlength=len(usual[name]))
+            shares[name] = rng.dirichlet(KINDS_WEIGHT * usual[name] + counts)
+            if sweep >= BURN_IN:
+                kept_shares[name].append(shares[name])
+    predictive = {name: _predictive(draws) for name, draws in drawn.items()}
+    return Population(predictive, {name: np.mean(kept, axis=0) for name, kept in kept_shares.items()})
+
+
+def _log_ratio(block: Block, law: _Normal) -> FloatArray:
+    """Log density under the law over that under the prior, shape (n, i)."""
+    mean, sd = law
+    z = (block.values - mean) / sd
+    log_law = -0.5 * (z**2).sum(-1) - np.log(sd).sum() - 0.5 * np.log(2 * np.pi) * len(mean)
+    ratio: FloatArray = log_law - block.log_density + np.log((1 - P_OUTSIDER) / P_OUTSIDER)
+    return ratio
+
+
+def _picked(
+    people: People,
+    laws: Mapping[str, _Normal],
+    shares: Mapping[str, FloatArray],
+    usual: Mapping[str, FloatArray],
+    rng: np.random.Generator,
+) -> IntArray:
+    """A particle of each person under the laws, memberships integrated out, shape (n,)."""
+    blocks = people.blocks.items()
+    log_weight = sum(
+        np.where(block.used, np.logaddexp(0.0, _log_ratio(block, laws[name])), 0.0) for name, block in blocks
+    )
+    # Kinds of -1 mean nothing to the particle, and weigh as in the prior.
+    for name, kinds in people.kinds.items():
+        log_share = np.append(np.log(shares[name] / usual[name]), 0.0)
+        log_weight = log_weight + log_share[kinds]
+    picks: IntArray = (log_weight + rng.gumbel(size=np.shape(log_weight))).argmax(-1)
+    return picks
+
+
+def _members(block: Block, law: _Normal, picks: IntArray, rng: np.random.Generator) -> FloatArray:
+    """The picked particles of those who are of the lab's law in this block, shape (m, d)."""
+    rows = np.arange(len(picks))
+    log_odds = _log_ratio(block, law)[rows, picks]
+    inside = block.used[rows, picks] & (rng.logistic(size=len(picks)) < log_odds)
+    members: FloatArray = block.values[rows, picks][inside]
+    return members
+
+
+def _drawn_law(members: FloatArray, law: _Normal, hyper: HyperPrior, rng: np.random.Generator) -> _Normal:
+    """A law given its members: the mean given the SD, and the SD given the mean."""
+    count, (_, sd) = len(members), law
+    precision = hyper.mean_sd**-2 + count * sd**-2
+    centre = (hyper.mean * hyper.mean_sd**-2 + members.sum(0) * sd**-2) / precision
+    mean = centre + rng.standard_normal(len(centre)) / np.sqrt(precision)
+    squares = SD_WEIGHT * hyper.sd**2 + ((members - mean) ** 2).sum(0)
+    return mean, np.sqrt(squares / rng.chisquare(SD_WEIGHT + count, size=len(centre)))
+
+
+def _predictive(draws: list[tuple[FloatArray, FloatArray, int]]) -> Law:
+    """Mean and spread of the next person of the lab; the spread is of the middle, as few people have heavy tails."""
+    means, sds, members = (np.array(column) for column in zip(*draws, strict=True))
+    return Law(means.mean(0), np.sqrt(means.var(0) + np.median(sds, axis=0) ** 2), float(members.mean()))

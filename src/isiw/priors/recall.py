@@ -1,0 +1,45 @@
+"""What a logged session says about its person: its trials told to the particle model once more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from isiw.errors import LogError
+from isiw.log.reader import SessionRecord
+from isiw.models.particles import ParticleModel, ParticlePosterior
+from isiw.models.particles.prior import Prior
+from isiw.models.protocol import Observation
+
+__all__ = ["recalled"]
+
+
+def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> ParticlePosterior:
+    """The posterior after a logged session; the hit delay is what its rig stated, where the prior says nothing of it.
+
+    Args:
+        record: the session.
+        prior: what is believed of people before it.
+        particles: how many particles.
+
+    Raises:
+        LogError: it has no accepted trial.
+        InvalidValueError: the prior's places count from another event than the session's ISIs.
+    """
+    if not record.table.told:
+        raise LogError(
+            "the session has no accepted trial to learn from", got=str(record.path), remedy="Leave this log out."
+        )
+    model = ParticleModel(_of_rig(prior, record), particles=particles)
+    if (limit_mv := record.header.device.detection_limit_mv) is not None:
+        model = replace(model, detection_limit_mv=limit_mv)
+    posterior = model.begin(record.header.space, seed=record.header.seed)
+    for trial in record.table.told:
+        told = Observation.of([trial.isi_ms], [trial.mep_mv], [trial.isi_sd_ms])
+        posterior = model.update(posterior, told)
+    return posterior
+
+
+def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
+    start = prior.profile.start
+    stated = start.hit_delay_ms or record.header.device.hit_delay_ms
+    return replace(prior, profile=replace(prior.profile, start=replace(start, hit_delay_ms=stated)))

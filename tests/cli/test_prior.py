@@ -1,0 +1,106 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from isiw import priors
+from isiw.cli import app
+from isiw.log.reader import read_session
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: Any) -> Any:
+    """Logs of two people, and the lab's prior learnt from them."""
+    return tmp_path_factory.mktemp("lab")
+
+
+@pytest.fixture
+def isiw(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.chdir(folder)
+
+    def run(*arguments: Any) -> Any:
+        return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+    return run
+
+
+@pytest.fixture
+def logs(isiw: Any, folder: Path) -> Any:
+    (folder / "short.toml").write_text("[strategy.settings]\nmax_trials = 3\nparticles = 200\n")
+    paths = [folder / f"{seed}.mcap" for seed in (1, 2)]
+    for seed, path in enumerate(paths, start=1):
+        if not path.exists():
+            assert isiw("run", "short.toml", "--seed", seed, "--log", path).exit_code == 0
+    return paths
+
+
+@pytest.fixture
+def lab(isiw: Any, logs: Any, folder: Path) -> Any:
+    if not (folder / "lab.toml").exists():
+        result = isiw("prior", "learn", *logs, "-o", "lab.toml")
+        assert result.exit_code == 0, result.output
+        assert "Learnt from 2 sessions with 6 trials" in result.output
+        assert "isiw run --prior lab.toml" in result.output
+    return folder / "lab.toml"
+
+
+def test_a_lab_prior_is_shown_beside_the_built_in_one_and_drawn(isiw: Any, lab: Any, folder: Path) -> None:
+    result = isiw("prior", "show", lab, "-o", "lab.png")
+    assert result.exit_code == 0, result.output
+    assert "EMG floor [mV]" in result.output
+    assert "built-in median" in result.output
+    assert (folder / "lab.png").stat().st_size > 5000
+
+
+def test_a_session_is_run_with_a_lab_prior_and_its_log_holds_the_numbers(isiw: Any, lab: Any, folder: Path) -> None:
+    result = isiw("run", "short.toml", "--prior", lab, "--log", "with.mcap")
+    assert result.exit_code == 0, result.output
+    places = read_session(folder / "with.mcap").header.strategy.settings["prior"]["profile"]["places"]
+    assert [place["share"] for place in places] == [p.share for p in priors.load(lab).profile.places]
+
+
+def test_a_session_starts_from_earlier_ones_of_the_person(isiw: Any, logs: Any, folder: Path) -> None:
+    result = isiw("run", "short.toml", "--after", logs[0], "--log", "after.mcap")
+    assert result.exit_code == 0, result.output
+    header = read_session(folder / "after.mcap").header
+    expected = priors.after(read_session(logs[0]))
+    assert [floor["share"] for floor in header.strategy.settings["prior"]["floors"]] == [
+        floor.share for floor in expected.floors
+    ]
+    assert header.config["isiw_run"]["after"] == [str(logs[0])]
+
+
+def test_a_session_with_a_prior_from_earlier_ones_is_resumed_without_their_files(
+    isiw: Any, logs: Any, folder: Path
+) -> None:
+    gone = folder / "gone.mcap"
+    gone.write_bytes(logs[0].read_bytes())
+    assert isiw("run", "short.toml", "--after", gone, "--log", "resumed.mcap").exit_code == 0
+    gone.unlink()
+    result = isiw("resume", "resumed.mcap")
+    assert result.exit_code == 0, result.output
+
+
+def test_the_same_person_twice_is_refused_with_the_way_out(isiw: Any, logs: Any, folder: Path) -> None:
+    (folder / "copy").mkdir()
+    assert isiw("run", "short.toml", "--seed", 1, "--log", folder / "copy" / "second.mcap").exit_code == 0
+    result = isiw("prior", "learn", logs[0], folder / "copy" / "second.mcap", "-o", "twice.toml")
+    assert result.exit_code == 1
+    assert "--again" in result.output
+    assert not (folder / "twice.toml").exists()
+
+
+def test_a_prior_that_is_not_there_is_named(isiw: Any) -> None:
+    result = isiw("run", "--prior", "nowhere.toml", "--log", "n.mcap")
+    assert result.exit_code == 1
+    assert "nowhere.toml" in result.output
+
+
+def test_a_prior_among_the_settings_excludes_one_from_earlier_sessions(isiw: Any, lab: Any, folder: Path) -> None:
+    (folder / "both.toml").write_text("[strategy.settings.prior.profile]\np_window = 0.5\n")
+    result = isiw("run", "both.toml", "--prior", lab, "--log", "b.mcap")
+    assert result.exit_code == 1
+    assert "exclude each other" in result.output

@@ -1,0 +1,95 @@
+"""Places: windows that earlier sessions lead one to expect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+import torch
+
+from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.errors import InvalidValueError
+from isiw.models.particles import ParticleModel
+from isiw.models.particles.places import Place
+from isiw.models.particles.prior import Prior
+from isiw.models.shared.scales import Scale
+
+MANY = 20_000
+HERE = Place(0.5, Scale(150.0, 5.0), Scale(60.0, 0.1))
+THERE = Place(0.2, Scale(320.0, 5.0), Scale(140.0, 0.1))
+
+
+def prior_with(*places: Place) -> Prior:
+    usual = Prior()
+    return replace(usual, profile=replace(usual.profile, places=places))
+
+
+def drawn(prior: Prior) -> torch.Tensor:
+    return prior.sample(1, MANY, torch.Generator().manual_seed(1), VALVE_SPACE).values
+
+
+def test_windows_are_in_their_places_as_often_as_stated_and_have_the_width_of_the_place() -> None:
+    values = drawn(prior_with(HERE, THERE))[0]
+    for place in (HERE, THERE):
+        inside = ((values[:, 0] - place.start_ms.median).abs() < 20) & (
+            (values[:, 1].exp() / place.width_ms.median).log().abs() < 0.4
+        )
+        assert place.share < inside.float().mean() < place.share + 0.04
+
+
+def test_start_and_width_have_a_density_that_is_the_law_of_the_draws() -> None:
+    # The mean over draws of any density over that of the law is 1.
+    prior = prior_with(HERE, THERE)
+    values = drawn(prior)
+    start, width = values[..., 0], values[..., 1]
+    other = torch.distributions.Normal(150.0, 4.0).log_prob(start) + torch.distributions.Normal(4.1, 0.08).log_prob(
+        width
+    )
+    ratio = (other - prior.log_densities(values, VALVE_SPACE)["place"]).exp()
+    assert ratio.mean().item() == pytest.approx(1.0, abs=0.03)
+
+
+def test_each_place_has_its_part_of_the_density() -> None:
+    prior = prior_with(HERE, THERE)
+    parts = prior.log_places(drawn(prior), VALVE_SPACE).softmax(-1)[0]
+    assert parts.mean(0).tolist() == pytest.approx([0.3, 0.5, 0.2], abs=0.02)
+
+
+def test_without_places_the_prior_is_what_it_was() -> None:
+    values = drawn(Prior())
+    start = Prior().profile.start.log_density(values[..., 0], VALVE_SPACE)
+    width = Prior().mixtures["width"].log_density(values[..., 1:2])
+    torch.testing.assert_close(Prior().log_densities(values, VALVE_SPACE)["place"], start + width)
+
+
+def test_something_is_left_to_anywhere_else() -> None:
+    with pytest.raises(InvalidValueError, match="less than 1"):
+        prior_with(HERE, replace(THERE, share=0.5))
+
+
+def test_places_count_from_one_event_and_that_of_the_space() -> None:
+    with pytest.raises(InvalidValueError, match="one event"):
+        prior_with(HERE, replace(THERE, reference="impact"))
+    with pytest.raises(InvalidValueError, match="different events"):
+        ParticleModel(prior_with(HERE), particles=10).begin(IMPACT_SPACE, 0)
+
+
+@pytest.mark.parametrize("wrong", [{"share": 1.5}, {"width_ms": (0.0, 0.1)}, {"reference": "tms"}])
+def test_an_impossible_place_is_refused(wrong: Any) -> None:
+    with pytest.raises(InvalidValueError, match=next(iter(wrong))):
+        replace(HERE, **wrong)
+
+
+def test_a_known_muscle_keeps_what_was_learnt_of_it() -> None:
+    learnt = replace(Prior().muscles[0], name="as in the lab", share=0.5)
+    prior = replace(Prior(), muscles=(*Prior().muscles, learnt, learnt), muscle="forearm")
+    assert [muscle.name for muscle in prior.possible_muscles] == [
+        "forearm",
+        "other muscle",
+        "as in the lab",
+        "as in the lab",
+    ]
+    assert len(set(prior.hypotheses)) == len(prior.hypotheses) == 6
+    latents = prior.sample(1, 500, torch.Generator().manual_seed(1), VALVE_SPACE)
+    assert int(prior.hypothesis(latents).max()) < 6

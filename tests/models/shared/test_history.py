@@ -1,0 +1,64 @@
+"""The trials told so far."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from isiw.errors import StrategyError
+from isiw.models.protocol import Observation
+from isiw.models.shared.history import AmplitudeHistory, History, observed
+
+LIMIT_MV, THRESHOLD_MV = 0.005, 0.05
+
+
+def interval(mep_mv: float | None, *, response: bool | None = None) -> tuple[float, float]:
+    """The interval of log mV that is known of one trial."""
+    trial = observed(Observation.of([100.0], [mep_mv], None, [response]), LIMIT_MV, THRESHOLD_MV, order=3)
+    assert trial.order.item() == 3
+    return trial.log_mep.item(), trial.log_mep_high.item()
+
+
+def test_an_amplitude_is_a_point() -> None:
+    assert interval(0.08) == pytest.approx((math.log(0.08), math.log(0.08)))
+
+
+def test_an_amplitude_of_zero_is_anything_below_the_detection_limit() -> None:
+    assert interval(0.0) == pytest.approx((-math.inf, math.log(LIMIT_MV)))
+
+
+def test_a_response_is_above_the_threshold_and_its_absence_below() -> None:
+    assert interval(None, response=True) == pytest.approx((math.log(THRESHOLD_MV), math.inf))
+    assert interval(None, response=False) == pytest.approx((-math.inf, math.log(THRESHOLD_MV)))
+
+
+def test_a_history_grows_by_one_trial_of_each_person_and_stays_what_it_was() -> None:
+    empty = History.empty(2, torch.device("cpu"))
+    trial = observed(Observation.of([100.0, None], [0.1, 0.2]), LIMIT_MV, THRESHOLD_MV, order=0)
+    longer = empty.appended(trial).appended(trial)
+    assert (empty.isi_ms.shape, longer.isi_ms.shape) == ((2, 0), (2, 2))
+    assert longer.isi_ms[0].tolist() == [100.0, 100.0]
+    assert longer.isi_ms[1].isnan().all()
+
+
+def test_another_precision_holds_for_all_of_a_history() -> None:
+    assert {column.dtype for column in History.empty(1, torch.device("cpu")).to("cpu", torch.double).columns} == {
+        torch.double
+    }
+
+
+def test_trials_of_tms_alone_are_kept_apart() -> None:
+    told = AmplitudeHistory.nothing(2)
+    told = told.appended(Observation.of([100.0, None], [0.1, 0.02])).appended(Observation.of([None, 50.0], [0.01, 0.3]))
+    assert (told.trials, told.people) == (2, 2)
+    second = told.person(1)
+    assert (second.isi_ms.tolist(), second.mep_mv.tolist()) == ([50.0], pytest.approx([0.3]))
+    np.testing.assert_allclose(second.baseline_mv, [0.02])
+
+
+def test_a_response_without_amplitude_is_refused_with_the_way_out() -> None:
+    with pytest.raises(StrategyError, match=r"amplitudes only.*Tell mep_mv"):
+        AmplitudeHistory.nothing(1).appended(Observation.of([100.0], [None], None, [True]))

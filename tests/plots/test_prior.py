@@ -1,0 +1,33 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.plots.prior import prior_figure, save_prior_plot
+
+
+@pytest.fixture
+def table() -> pd.DataFrame:
+    rows = {"value": [1.0, 2.0, 3.0], "built_in": [0.2, 0.5, 0.2], "lab": [0.0, 0.9, 0.0]}
+    start = pd.DataFrame({"quantity": "start [ms]", "logarithmic": False, **rows})
+    width = pd.DataFrame({"quantity": "width [ms]", "logarithmic": True, **rows})
+    return pd.concat([start, width], ignore_index=True)
+
+
+def test_each_quantity_has_a_panel_with_both_priors_as_they_were_given(table: Any) -> None:
+    shown = [axes for axes in prior_figure(table).axes if axes.get_visible()]
+    assert [axes.get_title(loc="left") for axes in shown] == ["start [ms]", "width [ms]"]
+    assert [axes.get_xscale() for axes in shown] == ["linear", "log"]
+    assert np.asarray(shown[0].lines[0].get_ydata()).tolist() == [0.0, 0.9, 0.0]
+    assert shown[0].get_legend_handles_labels()[1] == ["built-in", "this lab"]
+
+
+def test_the_picture_is_written_in_a_format_that_is_known(table: Any, tmp_path: Path) -> None:
+    assert save_prior_plot(table, tmp_path / "new" / "p.png").stat().st_size > 3000
+    with pytest.raises(InvalidValueError, match="format"):
+        save_prior_plot(table, tmp_path / "p.docx")

@@ -1,0 +1,53 @@
+"""Logs of simulated people, written without a strategy: ISIs in a fixed order over the range."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import DeviceInfo
+from isiw.log.schema import Header, StrategyRecipe
+from isiw.log.writer import LogWriter
+from isiw.signals.judgement import SignalLimits
+from isiw.subjects.cohorts import cohort
+from isiw.subjects.subject import SimulatedSubject
+from isiw.trials import Status, Trial
+
+
+def gaussian_person(number: int = 0) -> SimulatedSubject:
+    """A person whose MEPs tell much."""
+    return cohort("gaussian", number + 1, 1)[number]
+
+
+def write_log(
+    path: Path,
+    person: SimulatedSubject | None = None,
+    *,
+    subject: str = "P1",
+    trials: int = 25,
+    space: DesignSpace = VALVE_SPACE,
+    seed: int = 1,
+) -> Path:
+    """The log of a session with ISIs all over the range."""
+    header = Header(
+        isiw_version="0.1.0",
+        created="2026-11-21T10:00:00+00:00",
+        subject=subject,
+        seed=seed,
+        strategy=StrategyRecipe(name="", seed=seed),
+        space=space,
+        limits=Limits.of_space(space),
+        device=DeviceInfo("bench", space.reference),
+        signals=SignalLimits(),
+    )
+    responder = (person or gaussian_person()).begin(seed)
+    order = np.random.default_rng(seed).permutation(trials)
+    with LogWriter.create(path, header) as log:
+        for trial, place in enumerate(order.tolist()):
+            isi_ms = space.snap(space.low_ms + (place + 0.5) * (space.high_ms - space.low_ms) / trials)
+            mep_mv = responder.respond(isi_ms, space.reference).mep_mv
+            log.append(Trial(trial, Status.ACCEPTED, isi_ms, isi_ms=isi_ms, mep_mv=mep_mv))
+    return path

@@ -1,0 +1,108 @@
+"""The same person another day: where the window is looked for first, and whether it moved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from isiw import priors
+from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.errors import InvalidValueError
+from isiw.log.reader import read_session
+from isiw.models.particles.prior import Prior
+from isiw.subjects.profiles import PeakProfile
+from isiw.subjects.responses import GainResponse
+from isiw.subjects.subject import SimulatedSubject
+from known import instance, known
+from priors.logged import gaussian_person, write_log
+
+EARLY_MS, LATE_MS = 20.0, 200.0
+
+
+def person(start_ms: float = EARLY_MS, gain: float = 3.0) -> SimulatedSubject:
+    """A person whose MEPs tell much, with the window elsewhere."""
+    usual = gaussian_person()
+    response = instance(GainResponse, usual.response)
+    profile = replace(instance(PeakProfile, usual.profile), start_ms=start_ms, width_ms=110.0)
+    return replace(usual, profile=profile, response=replace(response, gain_mv=gain * response.gain_mv))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: Any) -> Any:
+    return tmp_path_factory.mktemp("days")
+
+
+@pytest.fixture(scope="module")
+def first(folder: Path) -> Any:
+    return read_session(write_log(folder / "first.mcap", person(), trials=18))
+
+
+@pytest.fixture(scope="module")
+def next_day(first: Any) -> Any:
+    return priors.after(first)
+
+
+def starts_ms(prior: Prior) -> torch.Tensor:
+    return prior.sample(1, 20_000, torch.Generator().manual_seed(1), VALVE_SPACE).values[0, :, 0]
+
+
+def test_seven_in_ten_windows_are_expected_about_the_first_days(next_day: Any) -> None:
+    truth = known(person().window(VALVE_SPACE))
+    near = (starts_ms(next_day) - truth.start_ms).abs() < 40.0
+    usually = (starts_ms(Prior()) - truth.start_ms).abs() < 40.0
+    assert near.float().mean() > 0.6 + 0.25 * usually.float().mean()
+    assert next_day.profile.p_place == pytest.approx(0.7)
+
+
+def test_the_window_is_less_certain_than_it_was_by_the_shift(next_day: Any, first: Any) -> None:
+    places = next_day.profile.places
+    assert min(place.start_ms.sd for place in places) >= 12.0
+    far = priors.after(first, law=priors.DayToDay(shift_sd_ms=40.0)).profile.places
+    assert min(place.start_ms.sd for place in far) >= 40.0
+
+
+def test_the_rest_of_the_person_is_nearly_kept(next_day: Any, first: Any) -> None:
+    assert sum(floor.share for floor in next_day.floors[2:]) == pytest.approx(0.9)
+    assert next_day.floors[-1].median_mv.median == pytest.approx(person().response.floor.median_mv, rel=0.2)
+    forgotten = priors.after(first, law=priors.DayToDay(p_stays=0.0, p_other=1.0))
+    assert forgotten.profile.p_window == pytest.approx(Prior().profile.p_window)
+    assert forgotten.noise == Prior().noise
+
+
+def test_a_third_day_knows_both(first: Any, next_day: Any, folder: Path) -> None:
+    second = read_session(write_log(folder / "second.mcap", person(), trials=18, seed=2))
+    third = priors.after(first, second)
+    known = len(next_day.profile.places)
+    assert [place.start_ms for place in third.profile.places[:known]] == [p.start_ms for p in next_day.profile.places]
+    assert sum(place.share for place in third.profile.places[:known]) == pytest.approx(0.3 * 0.7)
+    assert third.profile.p_place == pytest.approx(0.7 + 0.3 * 0.7)
+    assert third == priors.after(second, prior=next_day)
+
+
+def test_a_window_that_stayed_probably_did_not_move_and_one_elsewhere_did(first: Any, folder: Path) -> None:
+    stayed = read_session(write_log(folder / "stayed.mcap", person(EARLY_MS + 8.0), trials=18, seed=3))
+    gone = read_session(write_log(folder / "gone.mcap", person(LATE_MS), trials=18, seed=3))
+    assert priors.moved(first, stayed) < 0.25
+    assert priors.moved(first, gone) > 0.9
+
+
+def test_of_a_session_without_a_window_it_cannot_be_said_whether_it_moved(first: Any, folder: Path) -> None:
+    none = read_session(write_log(folder / "none.mcap", person(gain=0.0), trials=18))
+    with pytest.raises(InvalidValueError, match="probably has none"):
+        priors.moved(none, first)
+
+
+def test_days_on_different_clocks_are_refused(first: Any, folder: Path) -> None:
+    other = read_session(write_log(folder / "impact.mcap", person(), trials=5, space=IMPACT_SPACE))
+    with pytest.raises(InvalidValueError, match="different events"):
+        priors.after(first, other)
+
+
+@pytest.mark.parametrize("wrong", [{"p_stays": 1.2}, {"shift_sd_ms": 0.0}, {"p_other": float("nan")}])
+def test_an_impossible_law_of_days_is_refused(wrong: Any) -> None:
+    with pytest.raises(InvalidValueError, match=next(iter(wrong))):
+        priors.DayToDay(**wrong)

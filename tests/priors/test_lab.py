@@ -1,0 +1,175 @@
+"""A lab's prior: who is learnt from, what is kept of people in general, and its file."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from isiw import priors
+from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.errors import ConfigError, InvalidValueError, LogError, StrategyError
+from isiw.models.particles import ParticleModel
+from isiw.models.particles.prior import Prior
+from isiw.strategy.catalogue import make_strategy
+from known import instance
+from priors.logged import gaussian_person, write_log
+
+TRIALS = 14
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: Any) -> Any:
+    folder = tmp_path_factory.mktemp("logs")
+    return [
+        write_log(folder / f"{number}.mcap", gaussian_person(number), subject=f"P{number}", trials=TRIALS)
+        for number in range(3)
+    ]
+
+
+@pytest.fixture(scope="module")
+def lab(logs: Any) -> Any:
+    return priors.learn(logs)
+
+
+@pytest.fixture
+def path(lab: Any, tmp_path: Path) -> Any:
+    return priors.write_lab_prior(lab, tmp_path / "lab.toml")
+
+
+def test_a_lab_prior_names_its_sessions_by_their_content(lab: Any, logs: Any) -> None:
+    assert [session.sha256 for session in lab.sessions] == [hashlib.sha256(p.read_bytes()).hexdigest() for p in logs]
+    assert [(session.subject, session.trials) for session in lab.sessions] == [(f"P{k}", TRIALS) for k in range(3)]
+
+
+def test_every_session_is_reported_once_it_is_learnt(tmp_path: Path) -> None:
+    done = []
+    log = write_log(tmp_path / "short.mcap", trials=3)
+    priors.learn([log], on_done=lambda record: done.append(record.header.subject))
+    assert done == ["P1"]
+
+
+def test_the_same_log_twice_is_refused_whatever_it_is_called(logs: Any, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.mcap"
+    copy.write_bytes(logs[0].read_bytes())
+    with pytest.raises(LogError, match="two logs are the same"):
+        priors.learn([logs[0], copy], again=True)
+
+
+def test_the_same_person_twice_is_refused_unless_told(tmp_path: Path) -> None:
+    twice = [write_log(tmp_path / f"{seed}.mcap", subject="P0", trials=3, seed=seed) for seed in (1, 2)]
+    with pytest.raises(LogError, match=r"same person.*--again"):
+        priors.learn(twice)
+    assert len(priors.learn(twice, again=True).sessions) == 2
+
+
+def test_people_without_a_name_may_be_the_same(tmp_path: Path) -> None:
+    unnamed = [write_log(tmp_path / f"{k}.mcap", subject="", trials=4, seed=k) for k in range(2)]
+    with pytest.raises(LogError, match="do not say of whom"):
+        priors.learn(unnamed)
+
+
+def test_sessions_on_different_clocks_are_refused(logs: Any, tmp_path: Path) -> None:
+    other = write_log(tmp_path / "impact.mcap", subject="Q", trials=4, space=IMPACT_SPACE)
+    with pytest.raises(LogError, match="different events"):
+        priors.learn([logs[0], other])
+
+
+def test_nothing_is_learnt_from_nobody(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="no session"):
+        priors.learn([])
+    with pytest.raises(LogError, match="no accepted trial"):
+        priors.learn([write_log(tmp_path / "empty.mcap", trials=0)])
+
+
+def test_people_in_general_keep_at_least_a_tenth_of_every_block(lab: Any) -> None:
+    joined = lab.joined()
+    assert joined.profile.p_place <= 0.9
+    for blocks, usual in ((joined.floors, Prior().floors), (joined.gains, Prior().gains)):
+        assert sum(block.share for block in blocks[: len(usual)]) >= 0.1 - 1e-9
+        assert sum(block.share for block in blocks) == pytest.approx(1.0)
+
+
+def test_of_three_people_the_built_in_prior_keeps_more_than_of_many(lab: Any) -> None:
+    assert lab.floor is not None
+    assert 0.5 < lab.floor.share <= 1.0 - 2 / 5
+
+
+def test_the_lab_prior_expects_its_peoples_floor(lab: Any) -> None:
+    floors_mv = [gaussian_person(number).response.floor.median_mv for number in range(3)]
+    assert min(floors_mv) * 0.8 < lab.floor.median_mv.median < max(floors_mv) * 1.25
+
+
+def test_the_file_says_what_was_learnt_and_nothing_else(lab: Any, path: Path) -> None:
+    assert priors.read_lab_prior(path) == lab
+    assert priors.load(path) == lab.joined()
+
+
+def test_a_session_with_a_lab_prior_can_be_made_again_from_its_log_alone(path: Path) -> None:
+    strategy = make_strategy(prior=priors.load(path), particles=100, seed=3)
+    path.unlink()
+    again = make_strategy(seed=3, **strategy.recipe.settings)
+    assert again.model == strategy.model
+    assert again.ask() == strategy.ask()
+
+
+def test_what_the_rig_states_joins_a_lab_prior_in_any_order(path: Path) -> None:
+    prior = priors.load(path)
+    orders: list[dict[str, Any]] = [{"prior": prior, "hit_delay_ms": (90.0, 3.0)}]
+    orders.append(dict(reversed(orders[0].items())))
+    for settings in orders:
+        made = instance(ParticleModel, make_strategy(particles=100, **settings).model).prior
+        assert made.profile.start.hit_delay_ms == (90.0, 3.0)
+        assert made.profile.places == prior.profile.places
+
+
+def test_a_lab_prior_from_the_valve_is_refused_in_a_space_from_the_impact(path: Path) -> None:
+    with pytest.raises(InvalidValueError, match="different events"):
+        make_strategy(space=IMPACT_SPACE, prior=priors.load(path), particles=100)
+
+
+def test_a_strategy_with_another_model_does_not_take_a_lab_prior(path: Path) -> None:
+    with pytest.raises(StrategyError, match="another kind of model"):
+        make_strategy("parametric-mi", prior=priors.load(path))
+
+
+@pytest.mark.parametrize(
+    ("line", "wrong", "message"),
+    [
+        ("schema_version = 1", "schema_version = 99", "newer isiw"),
+        ("schema_version = 1", "schema_version = 1\nrun = 'rm'", "run is unknown"),
+        ("p_window = ", "p_window = 1e3 #", "p_window"),
+    ],
+)
+def test_a_file_that_is_no_lab_prior_is_refused(path: Path, line: Any, wrong: Any, message: Any) -> None:
+    path.write_text(path.read_text().replace(line, wrong, 1))
+    with pytest.raises(ConfigError, match=message):
+        priors.load(path)
+
+
+def test_the_table_sets_the_lab_beside_people_in_general(lab: Any) -> None:
+    table = priors.compared(lab)
+    row = table.loc["EMG floor [mV]"]
+    assert row["lab median"] == pytest.approx(lab.floor.median_mv.median, rel=0.1)
+    assert row["built-in median"] == pytest.approx(0.009, rel=0.05)
+    slope = table.loc["slope [1 / % RMT]"]
+    assert slope["built-in 95 %"] > slope["built-in 5 %"]
+
+
+def test_densities_of_either_prior_are_densities(lab: Any) -> None:
+    table = priors.densities(replace(lab, place=None))
+    curve = table[table["quantity"] == "start [ms]"]
+    for whose in ("built_in", "lab"):
+        area = (curve[whose] * curve["value"].diff().median()).sum()
+        assert area == pytest.approx(0.997, abs=0.02)
+
+
+def test_the_next_person_may_still_be_anyone(lab: Any) -> None:
+    usual, joined = Prior(), lab.joined()
+    latents = usual.sample(1, 500, torch.Generator().manual_seed(1), VALVE_SPACE)
+    ratio = joined.log_density(latents.values, VALVE_SPACE) - usual.log_density(latents.values, VALVE_SPACE)
+    assert ratio.min() > 4 * torch.log(torch.tensor(0.1))  # four blocks have laws

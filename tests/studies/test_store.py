@@ -1,0 +1,77 @@
+"""The folder of a study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from isiw.errors import StudyError
+from isiw.studies.execution import Failure
+from isiw.studies.plan import Unit
+from isiw.studies.store import Store, begin_store, open_store
+from studies.tiny import tiny
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    return begin_store(tiny(), tmp_path / "s")
+
+
+def rows_of(unit: Unit) -> pd.DataFrame:
+    """Rows as a unit may have come to."""
+    (session,) = unit.sessions
+    keys = {"strategy": session.label, "cohort": session.cohort, "person": session.person, "unit": unit.key}
+    return pd.DataFrame([keys | {"trial": trial, "f1": trial / 10} for trial in (4, 2)])
+
+
+def test_a_unit_is_left_until_it_is_kept(store: Store) -> None:
+    units = store.left()
+    assert units == store.study.units()
+    store.keep(units[1], rows_of(units[1]))
+    assert store.left() == [units[0], *units[2:]]
+    assert open_store(store.folder).left() == store.left()
+
+
+def test_rows_come_sorted_whatever_the_order_in_which_units_were_finished(store: Store) -> None:
+    for unit in reversed(store.left()):
+        store.keep(unit, rows_of(unit))
+    rows = store.rows()
+    keys = list(rows[["strategy", "cohort", "person", "trial"]].itertuples(index=False, name=None))
+    assert keys == sorted(keys)
+    assert len(rows) == 2 * len(store.study.units())
+
+
+def test_a_failed_unit_is_run_again_only_where_that_is_wanted_and_its_error_goes_with_success(store: Store) -> None:
+    unit = store.left()[0]
+    store.keep(unit, Failure("ValueError: no air", "a traceback"))
+    assert store.errors()[["unit", "error", "details"]].to_numpy().tolist() == [
+        [unit.key, "ValueError: no air", "a traceback"]
+    ]
+    assert unit not in store.left()
+    assert unit in store.left(retry=True)
+    store.keep(unit, rows_of(unit))
+    assert len(store.errors()) == 0
+    assert unit not in store.left(retry=True)
+
+
+def test_without_finished_units_there_are_no_rows(store: Store) -> None:
+    assert store.rows().empty
+    assert store.errors().empty
+
+
+def test_an_unknown_unit_is_refused(store: Store) -> None:
+    known = store.study.units()[2]
+    assert store.unit(known.key) == known
+    with pytest.raises(StudyError, match="no such unit"):
+        store.unit("nobody")
+
+
+def test_a_write_that_was_cut_off_is_no_part(store: Store) -> None:
+    unit = store.left()[0]
+    (store.folder / "parts" / f"{unit.key}.parquet.part").write_bytes(b"half of it")
+    assert store.rows().empty
+    assert unit in store.left()
+    store.keep(unit, rows_of(unit))
+    assert not list(store.folder.rglob("*.part"))
