@@ -125,6 +125,12 @@ def test_show_of_an_unreadable_log_exits_3(isiw, tmp_path) -> None:
     assert isiw("show", "s.mcap").exit_code == 3
 
 
+def test_plot_draws_beside_the_log_where_no_file_is_given(isiw, log) -> None:
+    log.with_suffix(".png").unlink()
+    assert isiw("plot", log).exit_code == 0
+    assert log.with_suffix(".png").exists()
+
+
 def test_plot_draws_into_the_file(isiw, log, tmp_path) -> None:
     result = isiw("plot", log, "-o", "picture.pdf")
     assert result.exit_code == 0

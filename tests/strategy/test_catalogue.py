@@ -205,3 +205,9 @@ def test_a_setting_of_the_dissertations_that_cannot_be_is_refused(
 ) -> None:
     with pytest.raises(InvalidValueError, match=what):
         make_strategy(name, **settings)
+
+
+@pytest.mark.parametrize("wrong", [{"space": (0, 320)}, {"seed": None}])
+def test_a_space_or_a_seed_of_another_kind_is_named(wrong) -> None:
+    with pytest.raises(InvalidValueError, match=r"the space is no design space|the seed must be"):
+        make_strategy(**wrong)

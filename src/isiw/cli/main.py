@@ -126,13 +126,17 @@ def show_log(log: Log) -> None:
 @app.command()
 def plot(
     log: Log,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Where to: .png, .pdf, .svg …")],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Where to: .png, .pdf, .svg …; by default beside the log.", **NO_DEFAULT),
+    ] = None,
 ) -> None:
     """Draw a session: profile, trials, window, and how they came."""
     with errors_reported(_INTERRUPTED):
         record = isiw.read_session(log)
         truth = isiw.config.true_window(record)
-        show(f"picture: {isiw.plots.save_session_plot(record, output, truth=truth)}")
+        target = output or Path(str(log).removesuffix(".part")).with_suffix(".png")
+        show(f"picture: {isiw.plots.save_session_plot(record, target, truth=truth)}")
         _exit_if_damaged(record.losses)
 
 
