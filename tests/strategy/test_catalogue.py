@@ -218,3 +218,9 @@ def test_a_regression_gives_up_after_99_iterations(name: str) -> None:
 def test_an_invalid_setting_of_the_dissertations_is_refused(name: str, settings: dict[str, Any], what: str) -> None:
     with pytest.raises(InvalidValueError, match=what):
         make_strategy(name, **settings)
+
+
+@pytest.mark.parametrize("wrong", [{"space": (0, 320)}, {"seed": None}])
+def test_a_space_or_a_seed_of_another_kind_is_named(wrong) -> None:
+    with pytest.raises(InvalidValueError, match=r"the space is no design space|the seed must be"):
+        make_strategy(**wrong)

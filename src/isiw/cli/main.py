@@ -158,14 +158,19 @@ def show_log(log: Log) -> None:
 @app.command()
 def plot(
     log: Log,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The picture's file: .png, .pdf, .svg …")],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="The picture's file: .png, .pdf, .svg …; by default beside the log.",
+                     **NO_DEFAULT),
+    ] = None,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Draw a session: profile, trials, window, and how the edges developed."""
     with errors_reported(_INTERRUPTED):
         record = isiw.read_session(log)
         truth = isiw.config.true_window(record)
-        show(f"picture: {isiw.plots.save_session_plot(record, output, truth=truth, overwrite=overwrite)}")
+        target = output or _picture_beside(Path(f"{record.path}".removesuffix(".part")))
+        show(f"picture: {isiw.plots.save_session_plot(record, target, truth=truth, overwrite=overwrite)}")
         _exit_if_damaged(record.losses)
 
 

@@ -230,7 +230,7 @@ def config_of_log(record: SessionRecord) -> RunConfig:
     """
     if RUN_KEY not in record.header.config:
         raise ConfigError(
-            "the log does not say how its device is made, as isiw run's with simulated people do",
+            "the session was not run by isiw run with a simulated person, so its device is not known here",
             got=record.header.device.name,
             remedy=f"With a configuration that has a device: isiw resume {record.path} CONFIG. From other software: "
             "isiw.resume(path, device).run()",

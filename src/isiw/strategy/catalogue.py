@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from isiw.checks import whole
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.errors import StrategyError
+from isiw.errors import InvalidValueError, StrategyError
 from isiw.strategy.settings.common import Settings, settings_from, settings_keys, settings_values
 from isiw.strategy.settings.described import DescribedSetting, described
 from isiw.strategy.strategy import Recipe, Strategy
@@ -154,9 +154,13 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
     Raises:
         StrategyError: an unknown name or setting, or an acquisition function that cannot work with the model.
         ConfigError: a nested key or value that cannot be used.
-        InvalidValueError: an invalid seed or setting.
+        InvalidValueError: an invalid seed, space or setting.
     """
     seed = whole("the seed", seed, least=0)
+    if not isinstance(space, DesignSpace):
+        raise InvalidValueError(
+            "the space is no design space", got=space, expected="isiw.DesignSpace(low_ms, high_ms, reference=...)"
+        )
     chosen = settings_for(name, **settings)
     initial_ms = chosen.asking.initial_ms(space)
     return Strategy(
