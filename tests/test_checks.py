@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from isiw.checks import (
+    amplitude,
     ascending,
     check_choice,
     check_numbers,
@@ -44,7 +45,7 @@ def test_a_number_of_any_kind_becomes_a_plain_float(value: float) -> None:
         assert got == value
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, True, "5", None, 1j, [1.0], np.array([1.0])])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, True, "5", None, 1j, [1.0], np.array([1.0]), 10**400])
 def test_what_is_not_a_finite_number_is_refused_by_name(value: object) -> None:
     with pytest.raises(InvalidValueError, match="isi_ms must be a finite number"):
         number("isi_ms", value)
@@ -141,3 +142,22 @@ def test_fields_become_plain_values() -> None:
 def test_a_wrong_field_is_named_with_its_class(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=rf"Checked\.{next(iter(wrong))}"):
         Checked(**wrong)
+
+
+@pytest.mark.parametrize("value", [1e4, 2e3, 1000.1, 4e38, 1e308, 10**400, -1.0, math.nan, "0.5", True])
+def test_an_amplitude_that_no_amplifier_gives_is_refused(value: Any) -> None:
+    with pytest.raises(InvalidValueError, match="mep_mv"):
+        amplitude("mep_mv", value)
+
+
+@pytest.mark.parametrize("value", [0, 0.05, 20, np.float32(5), 1000])
+def test_an_amplitude_that_an_amplifier_may_give_is_a_plain_number(value: Any) -> None:
+    assert type(amplitude("mep_mv", value)) is float
+    assert amplitude("mep_mv", value) == value
+
+
+def test_arrays_are_no_choices_and_no_deadlines() -> None:
+    with pytest.raises(InvalidValueError, match="the cohort is unknown"):
+        choice("the cohort", np.array(["a", "b"]), ["a", "b"])
+    with pytest.raises(InvalidValueError, match="deadline_s"):
+        deadline("deadline_s", np.array([1.0, math.inf]))

@@ -128,3 +128,13 @@ def test_the_grid_cannot_be_written_to() -> None:
 def test_the_two_ready_spaces_are_those_of_the_dissertation() -> None:
     assert (VALVE_SPACE.low_ms, VALVE_SPACE.high_ms, VALVE_SPACE.reference) == (0, 500, "valve")
     assert (IMPACT_SPACE.low_ms, IMPACT_SPACE.high_ms, IMPACT_SPACE.reference) == (0, 320, "impact")
+
+
+@pytest.mark.parametrize("space", [(0, 1e6, 1.0), (0, 500, 1e-3), (0, 1e15, 1e-9), (-1.7e308, 1.7e308, 1.0)])
+def test_a_space_with_more_isis_than_anybody_needs_is_refused(space: tuple[float, float, float]) -> None:
+    with pytest.raises(InvalidValueError, match=r"too many ISIs.*larger step_ms"):
+        DesignSpace(*space)
+
+
+def test_a_second_in_steps_of_a_tenth_of_a_millisecond_is_a_space() -> None:
+    assert len(DesignSpace(0, 1000, 0.1).grid_ms) == 10_001

@@ -136,3 +136,10 @@ def test_the_frame_has_a_row_a_trial_and_its_values() -> None:
 
 def test_the_frame_of_no_trials_has_the_same_columns() -> None:
     assert TrialTable().to_frame().columns.tolist() == TrialTable((accepted(0),)).to_frame().columns.tolist()
+
+
+def test_an_amplitude_in_microvolts_is_no_measurement_and_no_trial() -> None:
+    with pytest.raises(InvalidValueError, match=r"more than any amplifier gives.*divide it by 1000"):
+        Measurement(2000.0, 50.0)
+    with pytest.raises(InvalidValueError, match=r"more than any amplifier gives"):
+        Trial(0, Status.ACCEPTED, 50.0, isi_ms=50.0, mep_mv=2000.0)

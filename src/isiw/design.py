@@ -12,7 +12,7 @@ from isiw.checks import check_choice, check_numbers, number
 from isiw.errors import InvalidValueError, OutOfSpaceError
 from isiw.types import FloatArray, Reference
 
-__all__ = ["IMPACT_SPACE", "VALVE_SPACE", "DesignSpace"]
+__all__ = ["IMPACT_SPACE", "VALVE_SPACE", "DesignSpace", "require_space"]
 
 
 MOST_ISIS = 10_001
@@ -116,6 +116,16 @@ class DesignSpace:
                 remedy=f"ISIs count from the {self.reference}; check the reference, or log the trial as a mistrial.",
             )
         return realised_ms
+
+
+def require_space(space: object) -> None:
+    """Raise where something else is given for a design space.
+
+    Raises:
+        InvalidValueError: it is none.
+    """
+    if not isinstance(space, DesignSpace):
+        raise InvalidValueError("a strategy needs a design space", got=space, expected="an isiw.DesignSpace")
 
 
 VALVE_SPACE = DesignSpace(0, 500, reference="valve")

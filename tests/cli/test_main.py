@@ -5,9 +5,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import pytest
 from typer.testing import CliRunner, Result
@@ -16,6 +17,9 @@ from isiw import __version__
 from isiw.cli import app
 from isiw.config.run import true_window
 from isiw.log.reader import read_session
+from isiw.log.salvage import salvage
+from isiw.log.schema import Event
+from isiw.log.writer import LogWriter
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import list_strategies
 from known import known
@@ -288,3 +292,71 @@ def test_what_the_operating_system_refuses_is_a_message(isiw: Command, log: Path
     assert result.exit_code == 1
     assert "error: " in result.output
     assert "picture.png" in result.output
+
+
+def test_a_picture_replaces_no_log_and_nothing_else_unasked(isiw: Any, log: Path, tmp_path: Path) -> None:
+    for name in ("log.pdf", "picture.png"):
+        (tmp_path / name).write_bytes(log.read_bytes() if name == "log.pdf" else b"precious")
+        before = (tmp_path / name).read_bytes()
+        result = isiw("plot", log, "-o", name)
+        assert (result.exit_code, (tmp_path / name).read_bytes()) == (1, before)
+        assert "--overwrite" in result.output
+    assert isiw("plot", "log.pdf", "-o", "log.pdf", "--overwrite").exit_code == 1
+    assert (tmp_path / "log.pdf").read_bytes() == log.read_bytes()
+    assert isiw("plot", log, "-o", "picture.png", "--overwrite").exit_code == 0
+    assert (tmp_path / "picture.png").stat().st_size > 5000
+
+
+def test_the_picture_that_run_draws_takes_a_free_name(isiw: Any, short: Any, tmp_path: Path) -> None:
+    (tmp_path / "new.png").write_bytes(b"precious")
+    result = isiw("run", short, "--log", "new.mcap")
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "new.png").read_bytes() == b"precious"
+    assert "new_2.png" in result.output
+    assert (tmp_path / "new_2.png").stat().st_size > 5000
+
+
+def test_show_obeys_nothing_that_a_log_says_to_the_terminal(isiw: Any, log: Path) -> None:
+    record = read_session(log)
+    text = "\x1b]8;;https://elsewhere.example\x1b\\sneezed\x1b]8;;\x1b\\ \x1b[2J\u202egnp.exe\r:warning:"
+    with LogWriter.continuing(log, salvage(log), record.header) as writer:
+        writer.append(Event(kind="fault", trial=1, text=text))
+    result = isiw("show", log)
+    assert "fault (trial 1): sneezed gnp.exe:warning:" in result.output
+    assert not set(result.output) & set("\x1b\r\u202e")
+
+
+def test_show_of_a_log_without_its_end_asks_for_the_stimulators_count_and_exits_3(isiw: Any, log: Path) -> None:
+    whole = log.read_bytes()
+    blocks = [at - 37 for at in range(len(whole)) if whole.startswith(b"\x04\x00\x00\x00zstd", at)]
+    log.write_bytes(whole[: blocks[4]])
+    result = isiw("show", log)
+    assert result.exit_code == 3
+    assert "was cut off" in result.output
+    assert "isiw resume --lost-pulses N" in result.output
+    assert isiw("resume", log).exit_code == 3
+    result = isiw("resume", log, "--lost-pulses", 1)
+    assert result.exit_code == 0, result.output
+    assert "outcome unknown" in isiw("show", log).output
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[strategy.settings]\nparticles = 1_000_000_000\n",
+        "[strategy.settings]\ninitial_trials = 1_000_000_000\n",
+        "[strategy.settings]\nmax_trials = 1e9\n",
+        "[space]\nhigh_ms = 1e9\n",
+        "[space]\nstep_ms = 1e-6\n",
+        "[space]\nlow_ms = -1.7e308\nhigh_ms = 1.7e308\n",
+        "[subject]\nnumber = 1_000_000_000\n",
+        "seed = " + "[" * 100_000 + "\n",
+    ],
+)
+def test_a_configuration_that_asks_for_too_much_is_an_error_at_once(isiw: Any, tmp_path: Path, text: str) -> None:
+    (tmp_path / "hostile.toml").write_text(text)
+    begin = time.process_time()
+    result = isiw("run", "hostile.toml")
+    assert time.process_time() - begin < 2
+    assert result.exit_code == 1
+    assert result.output.startswith("error: ")

@@ -259,15 +259,15 @@ def test_the_suite_finds_sweeps_that_no_session_could_use(space: DesignSpace, ri
 
 
 @pytest.mark.parametrize("wrong", WRONG)
-def test_the_suite_names_what_is_wrong_with_a_rig_and_says_what_it_found(wrong) -> None:
-    said = []
+def test_the_suite_names_what_is_wrong_with_a_rig_and_says_what_it_found(wrong: str) -> None:
+    said: list[str] = []
     with pytest.raises(AssertionError, match=NAMED[wrong]):
         check_device(lambda: rig(wrong), RIG_SPACE, say=said.append)
     assert said[-1].startswith("background EMG")
 
 
 def test_a_right_rig_passes_with_a_table_of_what_was_found() -> None:
-    rows = dict(check_device(rig, DesignSpace(20, 320), say=str).rows)
+    rows = dict(check_device(rig, DesignSpace(20, 320), say=lambda text: None).rows)
     assert rows["impact found"] == "3 of 3"
     assert rows["background EMG"].endswith("µV RMS (a session accepts 10 at most)")
     assert len(rows["realised minus wanted ISI"].split(",")) == 3
@@ -283,10 +283,10 @@ def test_a_right_rig_passes_with_a_table_of_what_was_found() -> None:
         (RememberingHardware(), "This check stimulates: 8 pairs and one magnetic pulse alone, 5 s apart."),
     ],
 )
-def test_the_suite_says_beforehand_that_it_stimulates(space, device, announced) -> None:
-    said = []
+def test_the_suite_says_beforehand_that_it_stimulates(space: DesignSpace, device: Hardware, announced: str) -> None:
+    said: list[tuple[int, str]] = []
 
-    def say(text) -> None:
+    def say(text: str) -> None:
         said.append((len(device.fired_s), text))
 
     check_device(lambda: device, space, clock=VirtualClock(), say=say)
@@ -294,7 +294,7 @@ def test_the_suite_says_beforehand_that_it_stimulates(space, device, announced) 
     assert said[0][1].startswith(announced)
 
 
-def test_a_simulated_device_is_announced_as_one(space) -> None:
-    said = []
+def test_a_simulated_device_is_announced_as_one(space: DesignSpace) -> None:
+    said: list[str] = []
     check_device(lambda: SimulatedDevice(SimulatedPerson(responder(), "valve")), space, say=said.append)
     assert said[0] == "simulated person is simulated: nothing is delivered to anybody."

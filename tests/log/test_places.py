@@ -155,7 +155,7 @@ def test_of_two_that_go_on_at_once_one_does_and_the_other_is_told_why(
         else:
             won.append(name)
 
-    for _ in range(30):
+    for _ in range(100):
         runners = [threading.Thread(target=resume, args=(name,)) for name in ("one", "other")]
         for runner in runners:
             runner.start()
@@ -163,7 +163,7 @@ def test_of_two_that_go_on_at_once_one_does_and_the_other_is_told_why(
             runner.join()
         assert [event.text for event in read_session(finished).events] == won
         assert len(won) == len(told) == 1
-        assert any(words in told[0] for words in ("running session", "has changed since", "no such log"))
+        assert any(words in told[0] for words in ("running session", "has changed since")), told
         assert [path.name for path in log.parent.iterdir()] == ["s.mcap"]
         won.clear()
         told.clear()

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
 
 from isiw.report.evidence import contradiction
@@ -7,7 +9,7 @@ from isiw.trials import Status, Trial
 from isiw.window import Window
 
 
-def trials(inside_mv, outside_mv):
+def trials(inside_mv: Sequence[float], outside_mv: Sequence[float]) -> list[Trial]:
     meps_mv = [(100.0 + k, mep_mv) for k, mep_mv in enumerate(inside_mv)]
     meps_mv += [(200.0 + k, mep_mv) for k, mep_mv in enumerate(outside_mv)]
     return [Trial(k, Status.ACCEPTED, isi, isi_ms=isi, mep_mv=mep) for k, (isi, mep) in enumerate(meps_mv)]
@@ -31,5 +33,7 @@ def test_a_window_whose_meps_are_no_larger_is_not_borne_out() -> None:
         (None, [0.02, 0.021, 0.019, 0.02], [0.02, 0.022, 0.021, 0.02]),
     ],
 )
-def test_larger_meps_too_few_of_them_and_no_window_contradict_nothing(window, inside_mv, outside_mv) -> None:
+def test_larger_meps_too_few_of_them_and_no_window_contradict_nothing(
+    window: Window | None, inside_mv: list[float], outside_mv: list[float]
+) -> None:
     assert contradiction(window, trials(inside_mv, outside_mv)) is None

@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import pytest
 
-from isiw.design import IMPACT_SPACE
+from isiw.design import IMPACT_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.signals.plausibility import DoubtKind, doubt_of, implausible_amplitude, require_plausible
 
 
 @pytest.mark.parametrize("mep_mv", [0.0, 0.0005, 0.008, 0.3, 12.0, 25.0])
-def test_what_muscles_give_is_plausible(mep_mv) -> None:
+def test_what_muscles_give_is_plausible(mep_mv: float) -> None:
     assert implausible_amplitude(mep_mv) is None
     assert require_plausible(100.0, mep_mv, 104.0, IMPACT_SPACE) is None
 
@@ -24,12 +24,12 @@ def test_what_muscles_give_is_plausible(mep_mv) -> None:
         (None, 1e-5, "Is it in V"),
     ],
 )
-def test_a_slip_is_refused_and_named(isi_ms, mep_mv, slip) -> None:
+def test_a_slip_is_refused_and_named(isi_ms: float | None, mep_mv: float, slip: str) -> None:
     with pytest.raises(InvalidValueError, match=slip):
         require_plausible(isi_ms, mep_mv, 100.0, IMPACT_SPACE)
 
 
-def test_an_isi_far_from_the_one_asked_is_a_doubt(space) -> None:
+def test_an_isi_far_from_the_one_asked_is_a_doubt(space: DesignSpace) -> None:
     doubt = require_plausible(180.0, 0.02, 100.0, space)
     assert doubt is not None
     assert doubt.kind is DoubtKind.ISI_OFF
@@ -45,7 +45,7 @@ def test_an_isi_far_from_the_one_asked_is_a_doubt(space) -> None:
         ([0.008, 0.01, 0.1, 8.0, 11.0, 9.0], DoubtKind.JUMP),
     ],
 )
-def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv, kind) -> None:
+def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv: list[float], kind: DoubtKind) -> None:
     doubt = doubt_of(meps_mv)
     assert doubt is not None
     assert doubt.kind is kind
@@ -63,5 +63,5 @@ def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv, kind) -> None:
         [0.08, 5.0, 2.0, 0.1],
     ],
 )
-def test_usual_amplitudes_are_not_doubted(meps_mv) -> None:
+def test_usual_amplitudes_are_not_doubted(meps_mv: list[float]) -> None:
     assert doubt_of(meps_mv) is None

@@ -220,7 +220,20 @@ def test_an_invalid_setting_of_the_dissertations_is_refused(name: str, settings:
         make_strategy(name, **settings)
 
 
-@pytest.mark.parametrize("wrong", [{"space": (0, 320)}, {"seed": None}])
-def test_a_space_or_a_seed_of_another_kind_is_named(wrong) -> None:
-    with pytest.raises(InvalidValueError, match=r"the space is no design space|the seed must be"):
-        make_strategy(**wrong)
+@pytest.mark.parametrize("name", [None, [], {}, 5])
+def test_a_name_of_another_type_is_unknown(name: str) -> None:
+    with pytest.raises(StrategyError, match="unknown strategy"):
+        make_strategy(name)
+
+
+@pytest.mark.parametrize("space", [None, "valve", (0, 500)])
+def test_what_is_no_design_space_is_refused(space: DesignSpace) -> None:
+    with pytest.raises(InvalidValueError, match=r"needs a design space.*isiw.DesignSpace"):
+        make_strategy("incremental", space)
+
+
+@pytest.mark.parametrize("setting", ["particles", "initial_trials", "max_trials"])
+def test_a_setting_that_would_fill_the_memory_is_refused_at_once(setting: str) -> None:
+    huge: dict[str, Any] = {setting: 10**9}
+    with pytest.raises(InvalidValueError, match=rf"the setting {setting} of random must be .*at most"):
+        make_strategy("random", **huge)

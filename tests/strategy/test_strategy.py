@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +21,6 @@ from isiw.strategy.strategy import Recipe, Strategy
 from known import known
 from scripted import scripted_strategy
 
-MakeStrategy = Callable[..., Strategy]
 MEPS_MV = [0.02, 0.0, 0.11, 0.05]
 
 
@@ -319,7 +317,7 @@ def test_a_batch_from_a_model_that_imagines_no_trials_is_refused() -> None:
         scripted_strategy().ask_batch(0)
 
 
-def test_a_slip_that_is_refused_changes_nothing(scripted_strategy: MakeStrategy) -> None:
+def test_a_slip_that_is_refused_changes_nothing() -> None:
     strategy = scripted_strategy()
     isi_ms = strategy.ask()
     for told in ((isi_ms / 1000, 0.02), (0.02, isi_ms), (isi_ms, 1e-6), (isi_ms, 1e12)):
@@ -329,7 +327,7 @@ def test_a_slip_that_is_refused_changes_nothing(scripted_strategy: MakeStrategy)
     assert strategy.delivered == 0
 
 
-def test_an_isi_far_from_the_one_asked_is_told_with_one_warning(scripted_strategy: MakeStrategy) -> None:
+def test_an_isi_far_from_the_one_asked_is_told_with_one_warning() -> None:
     strategy = scripted_strategy()
     said = []
     for _ in range(2):
@@ -342,7 +340,7 @@ def test_an_isi_far_from_the_one_asked_is_told_with_one_warning(scripted_strateg
     assert strategy.delivered == 2
 
 
-def test_what_was_judged_before_is_learnt_as_it_is(scripted_strategy: MakeStrategy) -> None:
+def test_what_was_judged_before_is_learnt_as_it_is() -> None:
     strategy = scripted_strategy()
     strategy.ask()
     strategy.learn(100.0, 50.0)

@@ -160,8 +160,9 @@ def plot(
     log: Log,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="The picture's file: .png, .pdf, .svg …; by default beside the log.",
-                     **NO_DEFAULT),
+        typer.Option(
+            "--output", "-o", help="The picture's file: .png, .pdf, .svg …; by default beside the log.", **NO_DEFAULT
+        ),
     ] = None,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:

@@ -91,6 +91,12 @@ def claimed(path: Path) -> Iterator[IO[bytes]]:
     """
     try:
         file = path.open("r+b")  # network disks lock only what is open for writing
+    except FileNotFoundError as error:
+        raise LogError(
+            "the log has changed since it was read: it is not there any more",
+            got=str(path),
+            remedy="Another process may have finished it. Begin again by reading it.",
+        ) from error
     except OSError as error:
         raise LogError(
             f"the log cannot be opened for writing: {error.strerror}", got=str(path), remedy="Check its permissions."

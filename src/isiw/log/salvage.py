@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import os
 import re
 import struct
 import zlib
@@ -121,6 +122,8 @@ def salvage(path: str | Path) -> Salvage:
         LogError: no such file, not a log, or one that may not be read.
         DamagedLogError: a log of which nothing can be read.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise LogError("a log is named by its path", got=path, expected="text or a path")
     with disk_errors(Path(path), "the log cannot be read", "Check its permissions and those of its folder."):
         current, closed = current_file(path), log_of(Path(path))
         if Path(path) == current or not closed.is_file():

@@ -221,7 +221,8 @@ def _require_free(target: Path) -> None:
 
 
 def _require_unchanged(source: IO[bytes], salvage: Salvage) -> None:
-    if not Fingerprint.of(source) == salvage.fingerprint == Fingerprint.of(salvage.path):
+    there = Fingerprint.of(salvage.path) if salvage.path.exists() else None
+    if not Fingerprint.of(source) == salvage.fingerprint == there:
         raise LogError(
             "the log has changed since it was read", got=str(salvage.path), remedy="Begin again by reading it."
         )

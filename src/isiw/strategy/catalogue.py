@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from isiw.checks import whole
-from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.errors import InvalidValueError, StrategyError
+from isiw.design import VALVE_SPACE, DesignSpace, require_space
+from isiw.errors import StrategyError
 from isiw.strategy.settings.common import Settings, settings_from, settings_keys, settings_values
 from isiw.strategy.settings.described import DescribedSetting, described
 from isiw.strategy.strategy import Recipe, Strategy
@@ -120,7 +120,7 @@ def settings_for(name: str, **settings: Any) -> Settings:
         ConfigError: a nested key or value that cannot be used.
         InvalidValueError: an invalid value.
     """
-    if name not in _CATALOGUE:
+    if not isinstance(name, str) or name not in _CATALOGUE:
         raise StrategyError("unknown strategy", got=name, expected=", ".join(_CATALOGUE))
     entry = _CATALOGUE[name]
     family = pkgutil.resolve_name(f"isiw.strategy.settings.{entry.family}")
@@ -154,14 +154,11 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
     Raises:
         StrategyError: an unknown name or setting, or an acquisition function that cannot work with the model.
         ConfigError: a nested key or value that cannot be used.
-        InvalidValueError: an invalid seed, space or setting.
+        InvalidValueError: an invalid seed or setting, or no design space.
     """
     seed = whole("the seed", seed, least=0)
-    if not isinstance(space, DesignSpace):
-        raise InvalidValueError(
-            "the space is no design space", got=space, expected="isiw.DesignSpace(low_ms, high_ms, reference=...)"
-        )
     chosen = settings_for(name, **settings)
+    require_space(space)
     initial_ms = chosen.asking.initial_ms(space)
     return Strategy(
         space,

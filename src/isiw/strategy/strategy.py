@@ -15,7 +15,7 @@ import numpy as np
 from isiw.acquisition.batch import greedy_batch, own_plan
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.checks import amplitude, deadline, number, whole
-from isiw.design import DesignSpace
+from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel
 from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
@@ -68,7 +68,7 @@ class Strategy:
 
     Raises:
         StrategyError: the model's posterior lacks a capability that the acquisition function needs.
-        InvalidValueError: an initial ISI that is not a finite number.
+        InvalidValueError: no design space, or an initial ISI that is not a finite number.
     """
 
     def __init__(
@@ -83,6 +83,7 @@ class Strategy:
         seed: int = 0,
         recipe: Recipe | None = None,
     ) -> None:
+        require_space(space)
         self.space, self.model, self.acquisition, self.stopping = space, model, acquisition, stopping
         self.initial_ms = tuple(space.snap(isi_ms) for isi_ms in initial_ms)
         self.recipe = recipe or Recipe(name="", seed=seed)

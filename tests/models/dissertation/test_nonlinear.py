@@ -174,3 +174,13 @@ def test_a_fit_of_two_gaussians_tells_their_amplitudes_largest_first() -> None:
 def test_one_gaussian_needs_no_second_amplitude() -> None:
     isi_ms = np.linspace(0.0, 500.0, 51)
     assert fit(isi_ms, bell_mv(isi_ms)).amplitudes_mv == pytest.approx((float(bell_mv(isi_ms).max()),), rel=0.05)
+
+
+@pytest.mark.parametrize("high_ms", [5.0, 20.0, 50.0])
+def test_two_gaussians_are_fitted_in_a_range_that_is_narrower_than_a_window(high_ms: Any) -> None:
+    space, rng = DesignSpace(0, high_ms, 1.0), np.random.default_rng(2)
+    isi_ms = np.linspace(0, high_ms, 12)
+    mep_mv = 0.01 + 0.05 * np.exp(-0.5 * ((isi_ms - high_ms / 2) / 5) ** 2) + 0.002 * rng.standard_normal(12)
+    curve = NonlinearRegression(peaks=2).fit(isi_ms, mep_mv, space, rng)
+    assert np.isfinite(curve.mean_mv).all()
+    assert np.isfinite(curve.samples_mv).all()

@@ -1,0 +1,12 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from benchmarks.log_damage import all_cases, drawn_cases, faults, write_log
+
+
+def test_two_thousand_damaged_logs_hang_raise_invent_and_hide_nothing(tmp_path: Path) -> None:
+    content = write_log(tmp_path / "s.mcap")
+    cases = drawn_cases(len(content), 2000)
+    assert len(set(cases)) == 2000 < len(all_cases(len(content)))
+    assert list(faults(tmp_path / "s.mcap", content, cases)) == []

@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+from typing import Any, Never
+
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.log.outputs import write_output
+
+
+def test_a_file_that_is_there_is_replaced_only_where_that_is_asked_for(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "s.pdf"
+    assert write_output(path, b"first") == path
+    with pytest.raises(InvalidValueError, match=r"there is a file already.*overwrite=True"):
+        write_output(path, b"second")
+    assert path.read_bytes() == b"first"
+    write_output(path, b"second", overwrite=True)
+    assert path.read_bytes() == b"second"
+    assert list(path.parent.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("overwrite", [True, False])
+def test_a_log_is_never_overwritten(finished_log: Path, overwrite: Any) -> None:
+    before = finished_log.read_bytes()
+    with pytest.raises(InvalidValueError, match=r"never overwritten|already"):
+        write_output(finished_log, b"a picture", overwrite=overwrite)
+    assert finished_log.read_bytes() == before
+
+
+def no_room(_: Any) -> Never:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_what_cannot_be_written_as_a_whole_leaves_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_output(tmp_path / "s.png", b"first")
+    monkeypatch.setattr(os, "fsync", no_room)
+    with pytest.raises(OSError, match="No space left"):
+        write_output(path, b"second", overwrite=True)
+    assert path.read_bytes() == b"first"
+    assert list(tmp_path.iterdir()) == [path]
