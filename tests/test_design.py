@@ -115,6 +115,11 @@ def test_a_space_is_printed_with_the_event_that_its_isis_count_from() -> None:
     assert str(DesignSpace(10, 50, 2.5)) == "10–50 ms after the impact, every 2.5 ms"
 
 
+def test_a_space_in_seconds_is_named() -> None:
+    with pytest.raises(InvalidValueError, match=r"In seconds\? Then DesignSpace\(0, 320\)"):
+        DesignSpace(0, 0.32)
+
+
 def test_the_grid_cannot_be_written_to() -> None:
     with pytest.raises(ValueError, match="read-only"):
         VALVE_SPACE.grid_ms[0] = 1.0

@@ -36,6 +36,8 @@ from .devices.simulated import SimulatedDevice as SimulatedDevice
 from .devices.simulated import SimulatedPerson as SimulatedPerson
 from .log.reader import read_session as read_session
 from .session.loop import Session as Session
+from .session.recorder import Recorder as Recorder
+from .session.recorder import open_session as open_session
 from .session.resume import exclude as exclude
 from .session.resume import resume as resume
 from .session.safeguards import Safeguards as Safeguards

@@ -51,6 +51,13 @@ class DesignSpace:
             raise InvalidValueError(
                 "the design space is empty", got=(self.low_ms, self.high_ms), expected="low_ms < high_ms"
             )
+        if self.high_ms - self.low_ms < 0.5 * self.step_ms:
+            raise InvalidValueError(
+                "the design space is narrower than a step",
+                got=(self.low_ms, self.high_ms),
+                expected=f"a range in ms of at least {self.step_ms:g} ms",
+                remedy=f"In seconds? Then DesignSpace({1e3 * self.low_ms:g}, {1e3 * self.high_ms:g}).",
+            )
         steps = (self.high_ms - self.low_ms) / self.step_ms
         if steps >= MOST_ISIS:
             raise InvalidValueError(

@@ -105,6 +105,10 @@ class OtherVersionsWarning(UserWarning):
     """A session goes on with versions other than those it was logged with, and may ask other ISIs."""
 
 
+class ImplausibleDataWarning(UserWarning):
+    """Data that were taken as they are, although they look like a slip of unit or order."""
+
+
 class LogError(IsiwError):
     """A log that cannot be written or read."""
 

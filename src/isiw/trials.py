@@ -35,6 +35,8 @@ class MistrialReason(StrEnum):
     SATURATION = "saturation"
     MISSING_CHANNEL = "missing channel"
     ISI_OFF = "ISI off by more than the tolerance"
+    IMPLAUSIBLE = "implausible amplitude"
+    REJECTED = "rejected"
     OUTCOME_UNKNOWN = "outcome unknown"
 
 

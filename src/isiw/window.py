@@ -15,6 +15,7 @@ from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
     "EDGE_LEVEL",
+    "ENOUGH_PAIRS",
     "MIN_EXCESS_MV",
     "MIN_EXCESS_OF_BASELINE",
     "BestISI",
@@ -33,6 +34,9 @@ EDGE_LEVEL = 0.135
 
 MIN_EXCESS_MV = 0.002
 MIN_EXCESS_OF_BASELINE = 0.10
+
+ENOUGH_PAIRS = 3
+"""With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
 
 Interval: TypeAlias = tuple[float, float]
 _Edge: TypeAlias = tuple[float | None, float | None, float | None]
@@ -187,6 +191,7 @@ class WindowEstimate:
         expected_f1: posterior mean of the F1 of the reported decision.
         best_isi: the ISI of the largest expected MEP.
         largest_excluded: an enhancement that, with 90 % probability, is larger than the largest at any ISI.
+        pairs: how many pairs of stimuli it rests on; None where that is not known.
 
     Raises:
         InvalidValueError: a probability outside 0–1, a window reported against it, not one hypothesis a sample, or one
@@ -207,6 +212,7 @@ class WindowEstimate:
     expected_f1: float | None = None
     best_isi: BestISI | None = None
     largest_excluded: Enhancement | None = None
+    pairs: int | None = None
 
     def __post_init__(self) -> None:
         self._check_hypotheses()
@@ -243,6 +249,11 @@ class WindowEstimate:
     def __str__(self) -> str:
         start, end = self.interval(0.9) or ((None, None), (None, None))
         return finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end))
+
+    @property
+    def rests_on_data(self) -> bool:
+        """Whether enough was measured to speak of a window; with less it is what was believed beforehand."""
+        return self.pairs is None or self.pairs >= ENOUGH_PAIRS
 
     def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:
         """Credible intervals of start and end, given that there is a window [ms].

@@ -25,6 +25,8 @@ from isiw.testing import check_device
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial, TrialTable
 from isiw.types import Reference
 from known import instance
+from wrong_rigs import NAMED, WRONG, rig
+from wrong_rigs import SPACE as RIG_SPACE
 
 
 def responder(reference: Reference = "valve") -> Callable[[float | None], Response]:
@@ -109,7 +111,7 @@ def test_the_suite_finds_a_device_that_cannot_resume(space: DesignSpace) -> None
 
 
 def test_the_suite_finds_a_device_with_wrong_timing(space: DesignSpace) -> None:
-    with pytest.raises(AssertionError, match=r"ISI off .* 20.* ms for 0"):
+    with pytest.raises(AssertionError, match=r"ISI off .* was 20 ms, not the commanded 0 ms"):
         check_device(lambda: Inaccurate(SimulatedPerson(responder(), "valve")), space)
 
 
@@ -185,7 +187,7 @@ def test_an_inter_trial_interval_passes_before_each_delivery(space: DesignSpace)
     clock = VirtualClock()
     device = RememberingHardware(clock=clock)
     check_device(lambda: device, space, clock=clock)
-    assert len(device.fired_s) == 8
+    assert len(device.fired_s) == 9
     assert np.diff([0.0, *device.fired_s]).min() >= 5.0
 
 
@@ -255,3 +257,45 @@ def test_a_device_of_sweeps_conforms(space: DesignSpace) -> None:
 def test_the_suite_finds_sweeps_that_no_session_could_use(space: DesignSpace, rig: dict[str, Any], broken: str) -> None:
     with pytest.raises(AssertionError, match=broken):
         check_device(lambda: Rig(**rig), space, clock=VirtualClock())
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_the_suite_names_what_is_wrong_with_a_rig_and_says_what_it_found(wrong: str) -> None:
+    said: list[str] = []
+    with pytest.raises(AssertionError, match=NAMED[wrong]):
+        check_device(lambda: rig(wrong), RIG_SPACE, say=said.append)
+    assert said[-1].startswith("background EMG")
+
+
+def test_a_right_rig_passes_with_a_table_of_what_was_found() -> None:
+    rows = dict(check_device(rig, DesignSpace(20, 320), say=lambda text: None).rows)
+    assert rows["impact found"] == "3 of 3"
+    assert rows["background EMG"].endswith("µV RMS (a session accepts 10 at most)")
+    assert len(rows["realised minus wanted ISI"].split(",")) == 3
+    assert "ms from the pulse" in rows["pulse artefact"]
+    assert "emg in mV" in rows["units"]
+    assert rows["judged"] == "accepted, accepted, accepted, accepted"
+
+
+@pytest.mark.parametrize(
+    ("device", "announced"),
+    [
+        (Hardware(), "This check stimulates: 3 pairs and one magnetic pulse alone, 5 s apart."),
+        (RememberingHardware(), "This check stimulates: 8 pairs and one magnetic pulse alone, 5 s apart."),
+    ],
+)
+def test_the_suite_says_beforehand_that_it_stimulates(space: DesignSpace, device: Hardware, announced: str) -> None:
+    said: list[tuple[int, str]] = []
+
+    def say(text: str) -> None:
+        said.append((len(device.fired_s), text))
+
+    check_device(lambda: device, space, clock=VirtualClock(), say=say)
+    assert said[0][0] == 0
+    assert said[0][1].startswith(announced)
+
+
+def test_a_simulated_device_is_announced_as_one(space: DesignSpace) -> None:
+    said: list[str] = []
+    check_device(lambda: SimulatedDevice(SimulatedPerson(responder(), "valve")), space, say=said.append)
+    assert said[0] == "simulated person is simulated: nothing is delivered to anybody."

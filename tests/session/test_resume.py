@@ -360,11 +360,11 @@ def hang(*_, **__):
     time.sleep(600)
 
 device, strategy, clock, on_trial = ScriptedDevice(), scripted_strategy(10), VirtualClock(), None
-point, answer, tell = {point!r}, device.answer, strategy.tell
+point, answer, learn = {point!r}, device.answer, strategy.learn
 if point == "while the device delivers":
     device.answer = lambda stimulus: hang() if stimulus.trial == 4 else answer(stimulus)
 elif point == "before the trial is told":
-    strategy.tell = lambda *a, **k: hang() if len(told_to(strategy)) == 3 else tell(*a, **k)
+    strategy.learn = lambda *a, **k: hang() if len(told_to(strategy)) == 3 else learn(*a, **k)
 elif point == "after the trial was reported":
     on_trial = lambda update: hang() if update.trial.index == 3 else None
 else:

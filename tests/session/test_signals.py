@@ -190,7 +190,7 @@ def test_without_anybody_to_ask_a_pause_ends_the_session_and_it_can_be_resumed(
 
     session = Session(scripted_device(), scripted_strategy(6), log=log, on_trial=on_trial)
     result = session.run()
-    assert result.decision.reason == "Paused: Three mistrials in a row."
+    assert result.decision.reason == "The session is paused: Three mistrials in a row."
     assert len(result.trials) == 3
     assert len(resume(log, scripted_device(), scripted_strategy(6)).run().trials) == 6
 

@@ -75,7 +75,7 @@ def test_fallbacks_differ_from_trial_to_trial(held_up: Strategy) -> None:
     asked = []
     for _ in range(4):
         asked.append(held_up.ask(deadline_s=0.0))
-        held_up.tell(asked[-1], 0.02)
+        held_up.tell(asked[-1], 0.02 + 1e-4 * asked[-1])
     assert len(set(asked)) == 4
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +21,6 @@ from isiw.strategy.strategy import Recipe, Strategy
 from known import known
 from scripted import scripted_strategy
 
-MakeStrategy = Callable[..., Strategy]
 MEPS_MV = [0.02, 0.0, 0.11, 0.05]
 
 
@@ -254,7 +253,7 @@ def test_the_initial_isis_come_first_and_a_mistrial_repeats_one() -> None:
 def settled_after(strategy: Strategy, trials: int) -> bool:
     """Whether the edges have settled after so many more pairs, each of which moves them by 1 ms."""
     for _ in range(trials):
-        strategy.tell(strategy.ask(), 0.02)
+        strategy.learn(strategy.ask(), 0.02)
     return strategy.decision().stop
 
 
@@ -272,7 +271,7 @@ def test_tms_alone_does_not_settle_the_edges() -> None:
     strategy = Strategy(usual.space, usual.model, usual.acquisition, EdgeVariance())
     settled_after(strategy, 4)
     for _ in range(5):
-        strategy.tell(None, 0.02)
+        strategy.learn(None, 0.02)
         assert not strategy.decision().stop
     assert settled_after(strategy, 1)
 
@@ -316,3 +315,33 @@ def test_a_batch_from_a_model_that_imagines_no_trials_is_refused() -> None:
     assert len(scripted_strategy().ask_batch(1)) == 1
     with pytest.raises(InvalidValueError, match="at least 1"):
         scripted_strategy().ask_batch(0)
+
+
+def test_a_slip_that_is_refused_changes_nothing() -> None:
+    strategy = scripted_strategy()
+    isi_ms = strategy.ask()
+    for told in ((isi_ms / 1000, 0.02), (0.02, isi_ms), (isi_ms, 1e-6), (isi_ms, 1e12)):
+        with pytest.raises(InvalidValueError):
+            strategy.tell(*told)
+    assert strategy.ask() == isi_ms
+    assert strategy.delivered == 0
+
+
+def test_an_isi_far_from_the_one_asked_is_told_with_one_warning() -> None:
+    strategy = scripted_strategy()
+    said = []
+    for _ in range(2):
+        far_ms = 0.0 if strategy.ask() > 100 else 200.0
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            strategy.tell(far_ms, 0.02)
+        said.append(len(caught))
+    assert said == [1, 0]
+    assert strategy.delivered == 2
+
+
+def test_what_was_judged_before_is_learnt_as_it_is() -> None:
+    strategy = scripted_strategy()
+    strategy.ask()
+    strategy.learn(100.0, 50.0)
+    assert strategy.delivered == 1

@@ -28,6 +28,8 @@ app = typer.Typer(
 )
 app.add_typer(prior.app, name="prior")
 app.add_typer(study.app, name="study")
+new = typer.Typer(help="Write a starting point of your own.", no_args_is_help=True)
+app.add_typer(new, name="new")
 
 _WIDTHS = (5, 7, 30, 9, 14, 8, 8, 4)
 _INTERRUPTED = "Interrupted: the device is stopped and the log is closed."
@@ -74,7 +76,7 @@ def run(
         typer.Option(help="The log of an earlier session of the same person; of several, the first one first."),
     ] = None,
 ) -> None:
-    """Run a session with a simulated person, and say what was found."""
+    """Run a session with a simulated person, or with the device of a configuration, and say what was found."""
     with errors_reported(_INTERRUPTED):
         settings = isiw.config.load_config(config).with_overrides(
             seed=seed, log=log, subject=subject, data=data, strategy=strategy, prior=lab, after=after
@@ -85,6 +87,9 @@ def run(
 @app.command()
 def resume(
     log: Log,
+    config: Annotated[
+        Path | None, typer.Argument(help="The configuration with your device; without it, somebody is simulated.")
+    ] = None,
     data: Data = None,
     lost_pulses: Annotated[
         int | None,
@@ -94,9 +99,47 @@ def resume(
 ) -> None:
     """Go on with a session that was interrupted."""
     with errors_reported(_INTERRUPTED):
-        settings = isiw.config.config_of_log(isiw.read_session(log)).with_overrides(data=data)
-        device = isiw.config.device_for(settings)
+        record = isiw.read_session(log)
+        settings = isiw.config.load_config(config) if config else isiw.config.config_of_log(record)
+        device = isiw.config.device_for(settings.with_overrides(data=data))
         _run_to_the_end(isiw.resume(log, device, on_trial=_show_progress, lost_pulses=lost_pulses, verify=verify))
+
+
+@app.command()
+def check(
+    config: Annotated[Path, typer.Argument(help="The configuration with your device.")],
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before stimulating.")] = False,  # noqa: FBT002 - a flag of the command line
+) -> None:
+    """Check a device, with the coil on a phantom: what it delivers, and whether a session can use it. It stimulates."""
+    with errors_reported("Interrupted: the device is stopped."):
+        settings = isiw.config.load_config(config)
+        device, space = isiw.config.device_for(settings), settings.space.design()
+        if not (yes or device.describe().simulated):
+            typer.confirm("The check stimulates. Is the coil on a phantom?", abort=True)
+        try:
+            isiw.testing.check_device(
+                lambda: isiw.config.device_for(settings),
+                space,
+                iti_s=settings.limits.min_iti_s,
+                timeout_s=settings.timeout_s,
+                signals=settings.signals,
+                say=show,
+            )
+        except AssertionError as broken:
+            show(f"{broken}", style="red", stderr=True)
+            raise typer.Exit(1) from broken
+        show("The device keeps what isiw asks of it.", style="bold")
+
+
+@new.command("rig")
+def new_rig(
+    folder: Annotated[Path, typer.Argument(help="Where to; by default here.")] = Path(),
+) -> None:
+    """Write a commented starting point for your own rig: device, configuration and test."""
+    with errors_reported():
+        for file in isiw.config.write_rig_template(folder):
+            show(f"{file}")
+        show(f"It runs as it is, on made-up EMG: isiw run {folder / 'session.toml'}", style="bold")
 
 
 @app.command("show")
@@ -115,14 +158,20 @@ def show_log(log: Log) -> None:
 @app.command()
 def plot(
     log: Log,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The picture's file: .png, .pdf, .svg …")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="The picture's file: .png, .pdf, .svg …; by default beside the log.", **NO_DEFAULT
+        ),
+    ] = None,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Draw a session: profile, trials, window, and how the edges developed."""
     with errors_reported(_INTERRUPTED):
         record = isiw.read_session(log)
         truth = isiw.config.true_window(record)
-        show(f"picture: {isiw.plots.save_session_plot(record, output, truth=truth, overwrite=overwrite)}")
+        target = output or _picture_beside(Path(f"{record.path}".removesuffix(".part")))
+        show(f"picture: {isiw.plots.save_session_plot(record, target, truth=truth, overwrite=overwrite)}")
         _exit_if_damaged(record.losses)
 
 
@@ -207,7 +256,8 @@ def _run_to_the_end(session: Session) -> None:
     record = isiw.read_session(result.log)
     truth = isiw.config.true_window(record)
     show(f"\n{isiw.report.final_statement(record)}", style="bold")
-    show(isiw.report.truth_sentence(record, truth))
+    if isiw.config.has_truth(record):
+        show(isiw.report.truth_sentence(record, truth))
     picture = isiw.plots.save_session_plot(record, _picture_beside(result.log), truth=truth)
     show(f"log:     {result.log}\npicture: {picture}")
 

@@ -1,10 +1,12 @@
 """Configuration files, and the sessions that they describe."""
 
+from isiw.config.rig import write_rig_template
 from isiw.config.run import (
     RunConfig,
     config_of_log,
     device_for,
     fresh_log_path,
+    has_truth,
     load_config,
     session_for,
     subject_for,
@@ -16,8 +18,10 @@ __all__ = [
     "config_of_log",
     "device_for",
     "fresh_log_path",
+    "has_truth",
     "load_config",
     "session_for",
     "subject_for",
     "true_window",
+    "write_rig_template",
 ]

@@ -23,6 +23,7 @@ from typing import Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from isiw.checks import choice
+from isiw.config.rig import device_from_factory
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
@@ -32,6 +33,7 @@ from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.priors import after, load
 from isiw.session.loop import Session, SessionUpdate
+from isiw.signals.judgement import SignalLimits
 from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
 from isiw.subjects.cohorts import COHORTS, cohort
 from isiw.subjects.subject import SimulatedSubject
@@ -44,6 +46,7 @@ __all__ = [
     "config_of_log",
     "device_for",
     "fresh_log_path",
+    "has_truth",
     "load_config",
     "session_for",
     "subject_for",
@@ -52,6 +55,8 @@ __all__ = [
 
 SESSIONS = Path("isiw-sessions")
 """The folder for logs of sessions without a path."""
+
+TIMEOUT_S = 30.0
 
 RUN_KEY = "isiw_run"
 """The name under which `isiw run` keeps its configuration in a log; other software may keep its own there."""
@@ -126,19 +131,53 @@ class LimitsConfig(_Section):
     period_s: float = Field(default=3600.0, gt=0.0)
     max_coil_c: float | None = None
     intensity_pct_mso: float | None = Field(default=None, ge=0.0)
+    max_consecutive_mistrials: int = Field(default=3, ge=1)
+
+
+class DeviceConfig(_Section):
+    """A lab's own rig: what makes it, with which settings; a log never names it."""
+
+    factory: str = Field(pattern=r"^[\w.]+:\w+$")
+    settings: dict[str, Any] = Field(default_factory=dict)
+    folder: Path | None = None
+    timeout_s: float = Field(default=TIMEOUT_S, gt=0.0, allow_inf_nan=False)
+
+
+class VisitConfig(_Section):
+    """Who is examined."""
+
+    subject: str = ""
 
 
 class RunConfig(_Section):
-    """The whole configuration of `isiw run`."""
+    """The whole configuration of `isiw run`; with a device, nobody is simulated."""
 
     seed: int = Field(default=0, ge=0)
     log: Path | None = None
     prior: Path | None = None
     after: tuple[Path, ...] = ()
+    device: DeviceConfig | None = None
+    visit: VisitConfig = VisitConfig()
     subject: SubjectConfig = SubjectConfig()
     space: SpaceConfig = SpaceConfig()
     strategy: StrategyConfig = StrategyConfig()
     limits: LimitsConfig = LimitsConfig()
+    signals: SignalLimits = SignalLimits()
+
+    @model_validator(mode="after")
+    def _one_person(self) -> Self:
+        if self.device is not None and self.subject != SubjectConfig():
+            raise ConfigError(
+                "device and subject exclude each other",
+                expected="a device of your own, or a simulated subject",
+                remedy="Remove [subject], and give the person's code as visit.subject.",
+            )
+        return self
+
+    @property
+    def timeout_s(self) -> float:
+        """How long the device may take for one delivery [s]."""
+        return self.device.timeout_s if self.device else TIMEOUT_S
 
     def with_overrides(
         self,
@@ -182,7 +221,10 @@ def load_config(path: str | Path | None = None) -> RunConfig:
     """
     if path is None:
         return _validated({}, "the defaults")
-    return _validated(read_toml(path), str(path))
+    values = read_toml(path)
+    if isinstance(values.get("device"), dict):  # a module of the user's own usually lies beside the file
+        values["device"] = {"folder": Path(path).resolve().parent} | values["device"]
+    return _validated(values, str(path))
 
 
 def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
@@ -197,9 +239,10 @@ def config_of_log(record: SessionRecord) -> RunConfig:
     """
     if RUN_KEY not in record.header.config:
         raise ConfigError(
-            "the session was not run by isiw run, so its device is not known here",
+            "the session was not run by isiw run with a simulated person, so its device is not known here",
             got=record.header.device.name,
-            remedy="Resume it from the software that ran it: isiw.resume(path, device).run()",
+            remedy=f"With a configuration that has a device: isiw resume {record.path} CONFIG. From other software: "
+            "isiw.resume(path, device).run()",
         )
     return _validated(record.header.config[RUN_KEY], str(record.path))
 
@@ -219,18 +262,23 @@ def subject_for(config: RunConfig) -> SimulatedSubject:
 
 def true_window(record: SessionRecord) -> Window | None:
     """The true window of the person whom `isiw run` simulated; None where it, or such a person, does not exist."""
-    if RUN_KEY not in record.header.config:
-        return None
-    return subject_for(config_of_log(record)).window(record.header.space)
+    return subject_for(config_of_log(record)).window(record.header.space) if has_truth(record) else None
+
+
+def has_truth(record: SessionRecord) -> bool:
+    """Whether the session is of a person whom `isiw run` simulated."""
+    return RUN_KEY in record.header.config
 
 
 def device_for(config: RunConfig) -> Device:
-    """The device: a simulated person, in recorded EMG where asked for.
+    """The device: the user's own, or a simulated person, in recorded EMG where asked for.
 
     Raises:
-        ConfigError: recorded EMG without its folder.
+        ConfigError: recorded EMG without its folder, or a factory that makes no device.
         DeviceError: no recordings in the folder.
     """
+    if config.device is not None:
+        return device_from_factory(config.device.factory, config.device.settings, config.device.folder)
     reference = config.space.reference
     subject = subject_for(config)
     respond = partial(subject.begin(config.seed).respond, reference=reference)
@@ -261,10 +309,6 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
     """
     space = config.space.design()
     log = config.log or fresh_log_path(config)
-    # What the prior came to is in the log; where it came from is kept for whoever reads that.
-    kept = config.model_dump(mode="json", exclude_none=True, exclude={"log"})
-    if config.subject.data is not None:
-        kept["subject"]["data"] = str(config.subject.data.resolve())
     device = device_for(config)
     known = {"hit_delay_ms": device.describe().hit_delay_ms}
     settings = known_settings(config.strategy.name, known) | _settings_for(config)
@@ -274,8 +318,10 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         log=log,
         limits=dataclasses.replace(Limits.of_space(space), **config.limits.model_dump()),
         on_trial=on_trial,
-        subject=f"{config.subject.cohort}-{config.seed}-{config.subject.number}",
-        config={RUN_KEY: kept},
+        subject=config.visit.subject or ("" if config.device else _code(config)),
+        signals=config.signals,
+        config={} if config.device else {RUN_KEY: _kept(config)},
+        timeout_s=config.timeout_s,
     )
 
 
@@ -291,3 +337,18 @@ def _settings_for(config: RunConfig) -> dict[str, Any]:
         )
     lab = None if config.prior is None else load(config.prior)
     return settings | {"prior": after(*map(read_session, config.after), prior=lab)}
+
+
+def _code(config: RunConfig) -> str:
+    return f"{config.subject.cohort}-{config.seed}-{config.subject.number}"
+
+
+def _kept(config: RunConfig) -> dict[str, Any]:
+    """What a log keeps to simulate the same person again; never what names code to import.
+
+    What a prior came to is in the strategy's recipe; where it came from is kept for whoever reads the log.
+    """
+    kept = config.model_dump(mode="json", exclude_none=True, exclude={"log", "device", "signals"})
+    if config.subject.data is not None:
+        kept["subject"]["data"] = str(config.subject.data.resolve())
+    return kept

@@ -34,9 +34,10 @@ class Limits:
         max_coil_c: highest temperature of the coil at which to deliver [°C]; the device must report it.
         intensity_pct_mso: the only intensity at which to deliver [% of the maximum stimulator output]; the device must
             report it. Where None, one that is reported when the device is staged may not change any more.
+        max_consecutive_mistrials: after so many mistrials in a row a session pauses, so that a person can look.
 
     Raises:
-        InvalidValueError: values that are not finite or limit nothing, or a number of pulses that is not whole.
+        InvalidValueError: values that are not finite or limit nothing, or a number that is not whole.
     """
 
     low_ms: float
@@ -50,11 +51,12 @@ class Limits:
     period_s: float = 3600.0
     max_coil_c: float | None = None
     intensity_pct_mso: float | None = None
+    max_consecutive_mistrials: int = 3
 
     def __post_init__(self) -> None:
         check_numbers(self, "low_ms", "high_ms")
         check_numbers(self, "min_iti_s", least=0)
-        check_wholes(self, "max_pulses", least=1)
+        check_wholes(self, "max_pulses", "max_consecutive_mistrials", least=1)
         check_wholes(self, "max_block_pulses", "max_period_pulses", least=1, optional=True)
         check_numbers(self, "rest_s", "period_s", above=0)
         check_numbers(self, "step_ms", above=0, optional=True)
@@ -64,15 +66,25 @@ class Limits:
             raise InvalidValueError("the limits of the ISI must ascend", got=(self.low_ms, self.high_ms))
 
     @classmethod
-    def of_space(cls, space: DesignSpace, *, min_iti_s: float = 5.0, max_pulses: int = 200) -> Limits:
+    def of_space(
+        cls, space: DesignSpace, *, min_iti_s: float = 5.0, max_pulses: int = 200, max_consecutive_mistrials: int = 3
+    ) -> Limits:
         """Limits that allow exactly the ISIs of a design space.
 
         Args:
             space: the design space.
             min_iti_s: shortest time between two deliveries [s].
             max_pulses: largest number of deliveries in a session.
+            max_consecutive_mistrials: after so many mistrials in a row a session pauses.
         """
-        return cls(space.low_ms, space.high_ms, min_iti_s, max_pulses, space.step_ms)
+        return cls(
+            space.low_ms,
+            space.high_ms,
+            min_iti_s,
+            max_pulses,
+            space.step_ms,
+            max_consecutive_mistrials=max_consecutive_mistrials,
+        )
 
     def require_isi(self, isi_ms: float) -> None:
         """Raise where an ISI must not be delivered.

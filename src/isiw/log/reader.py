@@ -19,6 +19,7 @@ from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Estimate, Event, Header
 from isiw.log.writer import CONFIGURATION
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, Trial, TrialTable
+from isiw.window import ENOUGH_PAIRS
 
 __all__ = ["SessionRecord", "read_salvaged", "read_session"]
 
@@ -76,6 +77,11 @@ class SessionRecord:
     def trials(self) -> pd.DataFrame:
         """All trials as a DataFrame, a row a trial, indexed by their number."""
         return self.table.to_frame()
+
+    @property
+    def rests_on_data(self) -> bool:
+        """Whether enough pairs of stimuli count to speak of a window."""
+        return sum(trial.isi_ms is not None for trial in self.table.told) >= ENOUGH_PAIRS
 
     @property
     def intents(self) -> tuple[Intent, ...]:

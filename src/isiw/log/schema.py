@@ -54,8 +54,8 @@ __all__ = [
     "topic_of",
 ]
 
-SCHEMA_VERSION = 2
-"""2 since 0.1.0: other settings of the strategies, hypotheses by name. Versions before the first release wrote 1."""
+SCHEMA_VERSION = 3
+"""3 since 0.1.0: pauses, and an ISI whose trial was lost is asked again twice only. Earlier versions wrote 1 and 2."""
 
 MOST_TRIALS: Final = 100_000
 """More than any session delivers; a record of a later trial makes no sense."""
@@ -244,7 +244,9 @@ def _rounded(values: FloatArray) -> tuple[float, ...]:
     return tuple(np.asarray(values, dtype=np.float64).round(PROFILE_DECIMALS).tolist())
 
 
-EventKind: TypeAlias = Literal["exclusion", "limit", "fault", "resume", "fallback", "fit", "refused", "late", "pause"]
+EventKind: TypeAlias = Literal[
+    "exclusion", "limit", "fault", "resume", "fallback", "fit", "refused", "late", "pause", "doubt", "note"
+]
 
 
 class Event(_Record):

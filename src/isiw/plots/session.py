@@ -56,13 +56,13 @@ def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Fig
     tidied(profile, edges, chance)
     edges.sharex(chance)
     edges.tick_params(labelbottom=False)
-    last = record.estimates[-1] if record.estimates else None
+    last = record.estimates[-1] if record.estimates and record.rests_on_data else None
     _draw_window(profile, last, truth)
     _draw_profile(profile, last)
     _draw_trials(profile, record)
     _finish_profile(profile, record)
     _draw_edges(edges, record, truth)
-    _draw_probability(chance, record.estimates)
+    _draw_probability(chance, record.estimates if last else ())
     figure.align_ylabels((profile, edges, chance))
     return figure
 
@@ -106,7 +106,7 @@ def _draw_trials(axes: Axes, record: SessionRecord) -> None:
 
 
 def _finish_profile(axes: Axes, record: SessionRecord) -> None:
-    space, window = record.header.space, record.estimates[-1].window if record.estimates else None
+    space = record.header.space
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -114,13 +114,19 @@ def _finish_profile(axes: Axes, record: SessionRecord) -> None:
     axes.set_xlim(space.low_ms, space.high_ms)
     axes.set_xlabel(_AXIS_NAME[space.reference], fontsize=9)
     axes.set_ylabel("MEP [µV]", fontsize=9)
-    found = "No window" if window is None else f"Window {window}"
-    axes.set_title(f"{found} after {len(record.table)} trials", fontsize=11, loc="left", color=INK, pad=12)
+    axes.set_title(f"{_title(record)} after {len(record.table)} trials", fontsize=11, loc="left", color=INK, pad=12)
     axes.legend(fontsize=7.5, frameon=False, loc="best", handlelength=1.6)
 
 
+def _title(record: SessionRecord) -> str:
+    if not record.rests_on_data:
+        return f"Too little was measured ({len(record.table.told)} count)"
+    window = record.estimates[-1].window if record.estimates else None
+    return "No window" if window is None else f"Window {window}"
+
+
 def _draw_edges(axes: Axes, record: SessionRecord, truth: Window | None) -> None:
-    estimates, space = record.estimates, record.header.space
+    estimates, space = record.estimates if record.rests_on_data else (), record.header.space
     trials = [estimate.trial + 1 for estimate in estimates]
     for name, colour in (("start", GREEN), ("end", ORANGE)):
         low, middle, high = (

@@ -9,9 +9,10 @@ from isiw.design import DesignSpace
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate, Event
 from isiw.metrics import f1
+from isiw.report.evidence import contradiction, nothing_measured
 from isiw.session.loop import SessionUpdate
 from isiw.trials import Trial
-from isiw.window import Interval, Window
+from isiw.window import Interval, Window, WindowEstimate
 
 __all__ = ["PROGRESS_HEADINGS", "TRIAL_HEADINGS", "final_statement", "progress_row", "trial_rows", "truth_sentence"]
 
@@ -36,7 +37,7 @@ def final_statement(record: SessionRecord) -> str:
     if not record.estimates:
         return "No trial has been completed."
     last = record.estimates[-1]
-    sentences = [_finding(last, record.header.space), _edges(last, record.header.space), _counts(record), last.reason]
+    sentences = [*_findings(record, last), _counts(record), last.reason]
     if record.end_lost:
         sentences.append(
             "The log's end is missing; go on with the number of pulses that the stimulator counted besides: "
@@ -47,6 +48,13 @@ def final_statement(record: SessionRecord) -> str:
     if _excluded_since(record):
         sentences.append("Trials were excluded after this estimate; resume the session to have it without them.")
     return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _findings(record: SessionRecord, estimate: Estimate) -> list[str]:
+    space, nothing = record.header.space, nothing_measured(record)
+    if nothing is not None:
+        return [nothing]
+    return [_finding(estimate, space), _edges(estimate, space), contradiction(estimate.window, record.table.told) or ""]
 
 
 def _finding(estimate: Estimate, space: DesignSpace) -> str:
@@ -109,10 +117,13 @@ def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
         record: the session.
         truth: the true window; None where there is none.
     """
+    true = "has no window" if truth is None else f"has the window {truth}"
+    if not record.rests_on_data:
+        return f"This simulated person in fact {true}."
     found = record.estimates[-1].window if record.estimates else None
     share = f1(found, truth, record.header.space)
-    true = "has no window" if truth is None else f"has the window {truth}"
-    return f"This simulated person in fact {true}; the result has an F1 of {share:.2f}."
+    said = "none was reported (F1 {0:.2f})" if found is None else "the F1 of the reported one is {0:.2f}"
+    return f"This simulated person in fact {true}; {said.format(share)}."
 
 
 def progress_row(update: SessionUpdate) -> tuple[str, ...]:
@@ -121,17 +132,19 @@ def progress_row(update: SessionUpdate) -> tuple[str, ...]:
     Args:
         update: what is known after the trial.
     """
-    estimate = update.estimate
+    trial, estimate = update.trial, update.estimate
+    found = _found(estimate) if estimate.rests_on_data else ("", "–", "", "")
+    return (str(trial.index), _isi(trial.commanded_isi_ms), _outcome(trial), *found, str(update.stimuli_left))
+
+
+def _found(estimate: WindowEstimate) -> tuple[str, ...]:
+    """Probability, window, start and end; where too little was measured to speak of them, they are not said."""
     start, end = estimate.interval(0.9) or (None, None)
     return (
-        str(update.trial.index),
-        _isi(update.trial.commanded_isi_ms),
-        _outcome(update.trial),
         "" if estimate.probability is None else f"{estimate.probability:.2f}",
         "none" if estimate.window is None else str(estimate.window),
         _short(start),
         _short(end),
-        str(update.stimuli_left),
     )
 
 

@@ -1,6 +1,7 @@
 """A session: the closed loop from the first ask to the decision, and going on with one from its log."""
 
 from isiw.session.loop import Session, SessionResult, SessionUpdate
+from isiw.session.recorder import Recorder, open_session
 from isiw.session.resume import exclude, resume
 
-__all__ = ["Session", "SessionResult", "SessionUpdate", "exclude", "resume"]
+__all__ = ["Recorder", "Session", "SessionResult", "SessionUpdate", "exclude", "open_session", "resume"]

@@ -36,6 +36,7 @@ from isiw.log.writer import LogWriter
 from isiw.session.operator import goes_on
 from isiw.session.rig import Rig, require_matching
 from isiw.session.safeguards import Safeguards
+from isiw.session.watch import Watch
 from isiw.signals.judgement import SignalLimits, judge, judge_measurement
 from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
@@ -108,7 +109,7 @@ def learn(strategy: Strategy, trial: Trial) -> None:
         trial: the trial.
     """
     if trial.told:
-        strategy.tell(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
+        strategy.learn(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
     else:
         strategy.count_mistrial()
 
@@ -197,6 +198,7 @@ class Session:
         self._unconcluded: Trial | None = None
         self._pause_reason: str | None = None
         self._resumed = False
+        self._watch = Watch(space, self._signals, self._limits.max_consecutive_mistrials)
 
     def continue_from(
         self,
@@ -215,9 +217,13 @@ class Session:
         """
         self.trials, self._open_log, self._first_records = trials, open_log, first_records
         self._own_earlier_s, self._resumed = earlier_s, True
+        self._watch = self._watch.resumed(trials)
 
     def run(self) -> SessionResult:
         """Run to the end, and close the log whatever happens.
+
+        Where trials are rejected again and again, or the data look like a slip of unit, it ends before its time with a
+        decision that does not stop: its reason says what to do before the session is resumed.
 
         Raises:
             DeviceError: the device failed; it is stopped, and the trial is a mistrial "outcome unknown". Or another
@@ -299,7 +305,8 @@ class Session:
         decision = None
         while decision is None or not decision.stop:
             if self._pausing:
-                decision = self._pause(self._pause_reason or "Interrupted by the operator.")
+                if (paused := self._pause(self._pause_reason or "Interrupted by the operator.")) is not None:
+                    return paused
                 continue
             try:
                 decision = self._next_step()
@@ -327,7 +334,7 @@ class Session:
         return self._pause_reason is not None or self._interrupts.heard
 
     def _pause(self, reason: str) -> StopDecision | None:
-        """Disarm, and arm again only where somebody says so; the decision to stop, where nobody does."""
+        """Disarm, and arm again only where somebody says so; where nobody does, what the session ends with."""
         self._rig.disarm()
         self._log_faults()
         if self._interrupts.ending:
@@ -338,9 +345,10 @@ class Session:
         if not self._freely(self._safeguards.on_pause or goes_on, reason):
             if self._interrupts.heard:
                 raise KeyboardInterrupt
-            return StopDecision(stop=True, reason=f"Paused: {reason}")
+            return StopDecision(stop=False, reason=f"The session is paused: {reason}")
         self._interrupts.settle()
         self._pause_reason = None
+        self._watch = self._watch.seen()
         self._log_event("pause", "The operator goes on.")
         self._rig.stage()
         return None
@@ -373,6 +381,8 @@ class Session:
             self._log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
         decision, next_isi_ms = self._log_estimate(trial.index)
         self._unconcluded = None
+        if not decision.stop and self._watch.reason is not None:
+            self._pause_reason = self._watch.reason
         if self._on_trial is not None:
             estimate = self._freely(self.strategy.estimate)
             update = SessionUpdate(trial, estimate, decision, next_isi_ms, self._stimuli_left())
@@ -381,11 +391,17 @@ class Session:
 
     def _log_estimate(self, trial: int) -> tuple[StopDecision, float | None]:
         """Put what is believed after a trial on disk; the decision and the next ISI [ms]."""
-        estimate, decision = self._freely(self.strategy.estimate), self._freely(self.strategy.decision)
+        estimate, decision = self._freely(self.strategy.estimate), self._freely(self._decision)
         next_isi_ms = None if decision.stop else self._freely(self.strategy.ask, self._ask_deadline_s)
         self._log.append(Estimate.of(trial, estimate, decision, next_isi_ms))
         self._log.sync()
         return decision, next_isi_ms
+
+    def _decision(self) -> StopDecision:
+        """The strategy's decision; none is made on data that a person should look at first."""
+        if self._watch.reason is None or not self._stimuli_left():
+            return self.strategy.decision()
+        return StopDecision(stop=False, reason=f"The session is paused: {self._watch.reason}")
 
     def _stimuli_left(self) -> int:
         budget = stimuli_left(self.strategy.stopping, len(self.trials))
@@ -404,7 +420,9 @@ class Session:
         self._log.sync()
         trial: Trial | None = Trial.unknown(stimulus)
         try:
-            trial = self._judged(stimulus, self._answer(stimulus))
+            answer = self._answer(stimulus)
+            trial = self._judged(stimulus, answer)
+            self._watch = self._watch.after(trial, answer)
         except _NOTHING_GIVEN as error:
             trial = None
             self._log.append(Event(kind="refused", trial=stimulus.trial, text=told(error)))

@@ -26,6 +26,7 @@ from isiw.signals.mep import (
     background_rms,
     mep_amplitudes,
 )
+from isiw.signals.plausibility import implausible_amplitude
 from isiw.signals.waveforms import is_recording
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
 from isiw.types import ArrayLike, BoolArray, FloatArray
@@ -125,8 +126,16 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
         return _mistrial(timed, MistrialReason.MISSING_CHANNEL)
     if timed.background_rms_uv > limits.background_uv:
         return _mistrial(timed, MistrialReason.BACKGROUND_ACTIVITY)
-    mep_mv = _mep_mv(emg_mv, emg, timed, limits)
-    return timed if math.isnan(mep_mv) else replace(timed, status=Status.ACCEPTED, reason=None, mep_mv=mep_mv)
+    return _measured(timed, _mep_mv(emg_mv, emg, timed, limits))
+
+
+def _measured(timed: Trial, mep_mv: float) -> Trial:
+    """The trial with its amplitude, where there is one [mV]; in a sweep even EMG at rest has more than 0."""
+    if math.isnan(mep_mv):
+        return timed
+    if mep_mv == 0 or implausible_amplitude(mep_mv) is not None:
+        return replace(_mistrial(timed, MistrialReason.IMPLAUSIBLE), mep_mv=mep_mv)
+    return replace(timed, status=Status.ACCEPTED, reason=None, mep_mv=mep_mv)
 
 
 def judge_measurement(
@@ -156,6 +165,8 @@ def judge_measurement(
         wrong = wrong_isi(measurement.isi_ms, stimulus.isi_ms, space, limits)
     if wrong is None and (measurement.background_rms_uv or 0.0) > limits.background_uv:
         wrong = MistrialReason.BACKGROUND_ACTIVITY
+    if wrong is None and implausible_amplitude(measurement.mep_mv) is not None:
+        return replace(_mistrial(judged, MistrialReason.IMPLAUSIBLE), mep_mv=measurement.mep_mv)
     return judged if wrong is None else _mistrial(judged, wrong)
 
 

@@ -118,12 +118,17 @@ class Course:
         """What is left of the initial ISIs [ms]."""
         return self.method.initial_ms[self.told - self.alone :]
 
+    @property
+    def plans_ahead(self) -> bool:
+        """Whether the model itself proposes the ISIs, whatever an acquisition function would choose."""
+        return ProposesIsi in self.method.acquisitions[0].needs and isinstance(self.posterior, ProposesIsi)
+
     @cached_property
     def planned(self) -> tuple[Choice, ...] | None:
         """What is asked of each person where that stands already; None where the acquisition function chooses."""
         if self.initial_left:
             return (Choice(self.initial_left[0]),) * self.people
-        if ProposesIsi in self.method.acquisitions[0].needs and isinstance(self.posterior, ProposesIsi):
+        if self.plans_ahead and isinstance(self.posterior, ProposesIsi):
             wanted_ms = self.posterior.proposed_isis_ms()[:, 0].tolist()
             return tuple(Choice(self.method.space.snap(isi_ms)) for isi_ms in wanted_ms)
         return None
@@ -155,7 +160,7 @@ class Course:
     def estimate(self, person: int = 0) -> WindowEstimate:
         """What is believed about the window of one person."""
         if person not in self._estimates:
-            self._estimates[person] = self.posterior.estimate(person)
+            self._estimates[person] = replace(self.posterior.estimate(person), pairs=self.told - self.alone)
         return self._estimates[person]
 
     def decision(self, person: int = 0, mistrials: int = 0) -> StopDecision:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -15,8 +16,9 @@ from isiw.acquisition.batch import greedy_batch, own_plan
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
-from isiw.errors import InvalidValueError, StrategyError
+from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel
+from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
 from isiw.strategy.choosing import Choice, Cost, Method, evenly_spaced
 from isiw.strategy.stopping import StopDecision, StoppingRule
 from isiw.window import WindowEstimate
@@ -24,6 +26,9 @@ from isiw.window import WindowEstimate
 __all__ = ["Recipe", "Strategy"]
 
 _T = TypeVar("_T")
+
+ASKED_AGAIN = 2
+"""How often an ISI whose trial was lost is asked again before another one."""
 
 
 def _fulfil(answer: Future[_T], choose: Callable[[], _T]) -> None:
@@ -91,7 +96,9 @@ class Strategy:
                 got=f"a posterior without {', '.join(missing)}",
                 remedy="Choose another acquisition function, or a model whose posterior has the capability.",
             )
-        self._mistrials = 0
+        self._mistrials = self._lost = 0
+        self._meps_mv: list[float] = []
+        self._doubted: set[DoubtKind] = set()
         self._choice: Choice | None = None
         self._fallback_reason: str | None = None
 
@@ -130,7 +137,7 @@ class Strategy:
         return self._course.told + self._mistrials
 
     def ask(self, deadline_s: float | None = None) -> float:
-        """The next ISI [ms], on the grid; the same until the next `tell`.
+        """The next ISI [ms], on the grid; the same until the next `tell`, or until its trial was lost three times.
 
         Args:
             deadline_s: answer within this time [s]: past it with an evenly spaced ISI, and a `fallback_reason`.
@@ -206,6 +213,42 @@ class Strategy:
             isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
 
         Raises:
+            InvalidValueError: NaN, infinite or negative values, a response that is neither True nor False, not exactly
+                one of `mep_mv` and `response`, an amplitude that no muscle gives, swapped arguments, or seconds.
+            OutOfSpaceError: an ISI beyond the space and its tolerance.
+            StrategyError: a kind of outcome that the model cannot learn from.
+
+        Warns:
+            ImplausibleDataWarning: an ISI far from the one that was asked, or amplitudes that look like a slip of unit;
+                once of each kind.
+        """
+        plain_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
+        plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
+        asked_ms = None if self._choice is None else self._choice.isi_ms
+        doubt = require_plausible(plain_ms, plain_mv, asked_ms, self.space)
+        self.learn(isi_ms, mep_mv, response=response, isi_sd_ms=isi_sd_ms)
+        doubt = doubt or doubt_of(self._meps_mv)
+        if doubt is not None and doubt.kind not in self._doubted:
+            self._doubted.add(doubt.kind)
+            warnings.warn(doubt.text, ImplausibleDataWarning, stacklevel=2)
+
+    def learn(
+        self,
+        isi_ms: float | None,
+        mep_mv: float | None = None,
+        *,
+        response: bool | None = None,
+        isi_sd_ms: float = 0.0,
+    ) -> None:
+        """Learn from one trial that was judged before, as a session does: as `tell`, however implausible.
+
+        Args:
+            isi_ms: as for `tell` [ms].
+            mep_mv: as for `tell` [mV].
+            response: as for `tell`.
+            isi_sd_ms: as for `tell` [ms].
+
+        Raises:
             InvalidValueError: NaN, infinite or negative values, an amplitude that no amplifier gives, a response that
                 is neither True nor False, or not exactly one of `mep_mv` and `response`.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
@@ -219,11 +262,18 @@ class Strategy:
         isi_sd_ms = number("isi_sd_ms", isi_sd_ms, least=0)
         isi_ms = None if isi_ms is None else self.space.check_realised(isi_ms)
         self._course = self._course.after(Observation.of([isi_ms], [mep_mv], [isi_sd_ms], [response]))
+        self._meps_mv += [] if mep_mv is None else [mep_mv]
         self._choice = self._fallback_reason = None
+        self._lost = 0
 
     def count_mistrial(self) -> None:
-        """Count a delivered stimulus whose outcome is not told: it uses up budget and changes nothing else."""
+        """Count a delivered stimulus whose outcome is not told: it uses up budget, and is asked again at most twice."""
         self._mistrials += 1
+        self._lost += 1
+        if self._lost > ASKED_AGAIN and not self._course.plans_ahead:
+            reason = f"The trial was lost {self._lost} times in a row: an evenly spaced ISI instead."
+            isi_ms = evenly_spaced(self.space, self._course.told + self._mistrials)
+            self._choice, self._fallback_reason, self._lost = Choice(isi_ms, reason), reason, 0
 
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""

@@ -274,7 +274,8 @@ class _Alone:
 
     def tell(self, responses: Sequence[Response]) -> None:
         (told,) = responses
-        self.player.tell(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
+        learn = self.player.learn if isinstance(self.player, Strategy) else self.player.tell
+        learn(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
 
     def count_mistrial(self, person: int) -> None:
         del person

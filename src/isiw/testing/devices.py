@@ -14,13 +14,13 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
 from isiw.errors import DeviceError, IsiwError
 from isiw.log.schema import waveform_topic
 from isiw.signals import SignalLimits, judge, judge_measurement
+from isiw.signals.faults import likely_fault, too_early_by_chance
+from isiw.signals.plausibility import DoubtKind, doubt_of
+from isiw.testing.device_table import Delivery, DeviceTable, device_table
 from isiw.testing.requirements import require
-from isiw.trials import Measurement, MistrialReason, Stimulus, Sweep, Trial
+from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
 __all__ = ["check_device"]
-
-_OF_THE_DEVICE = {MistrialReason.NO_PULSE, MistrialReason.MISSING_CHANNEL, MistrialReason.ISI_OFF}
-"""Mistrials that are no person's, nor a phantom's."""
 
 
 def check_device(
@@ -31,11 +31,13 @@ def check_device(
     iti_s: float = 5.0,
     clock: Clock | None = None,
     signals: SignalLimits | None = None,
-) -> None:
+    say: Callable[[str], None] = print,
+) -> DeviceTable:
     """Check that a device keeps the promises of `isiw.Device`. It stimulates: put the coil on a phantom.
 
-    It delivers three pairs of stimuli, or eight where the device has a memory, and tries six more times while the
-    device is disarmed and must refuse. Whatever happens, the device is stopped and unstaged at the end.
+    It delivers three pairs of stimuli and TMS alone, five pairs more where the device has a memory, and tries six more
+    times while the device is disarmed and must refuse. It says so beforehand, and ends with a table of what was found.
+    Whatever happens, the device is stopped and unstaged at the end.
 
     Args:
         make: makes the device, in the same state each time; called three times where the device has a memory.
@@ -44,9 +46,13 @@ def check_device(
         iti_s: how long to wait before each of these deliveries [s].
         clock: waits; a virtual one by default where the device is simulated.
         signals: what a session's sweeps must keep.
+        say: takes what is said to whoever watches.
+
+    Returns:
+        The table.
 
     Raises:
-        AssertionError: a promise is broken; the message says which.
+        AssertionError: a promise is broken, or a session would reject a trial; the message says which, and why.
         InvalidValueError: an inter-trial interval that is negative or not finite.
     """
     device = make()
@@ -54,10 +60,26 @@ def check_device(
     _check_description(device, space)
     rules = _Rules(space, signals or SignalLimits())
     pace = _Pace(timeout_s, iti_s, clock or (VirtualClock() if device.describe().simulated else MonotonicClock()))
+    say(_announcement(device, pace))
     with _disarmed_at_last(device):
-        _check_delivery(device, rules, pace)
+        deliveries = _check_delivery(device, rules, pace)
     if isinstance(device, HasMemory):
         _check_memory(make, space, pace)
+    table = device_table(device.describe(), deliveries, rules.limits)
+    say(str(table))
+    _require_usable(deliveries, rules)
+    return table
+
+
+def _announcement(device: Device, pace: _Pace) -> str:
+    info = device.describe()
+    if info.simulated:
+        return f"{info.name} is simulated: nothing is delivered to anybody."
+    pairs = 8 if isinstance(device, HasMemory) else 3
+    return (
+        f"This check stimulates: {pairs} pairs and one magnetic pulse alone, {pace.iti_s:g} s apart. "
+        "Keep the coil on a phantom."
+    )
 
 
 @dataclass(frozen=True)
@@ -73,12 +95,16 @@ class _Pace:
 
     def deliver(self, device: Device, stimulus: Stimulus) -> Answer:
         """Deliver one pair of stimuli, an inter-trial interval after whatever was delivered before."""
+        return self.timed(device, stimulus)[0]
+
+    def timed(self, device: Device, stimulus: Stimulus) -> tuple[Answer, float]:
+        """As `deliver`, and how long the device took [s]."""
         self.clock.sleep_s(self.iti_s)
         began_s = time.monotonic()
         answer = device.deliver(stimulus, self.timeout_s)
         spent_s = time.monotonic() - began_s
         require(spent_s <= self.timeout_s, f"deliver returns or raises within its timeout, here after {spent_s:.3g} s")
-        return answer
+        return answer, spent_s
 
 
 @dataclass(frozen=True)
@@ -107,18 +133,24 @@ def _disarmed_at_last(device: Device) -> Iterator[None]:
             device.unstage()
 
 
-def _check_delivery(device: Device, rules: _Rules, pace: _Pace) -> None:
+def _check_delivery(device: Device, rules: _Rules, pace: _Pace) -> list[Delivery]:
     _check_refusal(device, "before stage()", pace)
     device.stage()
-    for trial, isi_ms in enumerate((rules.space.low_ms, None, rules.space.high_ms)):
-        stimulus = Stimulus(trial, isi_ms)
-        _check_answer(device.describe(), stimulus, pace.deliver(device, stimulus), rules)
+    space = rules.space
+    between_ms = float(space.grid_ms[(len(space.grid_ms) - 1) // 3])
+    stimuli = [Stimulus(trial, isi) for trial, isi in enumerate((space.low_ms, None, between_ms, space.high_ms))]
+    deliveries = []
+    for stimulus in stimuli:
+        answer, took_s = pace.timed(device, stimulus)
+        trial = _checked_answer(device.describe(), stimulus, answer, rules)
+        deliveries.append(Delivery(stimulus, answer, trial, took_s))
     for verb in (device.stop, device.stop, device.unstage, device.unstage):
         verb()
         _check_refusal(device, "after stop() or unstage()", pace)
     device.stage()
     device.stop()
     _check_refusal(device, "after being staged again and stopped", pace)
+    return deliveries
 
 
 def _check_description(device: Device, space: DesignSpace) -> None:
@@ -136,7 +168,7 @@ def _check_refusal(device: Device, when: str, pace: _Pace) -> None:
     raise AssertionError(f"broken promise: deliver raises a DeviceError {when}")
 
 
-def _check_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, rules: _Rules) -> None:
+def _checked_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, rules: _Rules) -> Trial:
     require(isinstance(answer, Sweep | Measurement), "deliver returns a Sweep or a Measurement")
     if isinstance(answer, Sweep):
         units = {name: channel.unit for name, channel in answer.channels.items()}
@@ -147,11 +179,25 @@ def _check_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, rules: _
         alone = stimulus.isi_ms is None
         require((answer.isi_ms is None) is alone, "the realised ISI is None for TMS alone, and only then")
     try:
-        judged = rules.judged(answer, stimulus)
+        return rules.judged(answer, stimulus)
     except IsiwError as error:
         raise AssertionError(f"broken promise: a session can judge what deliver returns, here: {error}") from error
-    what = f"{judged.reason}, {judged.isi_ms} ms for {stimulus.isi_ms} ms"
-    require(judged.reason not in _OF_THE_DEVICE, f"a session can use what deliver returns, here a mistrial: {what}")
+
+
+def _require_usable(deliveries: Sequence[Delivery], rules: _Rules) -> None:
+    """Raise where a session would reject what was delivered, or would pause over it."""
+    said = []
+    for delivery in deliveries:
+        fault = likely_fault(delivery.answer, delivery.trial, rules.limits)
+        if fault is not None and not too_early_by_chance(delivery.trial, rules.space):
+            said.append(
+                f"{fault}" if delivery.trial.reason is None else f"a mistrial, {delivery.trial.reason}: {fault}"
+            )
+    meps_mv = [delivery.trial.mep_mv for delivery in deliveries if delivery.trial.mep_mv is not None]
+    doubt = doubt_of(meps_mv)
+    if doubt is not None and doubt.kind is not DoubtKind.EQUAL:
+        said.append(doubt.text)
+    require(not said, f"a session can use what deliver returns, here {'; '.join(dict.fromkeys(said))}")
 
 
 def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: _Pace) -> None:

@@ -55,7 +55,7 @@ def trials_that_break_things(space: DesignSpace, trials: int = 12) -> Mapping[st
         "baselines only": ((None, 0.01), (None, 0.02), (None, 0.0)),
         "all MEPs equal": tuple((isi_ms, 0.05) for isi_ms in isis_ms),
         "all MEPs zero": tuple((isi_ms, 0.0) for isi_ms in isis_ms),
-        "one huge outlier": tuple((isi_ms, 50.0 if isi_ms == isis_ms[3] else 0.01) for isi_ms in isis_ms),
+        "one huge outlier": tuple((isi_ms, 25.0 if isi_ms == isis_ms[3] else 0.01) for isi_ms in isis_ms),
         "the same ISI again and again": tuple((middle, 0.01 + 0.01 * (k % 5)) for k in range(trials)),
         "both ends only": tuple(((low, high)[k % 2], (0.01, 0.3)[k % 2]) for k in range(trials)),
         "beyond the range": ((low - 0.9 * space.tolerance_ms, 0.01), (high + 0.9 * space.tolerance_ms, 0.02)),

@@ -78,7 +78,7 @@ def _check_refusals(strategy: Strategy) -> None:
 
 def _check_learning(strategy: Strategy, told: Trials, when: str) -> None:
     for isi_ms, mep_mv in told:
-        strategy.tell(isi_ms, mep_mv)
+        strategy.learn(isi_ms, mep_mv)
     require(strategy.ask() in strategy.space.grid_ms, f"ask answers an ISI on the grid {when}")
     check_estimate(strategy.estimate(), strategy.space, when)
     decision = strategy.decision()
@@ -98,7 +98,7 @@ def _asks(strategy: Strategy, told: Trials) -> list[float]:
     asked = []
     for isi_ms, mep_mv in told:
         asked.append(strategy.ask())
-        strategy.tell(isi_ms, mep_mv)
+        strategy.learn(isi_ms, mep_mv)
     return [*asked, strategy.ask()]
 
 

@@ -1,0 +1,97 @@
+"""A lab's own rig, named in its own configuration: `[device] factory = "mylab.rig:make"`.
+
+A log never names it: what is imported is what the person at the keyboard has configured.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from isiw.devices.protocol import Device
+from isiw.errors import ConfigError
+
+__all__ = ["TEMPLATE_FILES", "device_from_factory", "write_rig_template"]
+
+TEMPLATE_FILES = ("rig.py", "session.toml", "test_rig.py")
+"""What `write_rig_template` writes."""
+
+
+def device_from_factory(factory: str, settings: Mapping[str, Any], folder: Path | None = None) -> Device:
+    """The device that a factory makes.
+
+    Args:
+        factory: where it is, as `module:function`.
+        settings: its keyword arguments.
+        folder: where the module is looked for before anything else.
+
+    Raises:
+        ConfigError: it cannot be imported, does not take the settings, or makes no device.
+    """
+    module_name, _, name = factory.partition(":")
+    with _importable(folder):
+        try:
+            make = getattr(importlib.import_module(module_name), name)
+        except (ImportError, AttributeError) as error:
+            raise ConfigError(
+                f"device.factory cannot be imported: {error}",
+                got=factory,
+                expected="module:function, such as mylab.rig:make",
+                remedy=f"The module is looked for in {folder or 'the installed packages'} first.",
+            ) from error
+    try:
+        device = make(**settings)
+    except TypeError as error:
+        raise ConfigError(
+            f"device.settings do not fit the factory: {error}", got=dict(settings), remedy="Correct their names."
+        ) from error
+    if not isinstance(device, Device):
+        raise ConfigError(
+            "device.factory makes no device",
+            got=type(device).__name__,
+            expected="an object with describe, stage, deliver, stop and unstage",
+            remedy="See isiw.Device.",
+        )
+    return device
+
+
+@contextmanager
+def _importable(folder: Path | None) -> Iterator[None]:
+    """Within, modules of a folder can be imported, before any others of their name."""
+    if folder is None:
+        yield
+        return
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+
+
+def write_rig_template(folder: str | Path) -> tuple[Path, ...]:
+    """Write a commented starting point for a rig: device, configuration and test. It runs as it is, on made-up EMG.
+
+    Args:
+        folder: where to; it is made where it does not exist.
+
+    Returns:
+        The files.
+
+    Raises:
+        ConfigError: one of the files exists already; nothing is written.
+    """
+    target = Path(folder)
+    files = tuple(target / name for name in TEMPLATE_FILES)
+    there = [str(file) for file in files if file.exists()]
+    if there:
+        raise ConfigError("the files are there already", got=", ".join(there), remedy="Choose another folder.")
+    target.mkdir(parents=True, exist_ok=True)
+    templates = resources.files("isiw.config") / "rig_template"
+    for file in files:
+        file.write_text((templates / f"{file.name}.txt").read_text(encoding="utf-8"), encoding="utf-8")
+    return files

@@ -1,0 +1,68 @@
+"""What the trials themselves say about a finding: that nothing was measured, or that they do not bear it out."""
+
+from __future__ import annotations
+
+import statistics
+from collections import Counter
+from collections.abc import Sequence
+
+from scipy.stats import mannwhitneyu
+
+from isiw.log.reader import SessionRecord
+from isiw.trials import Trial
+from isiw.window import Window
+
+__all__ = ["contradiction", "nothing_measured"]
+
+ENOUGH_ON_EACH_SIDE = 4
+NO_LARGER = 0.5
+"""From this p-value of a one-sided rank test on, MEPs are not larger at all."""
+
+
+def nothing_measured(record: SessionRecord) -> str | None:
+    """That too little was measured to speak of a window, and why; None where there was enough.
+
+    Args:
+        record: the session.
+    """
+    if record.rests_on_data:
+        return None
+    given, told = len(record.table) + len(record.unknown), len(record.table.told)
+    if told:
+        return f"Too little was measured to speak of a window: {told} of {given} trials count."
+    lost = [trial for trial in record.table if trial.reason is not None]
+    if not lost:
+        return f"Nothing was measured: none of {given} trials counts."
+    reasons = Counter(str(trial.reason) for trial in lost)
+    why = ", ".join(f"{count} {reason}" for reason, count in reasons.items())
+    return f"Nothing was measured: {len(lost)} of {given} trials were rejected ({why}{_background(lost)})."
+
+
+def _background(lost: Sequence[Trial]) -> str:
+    levels_uv = [trial.background_rms_uv for trial in lost if trial.background_rms_uv is not None]
+    if not levels_uv:
+        return ""
+    usual_uv = statistics.median(levels_uv)
+    text = f"{usual_uv / 1000:.2g} mV" if usual_uv >= 1000 else f"{usual_uv:.2g} µV"
+    return f"; background EMG {text} RMS"
+
+
+def contradiction(window: Window | None, trials: Sequence[Trial]) -> str | None:
+    """That the MEPs inside a reported window are no larger than those outside; None where they are, or are too few.
+
+    Args:
+        window: the reported window; None where none is.
+        trials: the trials that count.
+    """
+    if window is None:
+        return None
+    placed = [(t.isi_ms, t.mep_mv) for t in trials if t.isi_ms is not None and t.mep_mv is not None]
+    is_inside = window.mask([isi_ms for isi_ms, _ in placed])
+    inside = [mep_mv for (_, mep_mv), within in zip(placed, is_inside, strict=True) if within]
+    outside = [mep_mv for (_, mep_mv), within in zip(placed, is_inside, strict=True) if not within]
+    if min(len(inside), len(outside)) < ENOUGH_ON_EACH_SIDE:
+        return None
+    if float(mannwhitneyu(inside, outside, alternative="greater").pvalue) < NO_LARGER:
+        return None
+    medians = " and ".join(f"{1e3 * statistics.median(meps_mv):.0f}" for meps_mv in (inside, outside))
+    return f"The data do not bear this out: the MEPs inside are no larger than those outside (medians {medians} µV)."

@@ -1,0 +1,327 @@
+"""Logged ask/tell, for labs that keep their own loop: the same log as a session's, written ahead of everything."""
+
+from __future__ import annotations
+
+import datetime as dt
+import itertools
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import isiw
+from isiw.checks import number
+from isiw.devices.clock import Clock, MonotonicClock
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import DeviceInfo
+from isiw.errors import ImplausibleDataWarning, InvalidValueError, LimitExceededError, StrategyError
+from isiw.log.durable import log_of, part_of
+from isiw.log.reader import read_salvaged
+from isiw.log.salvage import salvage
+from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, StrategyRecipe
+from isiw.log.writer import LogWriter
+from isiw.session.loop import learn, versions
+from isiw.session.resume import replay
+from isiw.signals.faults import remedy_for
+from isiw.signals.judgement import SignalLimits
+from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
+from isiw.strategy.stopping import StopDecision
+from isiw.strategy.strategy import Strategy
+from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
+from isiw.window import WindowEstimate
+
+__all__ = ["Recorder", "open_session"]
+
+
+def open_session(
+    strategy: Strategy,
+    log: str | Path,
+    *,
+    resume: bool = False,
+    limits: Limits | None = None,
+    clock: Clock | None = None,
+    subject: str = "",
+    config: Mapping[str, Any] | None = None,
+) -> Recorder:
+    """Open a session whose loop is your own: ask it for ISIs, and tell it what came of them.
+
+    Args:
+        strategy: proposes ISIs and learns; of a session that goes on, made with the same settings and seed.
+        log: where the log is; it must not exist yet, unless the session goes on.
+        resume: whether to go on with the log where there is one. What was asked and has no outcome in it becomes a
+            mistrial.
+        limits: what may be asked; the strategy's space and 200 pulses by default, without an inter-trial interval.
+        clock: tells the time, and waits in `ask` until an inter-trial interval of the limits has passed.
+        subject: the person's code, for the log.
+        config: anything that should be kept in the log, as TOML values.
+
+    Raises:
+        LogError: there is a log already, or it cannot be written or read.
+        StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
+    """
+    path = log_of(Path(log))
+    if strategy.delivered:
+        raise StrategyError(
+            "the strategy knows of trials that are not this session's",
+            got=f"{strategy.delivered} trials",
+            remedy="Make it anew, or give the session strategy.restarted().",
+        )
+    limits = limits or Limits.of_space(strategy.space, min_iti_s=0.0)
+    header = _header(strategy, limits, subject, config or {})
+    clock = clock or MonotonicClock()
+    if not (resume and (path.exists() or part_of(path).exists())):
+        return Recorder(strategy, LogWriter.create(path, header), limits, clock)
+    return _resumed(path, strategy, header, limits, clock)
+
+
+def _resumed(path: Path, strategy: Strategy, header: Header, limits: Limits, clock: Clock) -> Recorder:
+    salvaged = salvage(path)
+    record = read_salvaged(salvaged)
+    replayed = replay(record, strategy)
+    kept = {"created": record.header.created, "subject": header.subject or record.header.subject}
+    log = LogWriter.continuing(path, salvaged, record.header, header.model_copy(update=kept))
+    recorder = Recorder(replayed.strategy, log, limits, clock, replayed.trials)
+    for trial in replayed.unknown:
+        log.append(trial)
+    recorder.log_event("resume", f"Resumed after {len(replayed.trials)} trials.")
+    return recorder
+
+
+def _header(strategy: Strategy, limits: Limits, subject: str, config: Mapping[str, Any]) -> Header:
+    recipe = strategy.recipe
+    return Header(
+        isiw_version=isiw.__version__,
+        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+        subject=subject,
+        seed=recipe.seed,
+        strategy=StrategyRecipe(name=recipe.name, seed=recipe.seed, settings=dict(recipe.settings)),
+        space=strategy.space,
+        limits=limits,
+        device=DeviceInfo("a loop of the lab's own", strategy.space.reference),
+        signals=SignalLimits(),
+        versions={name: version for name, version in versions().items() if name != "isiw"},
+        config=dict(config),
+    )
+
+
+class Recorder:
+    """A session whose loop is the lab's own; `isiw.open_session` opens one. As a context manager it closes its log.
+
+    Args:
+        strategy: proposes ISIs and learns.
+        log: the open log.
+        limits: what may be asked.
+        clock: tells the time, and waits.
+        trials: what was delivered before; the strategy has learned it.
+    """
+
+    def __init__(
+        self, strategy: Strategy, log: LogWriter, limits: Limits, clock: Clock, trials: TrialTable | None = None
+    ) -> None:
+        self.strategy, self.trials = strategy, trials or TrialTable()
+        self._log, self._limits, self._clock = log, limits, clock
+        self._asked: Stimulus | None = None
+        self._last_s = clock.now_s() if self.trials else None
+        self._doubted: set[DoubtKind] = set()
+
+    def ask(self, deadline_s: float | None = None) -> float:
+        """The next ISI [ms], the same until its outcome; on disk as about to be delivered before this returns.
+
+        Args:
+            deadline_s: as for `Strategy.ask` [s].
+
+        Raises:
+            LimitExceededError: a limit is reached; deliver nothing.
+            LogError: the log cannot be written; deliver nothing.
+        """
+        if self._asked is None or self._asked.isi_ms is None:
+            isi_ms = self.strategy.ask(deadline_s)
+            if self.strategy.fallback_reason is not None:
+                self._log.append(Event(kind="fallback", trial=len(self.trials), text=self.strategy.fallback_reason))
+            self._begin(isi_ms)
+            return isi_ms
+        return self._asked.isi_ms
+
+    def _begin(self, isi_ms: float | None) -> None:
+        """Put on disk what is about to be delivered, once the limits allow it."""
+        stimulus = Stimulus(len(self.trials), isi_ms)
+        self._require_within_limits(stimulus)
+        if self._last_s is not None:
+            self._clock.sleep_s(self._last_s + self._limits.min_iti_s - self._clock.now_s())
+        self._log.append(Intent(trial=stimulus.trial, isi_ms=isi_ms, t_s=self._clock.now_s()))
+        self._log.sync()
+        self._asked = stimulus
+
+    def _require_within_limits(self, stimulus: Stimulus) -> None:
+        limits, isi_ms = self._limits, stimulus.isi_ms
+        if len(self.trials) >= limits.max_pulses:
+            raise LimitExceededError(
+                f"the limit of {limits.max_pulses} pulses is reached",
+                remedy="Deliver nothing. End the session, or go on with a higher max_pulses.",
+            )
+        if isi_ms is not None and not limits.low_ms <= isi_ms <= limits.high_ms:
+            raise LimitExceededError(
+                "the ISI is beyond the limits",
+                got=isi_ms,
+                expected=f"{limits.low_ms:g} to {limits.high_ms:g} ms",
+                remedy="Deliver nothing. Let the limits hold the whole design space.",
+            )
+
+    def tell(
+        self,
+        isi_ms: float | None,
+        mep_mv: float,
+        *,
+        isi_sd_ms: float = 0.0,
+        background_rms_uv: float | None = None,
+    ) -> None:
+        """What came of the ISI that was asked; it is on disk before the strategy learns it.
+
+        Args:
+            isi_ms: the realised ISI on the space's reference [ms]; None is TMS alone, told without being asked.
+            mep_mv: peak-to-peak amplitude [mV]; 0 is below the detection limit.
+            isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
+            background_rms_uv: EMG before the pulse [µV RMS], where known.
+
+        Raises:
+            InvalidValueError: nothing was asked, a value that cannot be, or a slip of unit or order; nothing is logged,
+                and the right value can be told.
+            OutOfSpaceError: an ISI beyond the space and its tolerance.
+            LogError: the log cannot be written.
+
+        Warns:
+            ImplausibleDataWarning: what looks like a slip of unit; it is told and logged all the same.
+        """
+        mep_mv = number("mep_mv", mep_mv, least=0)
+        isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
+        if isi_ms is None and self._asked is None:
+            self._begin(None)
+        asked = self._require_asked()
+        doubt = require_plausible(isi_ms, mep_mv, asked.isi_ms, self.strategy.space)
+        isi_ms = None if isi_ms is None else self.strategy.space.check_realised(isi_ms)
+        if (isi_ms is None) != (asked.isi_ms is None):
+            raise InvalidValueError(
+                "the outcome is another kind of trial than the one that was asked",
+                got=isi_ms,
+                expected=f"the outcome of {'TMS alone' if asked.isi_ms is None else f'{asked.isi_ms:g} ms'}",
+                remedy="Tell that first, or call mistrial().",
+            )
+        trial = Trial(asked.trial, Status.ACCEPTED, asked.isi_ms, isi_ms=isi_ms, mep_mv=mep_mv,
+                      isi_sd_ms=isi_sd_ms, background_rms_uv=background_rms_uv)  # fmt: skip
+        self._conclude(trial)
+        doubt = doubt or doubt_of([told.mep_mv for told in self.trials.told if told.mep_mv is not None])
+        if doubt is not None and doubt.kind not in self._doubted:
+            self._doubted.add(doubt.kind)
+            self._warn(doubt.text)
+
+    def mistrial(self, reason: MistrialReason | str) -> None:
+        """That the trial of the ISI that was asked is lost: it counts as a stimulus, and is not told.
+
+        Args:
+            reason: a `MistrialReason` or its value; any other text is logged as a note, under "rejected".
+
+        Raises:
+            InvalidValueError: nothing was asked.
+            LogError: the log cannot be written.
+
+        Warns:
+            ImplausibleDataWarning: as many mistrials in a row as pause a session.
+        """
+        asked = self._require_asked()
+        known = next((each for each in MistrialReason if each == reason), MistrialReason.REJECTED)
+        if known != reason:
+            self.note(str(reason))
+        self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known))
+        lost = len(list(itertools.takewhile(lambda trial: trial.reason is not None, reversed(self.trials.trials))))
+        if lost == self._limits.max_consecutive_mistrials:
+            self._warn(f"{lost} trials in a row were lost: {known}. {remedy_for(known)}")
+
+    def note(self, text: str) -> None:
+        """Log a remark.
+
+        Args:
+            text: anything.
+        """
+        self.log_event("note", text)
+
+    def exclude(self, trial: int, reason: str = "") -> None:
+        """Exclude a trial from here on: an event is appended, and the strategy learns anew without it.
+
+        Args:
+            trial: its number.
+            reason: why, for whoever reads the log.
+
+        Raises:
+            InvalidValueError: no accepted trial has this number.
+        """
+        if trial not in {told.index for told in self.trials.told}:
+            raise InvalidValueError(
+                "there is no such trial to exclude",
+                got=trial,
+                expected=", ".join(str(told.index) for told in self.trials.told) or "one that was told",
+            )
+        self._log.append(Event(kind="exclusion", trial=trial, text=reason))
+        self._log.sync()
+        self.trials = self.trials.excluding([trial])
+        self.strategy = self.strategy.restarted()
+        for told in self.trials:
+            learn(self.strategy, told)
+
+    def estimate(self) -> WindowEstimate:
+        """What is believed about the window now."""
+        return self.strategy.estimate()
+
+    def decision(self) -> StopDecision:
+        """Whether to stop now, and why."""
+        return self.strategy.decision()
+
+    def close(self) -> None:
+        """Close the log; calling it again is harmless."""
+        self._log.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is not None:
+            interrupted = isinstance(error, KeyboardInterrupt)
+            self.log_event(
+                "fault", "Interrupted by the operator." if interrupted else f"{type(error).__name__}: {error}"
+            )
+        self.close()
+
+    def log_event(self, kind: EventKind, text: str) -> None:
+        """Put on disk that something happened.
+
+        Args:
+            kind: what kind of thing.
+            text: what, in words.
+        """
+        self._log.append(Event(kind=kind, trial=len(self.trials) - 1 if self.trials else None, text=text))
+        self._log.sync()
+
+    def _require_asked(self) -> Stimulus:
+        if self._asked is None:
+            raise InvalidValueError(
+                "nothing was asked whose outcome this could be", remedy="Call ask() first, then deliver, then tell()."
+            )
+        return self._asked
+
+    def _conclude(self, trial: Trial) -> None:
+        """Put a trial on disk, then learn it, then put on disk what is believed."""
+        self._log.append(trial)
+        self._log.sync()
+        self.trials, self._asked = self.trials.appended(trial), None
+        self._last_s = self._clock.now_s()
+        learn(self.strategy, trial)
+        if trial.told and self.strategy.trouble is not None:
+            self._log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
+        self._log.append(Estimate.of(trial.index, self.estimate(), self.decision(), None))
+        self._log.sync()
+
+    def _warn(self, text: str) -> None:
+        self.log_event("doubt", text)
+        warnings.warn(text, ImplausibleDataWarning, stacklevel=3)

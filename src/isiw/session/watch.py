@@ -1,0 +1,73 @@
+"""Whether a session should pause and let a person look: trials rejected in a row, and data that look like a slip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from isiw.design import DesignSpace
+from isiw.devices.protocol import Answer
+from isiw.signals.faults import likely_fault, too_early_by_chance
+from isiw.signals.judgement import SignalLimits
+from isiw.signals.plausibility import DoubtKind, doubt_of
+from isiw.trials import Trial, TrialTable
+
+__all__ = ["Watch"]
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What speaks for a pause after the trials so far.
+
+    Args:
+        space: the session's design space.
+        signals: what its sweeps are judged by.
+        max_in_a_row: how many trials in a row may be rejected, or show a faulty rig.
+        in_a_row: how many there have been.
+        meps_mv: the amplitudes told [mV].
+        settled: doubts that a person has seen.
+        reason: why to pause now, and what to do; None where there is no reason.
+    """
+
+    space: DesignSpace
+    signals: SignalLimits
+    max_in_a_row: int
+    in_a_row: int = 0
+    meps_mv: tuple[float, ...] = ()
+    settled: frozenset[DoubtKind] = frozenset()
+    reason: str | None = None
+
+    def resumed(self, trials: TrialTable) -> Watch:
+        """The same after earlier trials, whose doubts whoever resumes the session has seen."""
+        meps_mv = tuple(trial.mep_mv for trial in trials.told if trial.mep_mv is not None)
+        doubts = (doubt_of(meps_mv[: n + 1]) for n in range(len(meps_mv)))
+        return replace(self, meps_mv=meps_mv, settled=frozenset(doubt.kind for doubt in doubts if doubt))
+
+    def seen(self) -> Watch:
+        """The same after a person has seen the reason and went on."""
+        return replace(self, in_a_row=0, reason=None)
+
+    def after(self, trial: Trial, answer: Answer) -> Watch:
+        """The same after one more trial.
+
+        Args:
+            trial: the trial.
+            answer: what the device answered.
+        """
+        if too_early_by_chance(trial, self.space):
+            return self
+        fault = likely_fault(answer, trial, self.signals)
+        if fault is not None:
+            count = self.in_a_row + 1
+            rejected = f"{count} trials in a row were rejected: {fault}" if trial.reason else f"{fault}"
+            learned = replace(self, in_a_row=count, reason=rejected if count >= self.max_in_a_row else None)
+        else:
+            learned = replace(self, in_a_row=0, reason=None)
+        return learned if trial.mep_mv is None or not trial.told else _with_amplitude(learned, trial.mep_mv)
+
+
+def _with_amplitude(watch: Watch, mep_mv: float) -> Watch:
+    meps_mv = (*watch.meps_mv, mep_mv)
+    doubt = doubt_of(meps_mv)
+    if doubt is None or doubt.kind in watch.settled:
+        return replace(watch, meps_mv=meps_mv)
+    return replace(watch, meps_mv=meps_mv, settled=watch.settled | {doubt.kind}, reason=watch.reason or doubt.text)

@@ -1,0 +1,203 @@
+"""What is likely wrong with a rig, told from one trial and its sweep, in words that say what to do.
+
+A judgement says why a trial does not count; a fault says why that is likely so. Nobody is accused without a sign: where
+a sweep shows none, the reason of the mistrial stands for itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from isiw.design import DesignSpace
+from isiw.signals.impact import impact_time
+from isiw.signals.judgement import SignalLimits
+from isiw.signals.plausibility import implausible_amplitude, off_by
+from isiw.signals.waveforms import is_recording
+from isiw.trials import Channel, Measurement, MistrialReason, Sweep, Trial
+
+__all__ = ["Fault", "likely_fault", "remedy_for", "steepest_edge", "too_early_by_chance"]
+
+TOO_LOUD_UV, TOO_QUIET_UV = 400.0, 0.05
+"""EMG before the pulse [µV RMS] that is no muscle's at rest or at work, and no amplifier's."""
+
+DRIVEN_MS = 25.0
+"""How long a hammer is driven before its impact, at least."""
+
+PULSE_SPAN_MS = (-2.0, 50.0)
+"""When the pulse and what it evokes are in the EMG [ms after the pulse]."""
+
+TAP_SPAN_MS = 60.0
+CLEAR = 20.0
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A likely fault of a rig.
+
+    Args:
+        what: what is likely wrong, as a sentence without a full stop.
+        remedy: what to do, in full sentences.
+    """
+
+    what: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.what}. {self.remedy}"
+
+
+_REMEDIES: Mapping[MistrialReason, str] = MappingProxyType(
+    {
+        MistrialReason.NO_IMPACT: "Check the air supply, the valve, and the accelerometer on the hammer.",
+        MistrialReason.NO_PULSE: "Check that the stimulator is charged and armed, and that its trigger is recorded.",
+        MistrialReason.TMS_BEFORE_IMPACT: "Check the hit delay that the rig reckons with, and the sampling rate.",
+        MistrialReason.BACKGROUND_ACTIVITY: "Let the person relax the muscle; check electrodes, ground and mains hum.",
+        MistrialReason.SATURATION: "Lower the amplifier's gain, or keep cables away from the coil.",
+        MistrialReason.MISSING_CHANNEL: "Check that the EMG is recorded from 50 ms before to 50 ms after the pulse.",
+        MistrialReason.ISI_OFF: "Check how the rig times the pulse, the reference of its ISIs, and the sampling rate.",
+        MistrialReason.IMPLAUSIBLE: "Check the unit and the gain of the EMG.",
+        MistrialReason.REJECTED: "See the notes in the log.",
+        MistrialReason.OUTCOME_UNKNOWN: "Check whether the device is connected and answers.",
+    }
+)
+
+
+def remedy_for(reason: MistrialReason) -> str:
+    """What to do about a mistrial of this reason."""
+    return _REMEDIES[reason]
+
+
+def too_early_by_chance(trial: Trial, space: DesignSpace) -> bool:
+    """Whether the pulse came before the impact by no more than the tolerance: no rig is to blame for that.
+
+    Args:
+        trial: a trial.
+        space: the design space.
+    """
+    if trial.reason is not MistrialReason.TMS_BEFORE_IMPACT or trial.isi_ms is None or trial.commanded_isi_ms is None:
+        return False
+    return not off_by(trial.isi_ms, trial.commanded_isi_ms, space)
+
+
+def likely_fault(answer: Sweep | Measurement, trial: Trial, limits: SignalLimits | None = None) -> Fault | None:
+    """What is likely wrong with the rig that gave an answer; None where nothing is.
+
+    Args:
+        answer: what the device answered.
+        trial: the trial that it was judged to be.
+        limits: what it was judged by.
+    """
+    found = _fault_of_sweep(answer, trial) if isinstance(answer, Sweep) else None
+    found = found or _fault_of_level(trial)
+    if found is not None or trial.reason is None:
+        return found
+    return Fault(_explained(trial, limits or SignalLimits()), remedy_for(trial.reason))
+
+
+def _fault_of_sweep(sweep: Sweep, trial: Trial) -> Fault | None:
+    emg, acceleration = sweep.channels.get("emg"), sweep.channels.get("acceleration")
+    if emg is None or not emg.values.size:
+        return Fault("the sweep has no EMG", "Name the channel emg, and record it in every trial.")
+    if not is_recording(emg.values):
+        return Fault("the EMG is a flat line", "Is the amplifier on, and its cable plugged in?")
+    if acceleration is not None and not _of_one_length(emg, acceleration):
+        return Fault(
+            "EMG and acceleration do not last equally long", "Check the sampling rates that the channels are given."
+        )
+    if trial.reason is not None and (found := _fault_of_hammer(sweep, emg, acceleration)):
+        return found
+    return _fault_of_rate(emg, trial)
+
+
+def _fault_of_hammer(sweep: Sweep, emg: Channel, acceleration: Channel | None) -> Fault | None:
+    if acceleration is None or sweep.t_valve_ms is None or sweep.t_hit_ms is not None:
+        return None
+    if _driven_impact(emg, sweep.t_valve_ms) is not None:
+        return Fault("EMG and acceleration are swapped", "The impact is in the channel emg: swap the two inputs.")
+    if not is_recording(acceleration.values):
+        return Fault("the acceleration is a flat line", "Is the accelerometer powered, and its cable plugged in?")
+    upright, inverted = (_driven_impact(acceleration, sweep.t_valve_ms, sign) for sign in (1.0, -1.0))
+    if inverted is not None and upright is None:
+        return Fault("the accelerometer is inverted", "Turn it, or negate its values: towards the tendon is positive.")
+    return None
+
+
+def _driven_impact(channel: Channel, valve_ms: float, sign: float = 1.0) -> float | None:
+    """The impact of a hammer that was driven towards it for a while [ms]; artefacts in the EMG are not."""
+    rate, valve = channel.rate_hz, valve_ms - channel.t0_ms
+    values = sign * channel.values
+    if not is_recording(values) or valve < DRIVEN_MS:
+        return None
+    hit = impact_time(values, rate, valve)
+    if hit is None:
+        return None
+    rest = values[: math.floor(valve * rate / 1000)]
+    way = values[math.floor((hit - DRIVEN_MS) * rate / 1000) : math.floor((hit - 3.0) * rate / 1000)] - np.median(rest)
+    driven = bool((way > 0).mean() > 0.9) and float(np.median(way)) > float(rest.std())
+    return hit + channel.t0_ms if driven else None
+
+
+def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
+    """The steepest edge of an EMG is the pulse's artefact, or belongs to what it evokes, or to the tap."""
+    if trial.t_tms_ms is None:
+        return None
+    steepest_ms = steepest_edge(emg)
+    spans = [(trial.t_tms_ms + PULSE_SPAN_MS[0], trial.t_tms_ms + PULSE_SPAN_MS[1])]
+    if trial.t_hit_ms is not None:
+        spans.append((trial.t_hit_ms - 2.0, trial.t_hit_ms + TAP_SPAN_MS))
+    if steepest_ms is None or any(first <= steepest_ms <= last for first, last in spans):
+        return None
+    return Fault(
+        f"the pulse shows in the EMG at {steepest_ms:.0f} ms, not at {trial.t_tms_ms:.0f} ms as the device says",
+        "Check the sampling rate, and that all times are on the sweep's own clock.",
+    )
+
+
+def steepest_edge(emg: Channel) -> float | None:
+    """When the EMG rises or falls most steeply [ms on the sweep's clock]; None where no edge stands out.
+
+    Args:
+        emg: the channel; an edge lasts a few samples, and spikes all over are none.
+    """
+    steps = np.abs(np.diff(emg.values))
+    usual = float(np.median(steps)) if steps.size else 0.0
+    if usual == 0 or steps.max() <= CLEAR * usual or (steps > 0.5 * steps.max()).mean() >= 0.01:
+        return None
+    return emg.t0_ms + 1000 * float(steps.argmax()) / emg.rate_hz
+
+
+def _fault_of_level(trial: Trial) -> Fault | None:
+    rest_uv = trial.background_rms_uv
+    if rest_uv is not None and rest_uv > TOO_LOUD_UV:
+        return Fault(
+            f"the EMG before the pulse has {rest_uv / 1000:.2g} mV RMS, more than any muscle's at rest",
+            "Is it in µV, and described as mV? Give the channel its unit, or correct the gain.",
+        )
+    if rest_uv is not None and rest_uv < TOO_QUIET_UV:
+        return Fault(
+            f"the EMG before the pulse has {rest_uv:.1g} µV RMS, less than any amplifier's noise",
+            "Is it in V, and described as mV? Give the channel its unit, or correct the gain; is the amplifier on?",
+        )
+    wrong = None if trial.mep_mv is None else implausible_amplitude(trial.mep_mv)
+    if trial.reason is MistrialReason.IMPLAUSIBLE and wrong is not None:
+        return Fault(f"the amplitude cannot be a MEP's: {wrong.partition('. ')[0]}", wrong.partition(". ")[2])
+    return None
+
+
+def _explained(trial: Trial, limits: SignalLimits) -> str:
+    """The reason of a mistrial, with the figure behind it."""
+    if trial.reason is MistrialReason.BACKGROUND_ACTIVITY and trial.background_rms_uv is not None:
+        return f"the muscle is tense: {trial.background_rms_uv:.0f} µV RMS, at most {limits.background_uv:g} at rest"
+    if trial.reason is MistrialReason.ISI_OFF and trial.isi_ms is not None:
+        return f"the realised ISI was {trial.isi_ms:.0f} ms, not the commanded {trial.commanded_isi_ms:g} ms"
+    return f"{trial.reason}"
+
+
+def _of_one_length(one: Channel, other: Channel) -> bool:
+    lengths = [channel.values.size / channel.rate_hz for channel in (one, other)]
+    return abs(lengths[0] - lengths[1]) <= max(1 / one.rate_hz, 1 / other.rate_hz)

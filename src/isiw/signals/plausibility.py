@@ -1,0 +1,158 @@
+"""Whether amplitudes and ISIs can be true, and which slip they look like where they cannot.
+
+What no muscle and no amplifier gives is refused: `require_plausible`. What is only odd is a `Doubt` that a person
+should look at: `doubt_of`. The bounds leave room for every muscle: the EMG at rest has 2 to 30 µV peak-to-peak, the
+largest compound action potentials some 25 mV.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+
+__all__ = ["Doubt", "DoubtKind", "doubt_of", "implausible_amplitude", "off_by", "require_plausible"]
+
+SMALLEST_MV = 2e-4
+"""No EMG amplifier is so quiet: the noise of the electrodes alone has more."""
+
+LARGEST_MV = 30.0
+
+SMALL_MV, LARGE_MV = 8e-4, 2.0
+"""Of several in a row, the largest is never smaller, and their geometric mean is hardly ever larger from the start."""
+
+JUMP = 300.0
+"""From EMG at rest to a large MEP there is a factor of 200 at most; from one unit to the next there are 1,000."""
+
+IN_A_ROW = 3
+EQUAL_IN_A_ROW = 4
+
+
+class DoubtKind(StrEnum):
+    """What is odd about data."""
+
+    ISI_OFF = "ISI far from the one asked"
+    EQUAL = "equal amplitudes"
+    SMALL = "small amplitudes"
+    LARGE = "large amplitudes"
+    JUMP = "a jump of the scale"
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Something about the data that a person should look at.
+
+    Args:
+        kind: what is odd.
+        text: what was seen, and the likely slip, in full sentences.
+    """
+
+    kind: DoubtKind
+    text: str
+
+
+def implausible_amplitude(mep_mv: float) -> str | None:
+    """Why an amplitude cannot be a MEP's in mV, and the likely slip; None where it can, as 0 always can.
+
+    Args:
+        mep_mv: peak-to-peak amplitude [mV].
+    """
+    if 0 < mep_mv < SMALLEST_MV:
+        return (
+            f"{mep_mv:.2g} mV is less than any amplifier's noise. Is it in V? Multiply by 1000; "
+            "an amplitude below the detection limit is 0."
+        )
+    if mep_mv > LARGEST_MV:
+        return f"{mep_mv:.4g} mV is more than any muscle gives. Is it in µV? Divide by 1000."
+    return None
+
+
+def off_by(isi_ms: float, asked_ms: float, space: DesignSpace) -> bool:
+    """Whether an ISI [ms] is farther than the space's tolerance from the one that was asked [ms].
+
+    Args:
+        isi_ms: the realised ISI.
+        asked_ms: the one that was asked.
+        space: the design space.
+    """
+    return abs(isi_ms - asked_ms) > space.tolerance_ms
+
+
+def require_plausible(
+    isi_ms: float | None, mep_mv: float | None, asked_ms: float | None, space: DesignSpace
+) -> Doubt | None:
+    """Refuse what cannot be true of one trial; the doubt about what is only odd.
+
+    Args:
+        isi_ms: the realised ISI [ms]; None for TMS alone.
+        mep_mv: peak-to-peak amplitude [mV]; None where a response was seen or not.
+        asked_ms: the ISI that was asked [ms]; None where none was.
+        space: the design space.
+
+    Raises:
+        InvalidValueError: swapped arguments, seconds for milliseconds, or an amplitude that no muscle gives.
+    """
+    odd = isi_ms is not None and asked_ms is not None and off_by(isi_ms, asked_ms, space)
+    if odd and isi_ms is not None and asked_ms is not None:
+        _require_in_place(isi_ms, mep_mv, asked_ms, space)
+    wrong = None if mep_mv is None else implausible_amplitude(mep_mv)
+    if wrong is not None:
+        what, _, remedy = wrong.partition(". ")
+        raise InvalidValueError(f"the amplitude cannot be a MEP's: {what}", got=mep_mv, remedy=remedy)
+    if not odd:
+        return None
+    text = f"The realised ISI of {isi_ms:g} ms is far from the {asked_ms:g} ms that were asked. Is it counted from the "
+    return Doubt(DoubtKind.ISI_OFF, f"{text}{space.reference}, and in ms?")
+
+
+def _require_in_place(isi_ms: float, mep_mv: float | None, asked_ms: float, space: DesignSpace) -> None:
+    """Raise where the ISI that was asked is in the amplitude's place, or in seconds."""
+    if mep_mv is not None and not off_by(mep_mv, asked_ms, space):
+        raise InvalidValueError(
+            "the ISI and the amplitude seem to be swapped",
+            got=(isi_ms, mep_mv),
+            expected=f"an ISI near the {asked_ms:g} ms that were asked, then the amplitude",
+            remedy="Tell the ISI first: tell(isi_ms, mep_mv).",
+        )
+    if not off_by(1000 * isi_ms, asked_ms, space):
+        raise InvalidValueError(
+            "the realised ISI seems to be in seconds",
+            got=isi_ms,
+            expected=f"an ISI near the {asked_ms:g} ms that were asked",
+            remedy="Tell it in ms: multiply by 1000.",
+        )
+
+
+def doubt_of(meps_mv: Sequence[float]) -> Doubt | None:
+    """What is odd about the last amplitudes of a person; None where nothing is.
+
+    Args:
+        meps_mv: all amplitudes told so far [mV], in order; 0, below the detection limit, says nothing about the scale.
+    """
+    last = list(meps_mv[-EQUAL_IN_A_ROW:])
+    if len(last) == EQUAL_IN_A_ROW and len(set(last)) == 1 and last[0] > 0:
+        text = f"The last {EQUAL_IN_A_ROW} amplitudes are exactly equal ({last[0]:g} mV). Is the EMG still recorded?"
+        return Doubt(DoubtKind.EQUAL, text)
+    seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
+    return _doubt_of_scale(seen[:-IN_A_ROW], seen[-IN_A_ROW:]) if len(seen) >= IN_A_ROW else None
+
+
+def _doubt_of_scale(earlier: Sequence[float], last: Sequence[float]) -> Doubt | None:
+    usual_mv = statistics.geometric_mean(last)
+    if max(last) < SMALL_MV:
+        text = f"The last {IN_A_ROW} amplitudes are below {1e3 * max(last):.2g} µV, less than EMG at rest has."
+        return Doubt(DoubtKind.SMALL, f"{text} Are they in V? Or is the amplifier off, or its gain applied twice?")
+    if usual_mv < LARGE_MV:
+        return None
+    if not earlier:
+        text = f"The first {IN_A_ROW} amplitudes are {usual_mv:.2g} mV in the mean, large for any muscle."
+        return Doubt(DoubtKind.LARGE, f"{text} Are they in µV? Divide by 1000.")
+    before_mv = statistics.median(earlier)
+    if usual_mv < JUMP * before_mv:
+        return None
+    text = f"The last {IN_A_ROW} amplitudes are {usual_mv / before_mv:.0f} times as large as those before."
+    return Doubt(DoubtKind.JUMP, f"{text} Has their unit changed, from mV to µV or from V to mV?")

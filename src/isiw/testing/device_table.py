@@ -1,0 +1,137 @@
+"""What a device's check found, as a table that a person reads before the first session."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from isiw.devices.protocol import Answer, DeviceInfo
+from isiw.signals.faults import steepest_edge
+from isiw.signals.judgement import SignalLimits
+from isiw.trials import Stimulus, Sweep, Trial
+
+__all__ = ["Delivery", "DeviceTable", "device_table"]
+
+
+@dataclass(frozen=True, eq=False)
+class Delivery:
+    """One stimulus of a check, and what came of it.
+
+    Args:
+        stimulus: what was commanded.
+        answer: what the device answered.
+        trial: what a session would have judged it to be.
+        took_s: how long the device took [s].
+    """
+
+    stimulus: Stimulus
+    answer: Answer
+    trial: Trial
+    took_s: float
+
+
+@dataclass(frozen=True)
+class DeviceTable:
+    """What was found, a row a question.
+
+    Args:
+        rows: what was looked at, and what was found.
+    """
+
+    rows: tuple[tuple[str, str], ...]
+
+    def __str__(self) -> str:
+        width = max(len(what) for what, _ in self.rows)
+        return "\n".join(f"{what.ljust(width)}  {found}" for what, found in self.rows)
+
+
+def device_table(info: DeviceInfo, deliveries: Sequence[Delivery], limits: SignalLimits) -> DeviceTable:
+    """The table of a check.
+
+    Args:
+        info: what the device says about itself.
+        deliveries: what it delivered.
+        limits: what a session's sweeps must keep.
+    """
+    trials = [delivery.trial for delivery in deliveries]
+    return DeviceTable(
+        (
+            ("background EMG", _background(trials, limits)),
+            ("impact found", _impacts(deliveries)),
+            ("realised minus wanted ISI", _isi_errors(trials)),
+            ("MEP window", _windows(deliveries, limits)),
+            ("amplitudes in it", _amplitudes(trials)),
+            ("pulse artefact", _artefacts(deliveries)),
+            ("units", ", ".join(f"{name} in {unit}" for name, unit in info.channels.items()) or "MEP in mV"),
+            ("time a trial", f"{max(delivery.took_s for delivery in deliveries):.2g} s at most"),
+            ("judged", ", ".join(f"{trial.reason or 'accepted'}" for trial in trials)),
+        )
+    )
+
+
+def _background(trials: Sequence[Trial], limits: SignalLimits) -> str:
+    levels_uv = [trial.background_rms_uv for trial in trials if trial.background_rms_uv is not None]
+    if not levels_uv:
+        return "not known"
+    return f"{statistics.median(levels_uv):.3g} µV RMS (a session accepts {limits.background_uv:g} at most)"
+
+
+def _impacts(deliveries: Sequence[Delivery]) -> str:
+    pairs = [delivery for delivery in deliveries if delivery.stimulus.isi_ms is not None]
+    measured = [
+        delivery
+        for delivery in pairs
+        if isinstance(delivery.answer, Sweep)
+        and delivery.answer.t_hit_ms is None
+        and "acceleration" in delivery.answer.channels
+    ]
+    if not measured:
+        return "told by the device, or not needed"
+    return f"{sum(delivery.trial.t_hit_ms is not None for delivery in measured)} of {len(measured)}"
+
+
+def _isi_errors(trials: Sequence[Trial]) -> str:
+    errors = [
+        f"{trial.isi_ms - trial.commanded_isi_ms:+.1f}"
+        for trial in trials
+        if trial.isi_ms is not None and trial.commanded_isi_ms is not None
+    ]
+    return f"{', '.join(errors)} ms" if errors else "not known"
+
+
+def _windows(deliveries: Sequence[Delivery], limits: SignalLimits) -> str:
+    spans = [_span_ms(d.answer, d.answer.t_tms_ms) for d in deliveries if isinstance(d.answer, Sweep)]
+    about = [span for span in spans if span is not None]
+    low, high = limits.mep_window_ms
+    wanted = f"{low:g} to {high:g} ms after the pulse"
+    if not about:
+        return f"{wanted}; the device itself measures the MEP" if not spans else f"{wanted}; not recorded"
+    first, last = max(span[0] for span in about), min(span[1] for span in about)
+    return f"{wanted}; the EMG is recorded from {first:.0f} to {last:.0f} ms"
+
+
+def _span_ms(sweep: Sweep, pulse_ms: float | None) -> tuple[float, float] | None:
+    emg = sweep.channels.get("emg")
+    if emg is None or pulse_ms is None:
+        return None
+    return emg.t0_ms - pulse_ms, emg.t0_ms + 1000 * (emg.values.size - 1) / emg.rate_hz - pulse_ms
+
+
+def _amplitudes(trials: Sequence[Trial]) -> str:
+    meps_mv = [trial.mep_mv for trial in trials if trial.mep_mv is not None]
+    return f"{1e3 * min(meps_mv):.3g} to {1e3 * max(meps_mv):.3g} µV" if meps_mv else "none"
+
+
+def _artefacts(deliveries: Sequence[Delivery]) -> str:
+    late_ms = []
+    for delivery in deliveries:
+        emg = delivery.answer.channels.get("emg") if isinstance(delivery.answer, Sweep) else None
+        edge_ms = None if emg is None else steepest_edge(emg)
+        if edge_ms is not None and delivery.trial.t_tms_ms is not None:
+            late_ms.append(edge_ms - delivery.trial.t_tms_ms)
+    if not late_ms:
+        return "none seen"
+    return f"steepest edge of the EMG {np.median(late_ms):+.1f} ms from the pulse"

@@ -1,0 +1,73 @@
+"""A rig of one's own from the command line: a starting point, its check, a session, and going on with it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from isiw.cli import app
+from isiw.log.reader import read_session
+
+Command = Callable[..., Result]
+
+
+@pytest.fixture
+def isiw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Command]:
+    """Runs isiw in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object, **given: Any) -> Result:
+        sys.modules.pop("rig", None)  # each run is a process of its own, in truth
+        return CliRunner().invoke(app, [str(argument) for argument in arguments], **given)
+
+    yield run
+    sys.modules.pop("rig", None)
+
+
+def changed(path: Path, old: str, new: str) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+
+
+def test_from_nothing_to_a_session_and_on(isiw: Command, tmp_path: Path) -> None:
+    assert "rig.py" in isiw("new", "rig", "lab").output
+    checked = isiw("check", "lab/session.toml")
+    assert checked.exit_code == 0, checked.output
+    assert "background EMG" in checked.output
+    changed(tmp_path / "lab" / "session.toml", "max_trials = 40", "max_trials = 4")
+    changed(tmp_path / "lab" / "session.toml", "max_pulses = 100", "max_pulses = 3")
+    ran = isiw("run", "lab/session.toml", "--log", "s.mcap")
+    assert ran.exit_code == 0, ran.output
+    assert "P(window)" in ran.output
+    assert "This simulated person" not in ran.output
+    assert (tmp_path / "s.png").exists()
+    without = isiw("resume", "s.mcap")
+    assert without.exit_code == 1
+    assert "isiw resume s.mcap CONFIG" in without.output
+    went_on = isiw("resume", "s.mcap", "lab/session.toml")
+    assert went_on.exit_code == 0, went_on.output
+    assert read_session("s.mcap").events[-1].kind == "limit"
+
+
+def test_a_faulty_rig_fails_its_check_with_a_table_and_the_fault(isiw: Command, tmp_path: Path) -> None:
+    isiw("new", "rig", ".")
+    changed(tmp_path / "rig.py", 'Channel(emg_mv, RATE_HZ, "mV"', 'Channel(1e3 * emg_mv, RATE_HZ, "mV"')
+    checked = isiw("check", "session.toml")
+    assert checked.exit_code == 1
+    assert "background EMG" in checked.output
+    assert "in µV, and described as mV" in checked.output
+
+
+def test_a_rig_that_stimulates_is_checked_only_when_somebody_says_so(isiw: Command, tmp_path: Path) -> None:
+    isiw("new", "rig", ".")
+    changed(tmp_path / "session.toml", "simulated = true", "simulated = false")
+    refused = isiw("check", "session.toml", input="n\n")
+    assert refused.exit_code == 1
+    assert "Is the coil on a phantom?" in refused.output
+    assert "background EMG" not in refused.output

@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from isiw.config.rig import TEMPLATE_FILES, device_from_factory, write_rig_template
+from isiw.config.run import device_for, load_config, session_for
+from isiw.errors import ConfigError
+from isiw.log.reader import read_session
+from known import known
+
+
+@pytest.fixture
+def template(tmp_path: Path) -> Iterator[Path]:
+    """The starting point of a rig, in a folder of its own; its module is forgotten afterwards."""
+    write_rig_template(tmp_path / "lab")
+    yield tmp_path / "lab"
+    sys.modules.pop("rig", None)
+
+
+def imported(file: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(str(file.parent))
+    specification = known(importlib.util.spec_from_file_location(file.stem, file))
+    module = importlib.util.module_from_spec(specification)
+    known(specification.loader).exec_module(module)
+    return module
+
+
+def test_the_starting_point_passes_its_own_check(template: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    imported(template / "test_rig.py", monkeypatch).test_the_rig_conforms()
+
+
+def test_the_starting_point_is_short(template: Path) -> None:
+    lines = (template / "rig.py").read_text(encoding="utf-8").splitlines()
+    assert len([line for line in lines if line.strip()]) < 60
+
+
+def test_a_starting_point_is_never_overwritten(template: Path) -> None:
+    before = {name: (template / name).read_bytes() for name in TEMPLATE_FILES}
+    (template / "session.toml").unlink()
+    with pytest.raises(ConfigError, match=r"there already.*rig\.py"):
+        write_rig_template(template)
+    assert not (template / "session.toml").exists()
+    assert (template / "rig.py").read_bytes() == before["rig.py"]
+
+
+def test_a_session_runs_with_the_users_own_rig_and_the_log_does_not_name_it(template: Path) -> None:
+    text = (template / "session.toml").read_text(encoding="utf-8").replace("max_trials = 40", "max_trials = 3")
+    (template / "session.toml").write_text(text, encoding="utf-8")
+    config = load_config(template / "session.toml").with_overrides(log=template / "s.mcap")
+    session_for(config).run()
+    record = read_session(template / "s.mcap")
+    assert (record.header.device.name, record.header.subject, record.header.config) == ("my rig", "P01", {})
+    assert len(record.table.told) == 3
+    assert set(record.sweep(0)) == {"emg"}
+    assert b"rig:make" not in (template / "s.mcap").read_bytes()
+
+
+def test_settings_of_the_configuration_reach_the_factory(template: Path) -> None:
+    text = (template / "session.toml").read_text(encoding="utf-8")
+    (template / "session.toml").write_text(text.replace("simulated = true", 'port = "COM3"'), encoding="utf-8")
+    device: Any = device_for(load_config(template / "session.toml"))
+    assert device.port == "COM3"
+
+
+@pytest.mark.parametrize(
+    ("factory", "settings", "words"),
+    [
+        ("nowhere.to.be.found:make", {}, "cannot be imported.*nowhere"),
+        ("rig:build", {}, "cannot be imported.*build"),
+        ("rig:make", {"prot": "COM3"}, "do not fit.*prot"),
+        ("json:loads", {"s": "1"}, "makes no device.*int"),
+    ],
+)
+def test_a_factory_that_cannot_be_used_is_named(
+    template: Path, factory: str, settings: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(ConfigError, match=words):
+        device_from_factory(factory, settings, template)
+
+
+def test_a_device_and_a_simulated_person_exclude_each_other(tmp_path: Path) -> None:
+    path = tmp_path / "both.toml"
+    path.write_text('[device]\nfactory = "rig:make"\n[subject]\ncohort = "gaussian"\n')
+    with pytest.raises(ConfigError, match="exclude each other"):
+        load_config(path)
+
+
+def test_a_factory_is_a_module_and_a_function(tmp_path: Path) -> None:
+    path = tmp_path / "session.toml"
+    path.write_text('[device]\nfactory = "rig.py"\n')
+    with pytest.raises(ConfigError, match=r"device\.factory.*'rig.py'"):
+        load_config(path)

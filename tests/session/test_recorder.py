@@ -1,0 +1,235 @@
+"""Logged ask/tell: the log of a session, for a loop of the lab's own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from isiw.design import DesignSpace
+from isiw.devices.clock import VirtualClock
+from isiw.devices.limits import Limits
+from isiw.errors import ImplausibleDataWarning, InvalidValueError, LimitExceededError, LogError, StrategyError
+from isiw.log.reader import read_session
+from isiw.log.schema import Estimate, Intent
+from isiw.report import final_statement
+from isiw.session.recorder import Recorder, open_session
+from isiw.session.resume import resume
+from isiw.trials import MistrialReason, Trial
+from known import known
+from scripted import ScriptedDevice, scripted_strategy, told_to
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return tmp_path / "s.mcap"
+
+
+def mep_at(isi_ms: float) -> float:
+    return 0.01 + isi_ms / 1e4
+
+
+def run(session: Recorder, trials: int) -> list[float]:
+    asked: list[float] = []
+    for _ in range(trials):
+        asked.append(session.ask())
+        session.tell(asked[-1], mep_at(asked[-1]))
+    return asked
+
+
+def test_a_loop_of_ones_own_leaves_the_log_of_a_session(log: Path) -> None:
+    with open_session(scripted_strategy(3), log, subject="P1") as session:
+        while not session.decision().stop:
+            run(session, 1)
+    record = read_session(log)
+    assert [type(entry) for entry in record.history] == [Intent, Trial, Estimate] * 3
+    assert record.finished
+    assert (record.header.subject, len(record.table.told)) == ("P1", 3)
+    assert "The budget of 3 stimuli is used up." in final_statement(record)
+
+
+def test_it_asks_what_the_strategy_alone_would_have_asked(log: Path) -> None:
+    alone = scripted_strategy(9)
+    asked: list[float] = []
+    for _ in range(4):
+        asked.append(alone.ask())
+        alone.tell(asked[-1], mep_at(asked[-1]))
+    with open_session(scripted_strategy(9), log) as session:
+        assert run(session, 4) == asked
+
+
+def test_the_intent_is_on_disk_before_the_isi_is_known_and_the_trial_before_it_is_learnt(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    strategy = scripted_strategy(3)
+    learned: list[Trial] = []
+    learn = strategy.learn
+
+    def watched(*told: Any, **more: Any) -> None:
+        learned.append(read_session(log).table[-1])
+        learn(*told, **more)
+
+    monkeypatch.setattr(strategy, "learn", watched)
+    with open_session(strategy, log) as session:
+        isi_ms = session.ask()
+        assert session.ask() == isi_ms
+        assert [intent.isi_ms for intent in read_session(log).intents] == [isi_ms]
+        session.tell(isi_ms + 0.5, 0.02)
+        assert [(trial.isi_ms, trial.mep_mv) for trial in learned] == [(isi_ms + 0.5, 0.02)]
+
+
+def test_a_slip_is_refused_and_can_be_put_right(log: Path) -> None:
+    with open_session(scripted_strategy(3), log) as session:
+        isi_ms = session.ask()
+        for told in ((isi_ms / 1000, 0.02), (isi_ms, 2e-5), (0.02, isi_ms)):
+            with pytest.raises(InvalidValueError):
+                session.tell(*told)
+        assert len(session.trials) == 0
+        session.tell(isi_ms, 0.02)
+    assert len(read_session(log).table.told) == 1
+
+
+def test_a_doubt_is_a_warning_and_an_event(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        for mep_mv in (8.0, 6.0):
+            session.tell(session.ask(), mep_mv)
+        with pytest.warns(ImplausibleDataWarning, match="in µV"):
+            session.tell(session.ask(), 12.0)
+    assert [event.kind for event in read_session(log).events] == ["doubt"]
+
+
+def test_mistrials_count_with_their_reason_and_are_asked_again(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        isi_ms = session.ask()
+        session.mistrial("no impact")
+        assert session.ask() == isi_ms
+        session.mistrial("the person laughed")
+    record = read_session(log)
+    assert [trial.reason for trial in record.table] == [MistrialReason.NO_IMPACT, MistrialReason.REJECTED]
+    assert [(event.kind, event.text) for event in record.events] == [("note", "the person laughed")]
+
+
+def test_three_mistrials_in_a_row_are_a_warning(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        for _ in range(2):
+            session.ask()
+            session.mistrial(MistrialReason.NO_IMPACT)
+        session.ask()
+        with pytest.warns(ImplausibleDataWarning, match="air supply"):
+            session.mistrial(MistrialReason.NO_IMPACT)
+
+
+def test_nothing_can_be_told_that_was_not_asked(log: Path) -> None:
+    with open_session(scripted_strategy(3), log) as session:
+        with pytest.raises(InvalidValueError, match="nothing was asked"):
+            session.tell(50.0, 0.02)
+        with pytest.raises(InvalidValueError, match="nothing was asked"):
+            session.mistrial("no impact")
+
+
+def test_tms_alone_is_told_without_being_asked(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        session.tell(None, 0.01)
+        session.ask()
+        with pytest.raises(InvalidValueError, match="another kind of trial"):
+            session.tell(None, 0.01)
+    assert read_session(log).table[0].commanded_isi_ms is None
+
+
+def test_the_limits_hold(log: Path, space: DesignSpace) -> None:
+    clock = VirtualClock()
+    limits = Limits.of_space(space, min_iti_s=7.0, max_pulses=3)
+    with open_session(scripted_strategy(9), log, limits=limits, clock=clock) as session:
+        run(session, 3)
+        with pytest.raises(LimitExceededError, match="3 pulses"):
+            session.ask()
+    assert [intent.t_s for intent in read_session(log).intents] == [0.0, 7.0, 14.0]
+
+
+def test_an_excluded_trial_is_unlearnt_and_stays_so(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        asked = run(session, 3)
+        session.exclude(1, "sneezed")
+        assert [isi for isi, _ in told_to(session.strategy)] == [asked[0], asked[2]]
+        with pytest.raises(InvalidValueError, match="no such trial"):
+            session.exclude(1)
+        after = session.ask()
+    with open_session(scripted_strategy(9), log, resume=True) as resumed:
+        assert [isi for isi, _ in told_to(resumed.strategy)] == [asked[0], asked[2]]
+        assert resumed.trials[3].reason is MistrialReason.OUTCOME_UNKNOWN
+        assert resumed.ask() == after
+
+
+def test_a_resumed_session_asks_what_an_uninterrupted_one_would_have(log: Path, tmp_path: Path) -> None:
+    with open_session(scripted_strategy(9), tmp_path / "whole.mcap") as session:
+        whole = run(session, 6)
+    with open_session(scripted_strategy(9), log, resume=True) as session:
+        first = run(session, 4)
+    with open_session(scripted_strategy(9), log, resume=True) as session:
+        assert first + run(session, 2) == whole
+    assert [event.kind for event in read_session(log).events] == ["resume"]
+    assert len(read_session(log).table) == 6
+
+
+def test_a_session_with_a_device_goes_on_with_the_log(log: Path) -> None:
+    with open_session(scripted_strategy(6), log) as session:
+        run(session, 4)
+    result = resume(log, ScriptedDevice(simulated=False), scripted_strategy(6), clock=VirtualClock()).run()
+    assert len(result.trials) == 6
+
+
+def test_a_log_is_never_overwritten_and_a_used_strategy_is_refused(log: Path) -> None:
+    with open_session(scripted_strategy(3), log) as session:
+        run(session, 1)
+    with pytest.raises(LogError, match="never overwritten"):
+        open_session(scripted_strategy(3), log)
+    with pytest.raises(StrategyError, match="not this session's"):
+        open_session(session.strategy, log.with_name("t.mcap"))
+
+
+def test_what_ends_the_loop_is_logged_and_the_log_is_closed(log: Path) -> None:
+    def loop() -> None:
+        with open_session(scripted_strategy(3), log) as session:
+            session.ask()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        loop()
+    record = read_session(log)
+    assert record.finished
+    assert record.events[-1].text.startswith("ZeroDivisionError")
+    assert len(record.unknown) == 1
+
+
+VICTIM = """
+import sys, time
+sys.path.insert(0, {tests!r})
+from scripted import scripted_strategy
+from isiw.session.recorder import open_session
+
+session = open_session(scripted_strategy(9), {log!r})
+for _ in range(3):
+    isi_ms = session.ask()
+    session.tell(isi_ms, 0.01 + isi_ms / 1e4)
+session.note("before the end")
+session.ask()
+print("hanging", flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+def test_a_killed_loop_loses_nothing(log: Path) -> None:
+    script = VICTIM.format(tests=str(Path(__file__).parents[1]), log=str(log))
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as victim:  # noqa: S603
+        assert known(victim.stdout).readline() == "hanging\n"
+        victim.send_signal(signal.SIGKILL)
+    with open_session(scripted_strategy(9), log, resume=True) as session:
+        assert [trial.told for trial in session.trials] == [True, True, True, False]
+        assert len(told_to(session.strategy)) == 3
+    assert [event.kind for event in read_session(log).events] == ["note", "resume"]

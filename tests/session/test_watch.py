@@ -1,0 +1,137 @@
+"""Bad data pause a session, and are told as bad."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from isiw.design import DesignSpace
+from isiw.devices.limits import Limits
+from isiw.log.reader import read_session
+from isiw.plots.session import session_figure
+from isiw.report import final_statement, progress_row
+from isiw.session.loop import Session
+from isiw.session.resume import resume
+from isiw.session.watch import Watch
+from isiw.signals import SignalLimits
+from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.strategy import Strategy
+from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Trial
+from scripted import ScriptedDevice, scripted_strategy
+from wrong_rigs import NAMED, SPACE, WRONG, rig
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return tmp_path / "s.mcap"
+
+
+def strategy_for_rigs(max_trials: int = 20) -> Strategy:
+    return make_strategy("default", SPACE, max_trials=max_trials, particles=200)
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_each_wrong_rig_is_named_within_four_trials_and_ends_in_no_finding(wrong: str, log: Path) -> None:
+    rows: list[tuple[str, ...]] = []
+    session = Session(
+        rig(wrong), strategy_for_rigs(), log=log, on_trial=lambda update: rows.append(progress_row(update))
+    )
+    result = session.run()
+    assert len(result.trials) <= 4
+    assert not result.decision.stop
+    assert NAMED[wrong] in result.decision.reason
+    record = read_session(log)
+    statement = final_statement(record)
+    assert statement.startswith("Nothing was measured")
+    assert NAMED[wrong] in statement
+    assert "The tap enhances" not in statement
+    assert "No window" not in statement
+    assert record.events[-1].kind == "pause"
+    assert {row[4] for row in rows} == {"–"}
+    assert session_figure(record).axes[0].get_title(loc="left").startswith("Too little was measured")
+
+
+def test_a_right_rig_runs_to_its_end(log: Path) -> None:
+    result = Session(rig(), strategy_for_rigs(8), log=log).run()
+    assert result.decision.stop
+    assert read_session(log).events == ()
+
+
+def tense(stimulus: Stimulus) -> Measurement:
+    return Measurement(0.1, stimulus.isi_ms, background_rms_uv=2900.0)
+
+
+def test_three_mistrials_in_a_row_pause_the_session_and_resuming_gives_three_more(log: Path) -> None:
+    result = Session(ScriptedDevice(tense), scripted_strategy(20), log=log).run()
+    assert len(result.trials) == 3
+    assert result.decision.reason.startswith("The session is paused: 3 trials in a row were rejected")
+    assert "isiw resume" in final_statement(read_session(log))
+    assert len(resume(log, ScriptedDevice(tense), scripted_strategy(20)).run().trials) == 6
+    relaxed = resume(log, ScriptedDevice(), scripted_strategy(20)).run()
+    assert relaxed.decision.reason == "The budget of 20 stimuli is used up."
+
+
+def test_how_many_mistrials_pause_a_session_is_a_limit(log: Path, space: DesignSpace) -> None:
+    limits = Limits.of_space(space, max_consecutive_mistrials=5)
+    assert len(Session(ScriptedDevice(tense), scripted_strategy(20), log=log, limits=limits).run().trials) == 5
+
+
+def test_mistrials_that_use_up_the_budget_are_no_finding(log: Path, space: DesignSpace) -> None:
+    limits = Limits.of_space(space, max_consecutive_mistrials=20)
+    Session(ScriptedDevice(tense), scripted_strategy(20), log=log, limits=limits).run()
+    statement = final_statement(read_session(log))
+    assert statement.startswith(
+        "Nothing was measured: 20 of 20 trials were rejected (20 background activity; background EMG 2.9 mV RMS)."
+    )
+    assert "enhances" not in statement
+
+
+def test_two_trials_are_too_few_to_speak_of_a_window(log: Path) -> None:
+    Session(ScriptedDevice(), scripted_strategy(2), log=log).run()
+    assert final_statement(read_session(log)).startswith("Too little was measured to speak of a window: 2 of 2 trials")
+
+
+def test_an_isi_whose_trial_was_lost_is_asked_again_twice_and_then_another(log: Path, space: DesignSpace) -> None:
+    device = ScriptedDevice(tense)
+    limits = Limits.of_space(space, max_consecutive_mistrials=20)
+    Session(device, scripted_strategy(9), log=log, limits=limits).run()
+    asked = [stimulus.isi_ms for stimulus in device.delivered]
+    assert [len(set(asked[k : k + 3])) for k in (0, 3, 6)] == [1, 1, 1]
+    assert len(set(asked)) == 3
+    assert [event.trial for event in read_session(log).events if event.kind == "fallback"] == [3, 4, 5, 6, 7, 8]
+
+
+def test_a_resumed_session_has_lost_as_many_trials_as_before(log: Path) -> None:
+    Session(ScriptedDevice(tense), scripted_strategy(20), log=log).run()
+    device = ScriptedDevice(tense)
+    resume(log, device, scripted_strategy(20)).run()
+    assert device.delivered[0].isi_ms != read_session(log).table[2].commanded_isi_ms
+
+
+def test_volts_are_no_trials(log: Path) -> None:
+    result = Session(ScriptedDevice(lambda s: Measurement(2e-5, s.isi_ms)), scripted_strategy(20), log=log).run()
+    assert {trial.reason for trial in result.trials} == {MistrialReason.IMPLAUSIBLE}
+    assert "Is it in V?" in result.decision.reason
+
+
+def test_microvolts_pause_a_session_once(log: Path) -> None:
+    device = ScriptedDevice(lambda s: Measurement(8.0 + s.trial, s.isi_ms))
+    result = Session(device, scripted_strategy(9), log=log).run()
+    assert len(result.trials) == 3
+    assert "Are they in µV?" in result.decision.reason
+    assert resume(log, device, scripted_strategy(9)).run().decision.stop
+
+
+def early(isi_ms: float, commanded_ms: float) -> Trial:
+    return Trial(0, Status.MISTRIAL, commanded_ms, MistrialReason.TMS_BEFORE_IMPACT, isi_ms=isi_ms)
+
+
+@pytest.mark.parametrize(("isi_ms", "commanded_ms", "paused"), [(-2.0, 1.0, False), (-147.0, 20.0, True)])
+def test_a_pulse_that_is_early_within_the_tolerance_is_nobodys_fault(
+    isi_ms: float, commanded_ms: float, *, paused: bool
+) -> None:
+    watch = Watch(SPACE, SignalLimits(), max_in_a_row=3)
+    for _ in range(3):
+        watch = watch.after(early(isi_ms, commanded_ms), Measurement(0.02, isi_ms))
+    assert (watch.reason is not None) is paused

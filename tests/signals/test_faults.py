@@ -1,0 +1,50 @@
+"""What is wrong with a rig is named from a single sweep, and a right one is not accused."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+
+from isiw.devices.simulated import SimulatedDevice
+from isiw.signals import judge
+from isiw.signals.faults import Fault, likely_fault, remedy_for
+from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
+from known import instance
+from wrong_rigs import NAMED, SPACE, WRONG, rig
+
+ISIS_MS = (40.0, 150.0, 300.0)
+
+
+def faults_of(device: SimulatedDevice, isis_ms: Sequence[float | None] = ISIS_MS) -> list[Fault | None]:
+    device.stage()
+    stimuli = [Stimulus(trial, isi_ms) for trial, isi_ms in enumerate(isis_ms)]
+    sweeps = [instance(Sweep, device.deliver(stimulus, 1.0)) for stimulus in stimuli]
+    return [likely_fault(sweep, judge(sweep, stimulus, SPACE)) for sweep, stimulus in zip(sweeps, stimuli, strict=True)]
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_wrong_rig_is_named_from_each_sweep(wrong: str, seed: int) -> None:
+    assert all(NAMED[wrong] in str(fault) for fault in faults_of(rig(wrong, seed)))
+
+
+@pytest.mark.parametrize("accelerometer", [True, False])
+def test_a_right_rig_is_not_accused(*, accelerometer: bool) -> None:
+    assert faults_of(rig(seed=3, accelerometer=accelerometer), (*ISIS_MS, None)) == [None] * 4
+
+
+def test_a_wrong_rate_shows_where_no_impact_is_measured() -> None:
+    device = rig("wrong rate", accelerometer=False)
+    assert all("sampling rate" in str(fault) for fault in faults_of(device, (None,)))
+
+
+def test_every_reason_of_a_mistrial_has_a_remedy() -> None:
+    assert all(remedy_for(reason).endswith(".") for reason in MistrialReason)
+
+
+def test_a_mistrial_without_a_sign_is_told_by_its_reason_and_figure() -> None:
+    trial = Trial(0, Status.MISTRIAL, 40.0, MistrialReason.ISI_OFF, isi_ms=90.0)
+    fault = likely_fault(Measurement(0.1, 90.0), trial)
+    assert fault is not None
+    assert fault.what == "the realised ISI was 90 ms, not the commanded 40 ms"

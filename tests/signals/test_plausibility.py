@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import pytest
+
+from isiw.design import IMPACT_SPACE, DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.signals.plausibility import DoubtKind, doubt_of, implausible_amplitude, require_plausible
+
+
+@pytest.mark.parametrize("mep_mv", [0.0, 0.0005, 0.008, 0.3, 12.0, 25.0])
+def test_what_muscles_give_is_plausible(mep_mv: float) -> None:
+    assert implausible_amplitude(mep_mv) is None
+    assert require_plausible(100.0, mep_mv, 104.0, IMPACT_SPACE) is None
+
+
+@pytest.mark.parametrize(
+    ("isi_ms", "mep_mv", "slip"),
+    [
+        (100.0, 8e-6, "Is it in V"),
+        (100.0, 60.0, "Is it in µV"),
+        (100.0, 1e12, "Is it in µV"),
+        (0.1, 0.02, "in seconds"),
+        (0.02, 100.0, "swapped"),
+        (None, 1e-5, "Is it in V"),
+    ],
+)
+def test_a_slip_is_refused_and_named(isi_ms: float | None, mep_mv: float, slip: str) -> None:
+    with pytest.raises(InvalidValueError, match=slip):
+        require_plausible(isi_ms, mep_mv, 100.0, IMPACT_SPACE)
+
+
+def test_an_isi_far_from_the_one_asked_is_a_doubt(space: DesignSpace) -> None:
+    doubt = require_plausible(180.0, 0.02, 100.0, space)
+    assert doubt is not None
+    assert doubt.kind is DoubtKind.ISI_OFF
+    assert "180 ms is far from the 100 ms" in doubt.text
+
+
+@pytest.mark.parametrize(
+    ("meps_mv", "kind"),
+    [
+        ([0.02, 0.05, 0.05, 0.05, 0.05], DoubtKind.EQUAL),
+        ([0.0005, 0.0004, 0.0003], DoubtKind.SMALL),
+        ([8.0, 6.0, 12.0], DoubtKind.LARGE),
+        ([0.008, 0.01, 0.1, 8.0, 11.0, 9.0], DoubtKind.JUMP),
+    ],
+)
+def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv: list[float], kind: DoubtKind) -> None:
+    doubt = doubt_of(meps_mv)
+    assert doubt is not None
+    assert doubt.kind is kind
+    assert doubt_of(meps_mv[:-1]) is None
+
+
+@pytest.mark.parametrize(
+    "meps_mv",
+    [
+        [],
+        [0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.05, 0.05, 0.05],
+        [0.008, 0.01, 0.009, 1.5, 0.9, 1.2],
+        [0.0027, 0.0008, 0.002],
+        [0.08, 5.0, 2.0, 0.1],
+    ],
+)
+def test_usual_amplitudes_are_not_doubted(meps_mv: list[float]) -> None:
+    assert doubt_of(meps_mv) is None
