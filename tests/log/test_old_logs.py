@@ -14,6 +14,7 @@ import isiw
 from isiw.errors import OtherVersionsWarning
 from isiw.plots import save_session_plot
 from isiw.report import final_statement
+from isiw.session.resume import strategy_of
 from isiw.trials import MistrialReason
 
 FOLDER = Path(__file__).parents[1] / "data" / "logs"
@@ -106,3 +107,18 @@ def test_the_recorded_waveforms_are_there() -> None:
     record = isiw.read_session(FOLDER / "e31d040-waveforms.mcap")
     assert set(record.sweep(0)) == {"emg", "acceleration", "pressure", "valve"}
     assert record.sweep(0)["emg"].values.size == 1000
+
+
+def test_settings_that_this_version_does_not_know_are_as_by_default_and_named() -> None:
+    header = isiw.read_session(FOLDER / "06ce820-default.mcap").header
+    recipe = header.strategy.model_copy(update={"settings": {"max_trials": 7, "prior": {"hand_boost": [3.0, 0.2]}}})
+    with pytest.warns(OtherVersionsWarning, match="not known any more.*: prior"):
+        strategy = strategy_of(header.model_copy(update={"strategy": recipe}))
+    assert strategy.recipe.settings["max_trials"] == 7
+
+
+def test_settings_by_their_earlier_name_are_kept() -> None:
+    header = isiw.read_session(FOLDER / "06ce820-default.mcap").header
+    recipe = header.strategy.model_copy(update={"name": "gp-ei", "settings": {"zero_below_mv": 0.004}})
+    strategy = strategy_of(header.model_copy(update={"strategy": recipe}))
+    assert strategy.recipe.settings["threshold_mv"] == 0.004

@@ -8,27 +8,38 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any, Final
 
 from isiw.checks import whole
 from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, HasMemory
-from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, OtherVersionsWarning, StrategyError
+from isiw.errors import (
+    ConfigError,
+    DamagedLogError,
+    DeviceError,
+    InvalidValueError,
+    OtherVersionsWarning,
+    StrategyError,
+)
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import salvage
-from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Event, Header, Intent
+from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Event, Header, Intent, StrategyRecipe
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session, SessionUpdate, learn, versions
 from isiw.session.safeguards import Safeguards
-from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.catalogue import make_strategy, settings_for
 from isiw.strategy.strategy import Strategy
 from isiw.texts import plain
 from isiw.trials import Stimulus, Trial, TrialTable
 
-__all__ = ["Replayed", "exclude", "replay", "resume"]
+__all__ = ["Replayed", "exclude", "replay", "resume", "strategy_of"]
 
 _COMPARED_AT_EACH_END = 50
+
+_RENAMED: Final = {"zero_below_mv": "threshold_mv"}
+"""Settings by the names that earlier versions logged them under."""
 
 
 def resume(  # noqa: PLR0913 - all but three are keyword-only
@@ -81,7 +92,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     header = record.header
     _require_as_real(device, header)
     record = _with_lost_pulses(record, lost_pulses)
-    replayed = replay(record, strategy.restarted() if strategy else _strategy_of(header), verify=verify)
+    replayed = replay(record, strategy.restarted() if strategy else strategy_of(header), verify=verify)
     if replayed.differing:
         warnings.warn(_differing_text(replayed, header), OtherVersionsWarning, stacklevel=2)
     if isinstance(device, HasMemory):
@@ -243,14 +254,43 @@ def _require_as_real(device: Device, header: Header) -> None:
         )
 
 
-def _strategy_of(header: Header) -> Strategy:
+def strategy_of(header: Header) -> Strategy:
+    """The strategy of a logged session, before its first trial.
+
+    Args:
+        header: of the log.
+
+    Raises:
+        StrategyError: it was built from a user's own objects.
+
+    Warns:
+        OtherVersionsWarning: it has settings of an earlier version that this one does not know.
+    """
     recipe = header.strategy
     if not recipe.name:
         raise StrategyError(
             "the session's strategy was built from a user's own objects, which no log can hold",
             remedy="Build the same strategy again and hand it over: isiw.resume(path, device, strategy).",
         )
-    return make_strategy(recipe.name, space=header.space, seed=recipe.seed, **recipe.settings)
+    settings = recipe.settings
+    if header.schema_version < SCHEMA_VERSION:
+        settings = _known_settings(recipe)
+    return make_strategy(recipe.name, space=header.space, seed=recipe.seed, **settings)
+
+
+def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
+    """The settings of an earlier version that this one knows; a warning names the others."""
+    known = {}
+    for key, value in recipe.settings.items():
+        try:
+            settings_for(recipe.name, **{_RENAMED.get(key, key): value})
+        except (ConfigError, StrategyError, InvalidValueError):
+            continue
+        known[_RENAMED.get(key, key)] = value
+    if unknown := sorted(key for key in recipe.settings if _RENAMED.get(key, key) not in known):
+        text = f"Settings of an earlier version are not known any more, and are as by default: {', '.join(unknown)}."
+        warnings.warn(text, OtherVersionsWarning, stacklevel=3)
+    return known
 
 
 def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
