@@ -164,14 +164,14 @@ def test_a_log_of_other_software_has_no_configuration(tmp_path: Path, config: di
     "limits",
     [{"min_iti_s": True}, {"max_pulses": "5"}, {"max_pulses": 5.0}, {"max_block_pulses": True}, {"period_s": "60"}],
 )
-def test_limits_of_another_kind_are_refused(tmp_path, limits) -> None:
+def test_limits_of_another_kind_are_refused(tmp_path: Path, limits: dict[str, Any]) -> None:
     file = tmp_path / "session.toml"
     file.write_text(tomli_w.dumps({"limits": limits}))
     with pytest.raises(ConfigError, match=next(iter(limits))):
         load_config(file)
 
 
-def test_every_limit_of_a_configuration_is_the_sessions(tmp_path) -> None:
+def test_every_limit_of_a_configuration_is_the_sessions(tmp_path: Path) -> None:
     wanted = {"min_iti_s": 6, "max_pulses": 30, "max_block_pulses": 12, "rest_s": 90.0, "max_period_pulses": 40}
     file = tmp_path / "session.toml"
     file.write_text(tomli_w.dumps({"log": str(tmp_path / "s.mcap"), "limits": wanted}))

@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from isiw.design import DesignSpace
 from isiw.devices.dry_run import DryRun
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Readiness
@@ -9,10 +12,11 @@ from isiw.errors import LimitExceededError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.testing import check_device
+from scripted import ScriptedDevice, scripted_strategy
 
 
-def test_a_rehearsal_arms_and_fires_nothing(scripted_strategy, scripted_device, tmp_path) -> None:
-    device = scripted_device(simulated=False)
+def test_a_rehearsal_arms_and_fires_nothing(tmp_path: Path) -> None:
+    device = ScriptedDevice(simulated=False)
     result = Session(DryRun(device), scripted_strategy(4), log=tmp_path / "s.mcap").run()
     assert device.delivered == []
     assert device.calls == []
@@ -20,9 +24,11 @@ def test_a_rehearsal_arms_and_fires_nothing(scripted_strategy, scripted_device, 
     assert read_session(tmp_path / "s.mcap").header.device.name == "dry run of scripted"
 
 
-def test_a_rehearsal_keeps_the_limits_on_what_the_device_reports(scripted_strategy, scripted_device, tmp_path) -> None:
-    device = scripted_device(simulated=False)
-    device.readiness = lambda: Readiness(coil_c=50.0)
+def test_a_rehearsal_keeps_the_limits_on_what_the_device_reports(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    device = ScriptedDevice(simulated=False)
+    monkeypatch.setattr(device, "readiness", lambda: Readiness(coil_c=50.0), raising=False)
     session = Session(
         DryRun(device), scripted_strategy(4), log=tmp_path / "s.mcap", limits=Limits(0, 200, max_coil_c=40.0)
     )
@@ -30,5 +36,5 @@ def test_a_rehearsal_keeps_the_limits_on_what_the_device_reports(scripted_strate
         session.run()
 
 
-def test_a_rehearsal_is_a_device(scripted_device, space) -> None:
-    check_device(lambda: DryRun(scripted_device(simulated=False)), space)
+def test_a_rehearsal_is_a_device(space: DesignSpace) -> None:
+    check_device(lambda: DryRun(ScriptedDevice(simulated=False)), space)

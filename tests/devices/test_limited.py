@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import threading
-from typing import Never
+from typing import Any, Never, cast
 
 import pytest
 
@@ -11,22 +11,23 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Readiness
 from isiw.errors import DeviceError, LimitExceededError, NotDelivered
 from isiw.trials import Measurement, Stimulus
+from scripted import ScriptedDevice
 
 LIMITS = Limits(low_ms=0, high_ms=200, min_iti_s=5.0, max_pulses=3)
 
 
 @pytest.fixture
-def clock():
+def clock() -> VirtualClock:
     return VirtualClock()
 
 
 @pytest.fixture
-def inner(scripted_device):
-    return scripted_device()
+def inner() -> ScriptedDevice:
+    return ScriptedDevice()
 
 
 @pytest.fixture
-def limited(inner, clock):
+def limited(inner: ScriptedDevice, clock: VirtualClock) -> LimitedDevice:
     device = LimitedDevice(inner, LIMITS, clock)
     device.stage()
     clock.sleep_s(device.wait_s())
@@ -34,7 +35,9 @@ def limited(inner, clock):
 
 
 @pytest.mark.parametrize("isi_ms", [-0.001, 200.001, 1e9])
-def test_an_isi_beyond_the_range_is_refused_before_anything_is_delivered(limited, inner, isi_ms) -> None:
+def test_an_isi_beyond_the_range_is_refused_before_anything_is_delivered(
+    limited: LimitedDevice, inner: ScriptedDevice, isi_ms: float | None
+) -> None:
     with pytest.raises(LimitExceededError, match="beyond the limits"):
         limited.deliver(Stimulus(0, isi_ms), 1.0)
     assert inner.delivered == []
@@ -42,12 +45,16 @@ def test_an_isi_beyond_the_range_is_refused_before_anything_is_delivered(limited
 
 
 @pytest.mark.parametrize("isi_ms", [0.0, 200.0, None])
-def test_the_ends_of_the_range_and_tms_alone_are_allowed(limited, inner, isi_ms) -> None:
+def test_the_ends_of_the_range_and_tms_alone_are_allowed(
+    limited: LimitedDevice, inner: ScriptedDevice, isi_ms: float | None
+) -> None:
     limited.deliver(Stimulus(0, isi_ms), 1.0)
     assert inner.delivered == [Stimulus(0, isi_ms)]
 
 
-def test_a_stimulus_before_the_interval_is_over_is_refused(limited, inner, clock) -> None:
+def test_a_stimulus_before_the_interval_is_over_is_refused(
+    limited: LimitedDevice, inner: ScriptedDevice, clock: VirtualClock
+) -> None:
     limited.deliver(Stimulus(0, 10), 1.0)
     clock.sleep_s(4.999)
     with pytest.raises(LimitExceededError, match="too early"):
@@ -58,8 +65,8 @@ def test_a_stimulus_before_the_interval_is_over_is_refused(limited, inner, clock
     assert len(inner.delivered) == 2
 
 
-def test_the_interval_runs_from_the_end_of_the_last_attempt(inner, clock) -> None:
-    def slow(stimulus) -> Never:
+def test_the_interval_runs_from_the_end_of_the_last_attempt(inner: ScriptedDevice, clock: VirtualClock) -> None:
+    def slow(stimulus: Stimulus) -> Never:
         del stimulus
         clock.sleep_s(3.0)
         raise DeviceError("no answer")
@@ -73,8 +80,8 @@ def test_the_interval_runs_from_the_end_of_the_last_attempt(inner, clock) -> Non
     assert limited.wait_s() == 5.0
 
 
-def test_a_delivery_that_fails_counts_as_delivered(limited, inner) -> None:
-    def failing(stimulus) -> Never:
+def test_a_delivery_that_fails_counts_as_delivered(limited: LimitedDevice, inner: ScriptedDevice) -> None:
+    def failing(stimulus: Stimulus) -> Never:
         raise RuntimeError(stimulus)
 
     inner.answer = failing
@@ -83,7 +90,9 @@ def test_a_delivery_that_fails_counts_as_delivered(limited, inner) -> None:
     assert limited.pulses_left == 2
 
 
-def test_no_pulse_beyond_the_largest_number_is_delivered(limited, inner, clock) -> None:
+def test_no_pulse_beyond_the_largest_number_is_delivered(
+    limited: LimitedDevice, inner: ScriptedDevice, clock: VirtualClock
+) -> None:
     for trial in range(3):
         limited.deliver(Stimulus(trial, 10), 1.0)
         clock.sleep_s(5.0)
@@ -93,7 +102,7 @@ def test_no_pulse_beyond_the_largest_number_is_delivered(limited, inner, clock) 
     assert len(inner.delivered) == 3
 
 
-def test_pulses_of_an_earlier_run_count(inner, clock) -> None:
+def test_pulses_of_an_earlier_run_count(inner: ScriptedDevice, clock: VirtualClock) -> None:
     limited = LimitedDevice(inner, LIMITS, clock, delivered=3)
     limited.stage()
     with pytest.raises(LimitExceededError, match="limit of 3 pulses"):
@@ -102,11 +111,11 @@ def test_pulses_of_an_earlier_run_count(inner, clock) -> None:
 
 
 @pytest.mark.parametrize("delivered", [0, 1])
-def test_the_first_stimulus_waits_a_whole_interval(inner, clock, delivered) -> None:
+def test_the_first_stimulus_waits_a_whole_interval(inner: ScriptedDevice, clock: VirtualClock, delivered: int) -> None:
     assert LimitedDevice(inner, LIMITS, clock, delivered=delivered).wait_s() == LIMITS.min_iti_s
 
 
-def test_nothing_is_delivered_unless_staged(inner, clock) -> None:
+def test_nothing_is_delivered_unless_staged(inner: ScriptedDevice, clock: VirtualClock) -> None:
     limited = LimitedDevice(inner, LIMITS, clock)
     with pytest.raises(DeviceError, match="not staged"):
         limited.deliver(Stimulus(0, 10), 1.0)
@@ -118,11 +127,13 @@ def test_nothing_is_delivered_unless_staged(inner, clock) -> None:
     assert limited.pulses_left == 3
 
 
-def test_a_device_that_fails_to_stage_stays_disarmed(inner, clock) -> None:
+def test_a_device_that_fails_to_stage_stays_disarmed(
+    inner: ScriptedDevice, clock: VirtualClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def broken() -> Never:
         raise DeviceError("no power")
 
-    inner.stage = broken
+    monkeypatch.setattr(inner, "stage", broken)
     limited = LimitedDevice(inner, LIMITS, clock)
     with pytest.raises(DeviceError, match="no power"):
         limited.stage()
@@ -131,8 +142,10 @@ def test_a_device_that_fails_to_stage_stays_disarmed(inner, clock) -> None:
 
 
 @pytest.mark.parametrize("error", [NotDelivered("no charge"), LimitExceededError("the device's own limit")])
-def test_what_was_refused_before_firing_does_not_count(limited, inner, error) -> None:
-    def refusing(stimulus) -> Never:
+def test_what_was_refused_before_firing_does_not_count(
+    limited: LimitedDevice, inner: ScriptedDevice, error: DeviceError
+) -> None:
+    def refusing(stimulus: Stimulus) -> Never:
         del stimulus
         raise error
 
@@ -143,25 +156,25 @@ def test_what_was_refused_before_firing_does_not_count(limited, inner, error) ->
     assert limited.wait_s() == 0.0
 
 
-def test_earlier_stimuli_count_for_the_block_and_the_period(inner, clock) -> None:
+def test_earlier_stimuli_count_for_the_block_and_the_period(inner: ScriptedDevice, clock: VirtualClock) -> None:
     limits = Limits(0, 200, 5.0, max_block_pulses=3, rest_s=60.0, max_period_pulses=4, period_s=1000.0)
     assert LimitedDevice(inner, limits, clock, earlier_s=(10.0, 15.0, 20.0)).wait_s() == 50.0
     assert LimitedDevice(inner, limits, clock, earlier_s=(100.0, 200.0, 300.0, 400.0)).wait_s() == 600.0
 
 
-def test_of_two_threads_only_one_delivers_at_a_time(scripted_device) -> None:
+def test_of_two_threads_only_one_delivers_at_a_time() -> None:
     together = threading.Barrier(2)
 
-    def answer(stimulus):
+    def answer(stimulus: Stimulus) -> Measurement:
         return Measurement(0.1, stimulus.isi_ms)
 
-    inner = scripted_device(answer)
+    inner = ScriptedDevice(answer)
     limited = LimitedDevice(inner, Limits(0, 200, 0.05, 1000), MonotonicClock())
     limited.stage()
     limited._clock.sleep_s(limited.wait_s())  # noqa: SLF001 - the interval before the first one
-    refused = []
+    refused: list[LimitExceededError] = []
 
-    def deliver(number) -> None:
+    def deliver(number: int) -> None:
         together.wait()
         try:
             limited.deliver(Stimulus(number, 10), 1.0)
@@ -181,10 +194,10 @@ def test_of_two_threads_only_one_delivers_at_a_time(scripted_device) -> None:
     assert all("too early" in str(error) for error in refused)
 
 
-def test_a_limit_cannot_be_loosened_while_the_device_is_in_use(limited, inner) -> None:
+def test_a_limit_cannot_be_loosened_while_the_device_is_in_use(limited: LimitedDevice, inner: ScriptedDevice) -> None:
     loose = Limits(0, 1000, 0.0, 1000)
     with pytest.raises(AttributeError):
-        limited.limits = loose
+        limited.limits = loose  # type: ignore[misc]  # which is what is tested
     mine = Limits(0, 200, 5.0, 3)
     device = LimitedDevice(inner, mine, VirtualClock())
     object.__setattr__(mine, "high_ms", 1000.0)
@@ -204,7 +217,9 @@ class Claiming(float):
         return True
 
 
-def test_a_number_that_pretends_to_be_within_the_limits_is_refused(limited, inner) -> None:
+def test_a_number_that_pretends_to_be_within_the_limits_is_refused(
+    limited: LimitedDevice, inner: ScriptedDevice
+) -> None:
     stimulus = Stimulus(0, Claiming(5000.0))
     assert type(stimulus.isi_ms) is float
     with pytest.raises(LimitExceededError, match="beyond the limits"):
@@ -215,17 +230,19 @@ def test_a_number_that_pretends_to_be_within_the_limits_is_refused(limited, inne
 class Reporting:
     """A device that reports its state, wrapped around another."""
 
-    def __init__(self, inner, state) -> None:
+    def __init__(self, inner: ScriptedDevice, state: Readiness) -> None:
         self._inner, self.state = inner, state
 
-    def __getattr__(self, name):
+    def __getattr__(self, name: str) -> Any:
         return getattr(self._inner, name)
 
     def readiness(self) -> Readiness:
         return self.state
 
 
-def reporting(inner, clock, state, **limits):
+def reporting(
+    inner: ScriptedDevice, clock: VirtualClock, state: Readiness, **limits: Any
+) -> tuple[Reporting, LimitedDevice]:
     device = Reporting(inner, state)
     limited = LimitedDevice(device, Limits(0, 200, 5.0, 9, **limits), clock)
     limited.stage()
@@ -233,7 +250,9 @@ def reporting(inner, clock, state, **limits):
     return device, limited
 
 
-def test_a_device_that_is_not_ready_delivers_nothing_and_may_be_tried_again(inner, clock) -> None:
+def test_a_device_that_is_not_ready_delivers_nothing_and_may_be_tried_again(
+    inner: ScriptedDevice, clock: VirtualClock
+) -> None:
     device, limited = reporting(inner, clock, Readiness(ready=False, reason="charging"))
     with pytest.raises(NotDelivered, match="charging"):
         limited.deliver(Stimulus(0, 10), 1.0)
@@ -243,7 +262,7 @@ def test_a_device_that_is_not_ready_delivers_nothing_and_may_be_tried_again(inne
     assert len(inner.delivered) == 1
 
 
-def test_a_hot_coil_delivers_nothing(inner, clock) -> None:
+def test_a_hot_coil_delivers_nothing(inner: ScriptedDevice, clock: VirtualClock) -> None:
     device, limited = reporting(inner, clock, Readiness(coil_c=39.0), max_coil_c=40.0)
     limited.check(Stimulus(0, 10))
     device.state = Readiness(coil_c=41.0)
@@ -252,7 +271,9 @@ def test_a_hot_coil_delivers_nothing(inner, clock) -> None:
     assert inner.delivered == []
 
 
-def test_the_intensity_at_staging_is_locked_also_when_it_is_staged_again(inner, clock) -> None:
+def test_the_intensity_at_staging_is_locked_also_when_it_is_staged_again(
+    inner: ScriptedDevice, clock: VirtualClock
+) -> None:
     device, limited = reporting(inner, clock, Readiness(intensity_pct_mso=55.0))
     device.state = Readiness(intensity_pct_mso=60.0)
     limited.stop()
@@ -263,8 +284,10 @@ def test_the_intensity_at_staging_is_locked_also_when_it_is_staged_again(inner, 
 
 
 @pytest.mark.parametrize("held", [False, None, 1, "yes"])
-def test_without_the_dead_mans_switch_nothing_is_delivered(inner, clock, held) -> None:
-    limited = LimitedDevice(inner, LIMITS, clock, dead_man=lambda: held)
+def test_without_the_dead_mans_switch_nothing_is_delivered(
+    inner: ScriptedDevice, clock: VirtualClock, held: object
+) -> None:
+    limited = LimitedDevice(inner, LIMITS, clock, dead_man=lambda: cast("bool", held))
     limited.stage()
     clock.sleep_s(limited.wait_s())
     with pytest.raises(LimitExceededError, match="dead man"):
@@ -272,6 +295,6 @@ def test_without_the_dead_mans_switch_nothing_is_delivered(inner, clock, held) -
     assert inner.delivered == []
 
 
-def test_a_virtual_clock_is_for_simulated_devices_only(scripted_device) -> None:
+def test_a_virtual_clock_is_for_simulated_devices_only() -> None:
     with pytest.raises(DeviceError, match="simulated=True"):
-        LimitedDevice(scripted_device(simulated=False), LIMITS, VirtualClock())
+        LimitedDevice(ScriptedDevice(simulated=False), LIMITS, VirtualClock())

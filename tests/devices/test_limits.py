@@ -61,7 +61,7 @@ def test_limits_of_another_kind_are_refused(values) -> None:
 
 
 @pytest.mark.parametrize("isi_ms", [10.0, 12.5, 200.0])
-def test_isis_on_the_grid_are_allowed(isi_ms) -> None:
+def test_isis_on_the_grid_are_allowed(isi_ms: float) -> None:
     Limits(10.0, 200.0, step_ms=2.5).require_isi(isi_ms)
 
 
@@ -72,7 +72,7 @@ def test_many_steps_of_a_rounded_length_stay_on_the_grid() -> None:
 
 
 @pytest.mark.parametrize("isi_ms", [11.0, 12.4999, 199.0])
-def test_an_isi_off_the_grid_is_refused(isi_ms) -> None:
+def test_an_isi_off_the_grid_is_refused(isi_ms: float) -> None:
     with pytest.raises(LimitExceededError, match="not on the grid"):
         Limits(10.0, 200.0, step_ms=2.5).require_isi(isi_ms)
 
@@ -97,13 +97,13 @@ def test_no_period_holds_more_stimuli_than_its_limit() -> None:
 
 
 @pytest.mark.parametrize("coil_c", [None, 40.1, 99.0])
-def test_a_coil_that_is_hot_or_not_measured_is_refused(coil_c) -> None:
+def test_a_coil_that_is_hot_or_not_measured_is_refused(coil_c: float | None) -> None:
     with pytest.raises(LimitExceededError, match="coil"):
         Limits(0, 200, max_coil_c=40.0).require_state(Readiness(coil_c=coil_c))
 
 
 @pytest.mark.parametrize("intensity", [None, 54.9, 56.0])
-def test_another_or_an_unknown_intensity_is_refused(intensity) -> None:
+def test_another_or_an_unknown_intensity_is_refused(intensity: float | None) -> None:
     with pytest.raises(LimitExceededError, match="intensity"):
         Limits(0, 200, intensity_pct_mso=55.0).require_state(Readiness(intensity_pct_mso=intensity))
 

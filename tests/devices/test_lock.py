@@ -8,35 +8,37 @@ import pytest
 from isiw.devices.lock import driven
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError
+from known import known
+from scripted import ScriptedDevice
 
 PLAIN = DeviceInfo("rig", "valve")
 PORT = DeviceInfo("rig", "valve", address="port of this test")
 
 
-def test_one_device_is_driven_once_at_a_time(scripted_device) -> None:
-    device = scripted_device()
+def test_one_device_is_driven_once_at_a_time() -> None:
+    device = ScriptedDevice()
     with driven(device, PLAIN):
         with pytest.raises(DeviceError, match="driven by another session"), driven(device, PLAIN):
             pass
-        with driven(scripted_device(), PLAIN):
+        with driven(ScriptedDevice(), PLAIN):
             pass
     with driven(device, PLAIN):
         pass
 
 
-def test_a_device_is_free_again_after_an_error(scripted_device) -> None:
-    device = scripted_device()
+def test_a_device_is_free_again_after_an_error() -> None:
+    device = ScriptedDevice()
     with pytest.raises(ZeroDivisionError), driven(device, PORT):
         raise ZeroDivisionError
     with driven(device, PORT):
         pass
 
 
-def test_two_objects_of_one_address_are_one_device(scripted_device) -> None:
+def test_two_objects_of_one_address_are_one_device() -> None:
     with (
-        driven(scripted_device(), PORT),
+        driven(ScriptedDevice(), PORT),
         pytest.raises(DeviceError, match="rig at port of this test"),
-        driven(scripted_device(), PORT),
+        driven(ScriptedDevice(), PORT),
     ):
         pass
 
@@ -51,14 +53,14 @@ with driven(object(), DeviceInfo("rig", "valve", address="port of this test")):
 """
 
 
-def test_an_address_is_driven_by_one_process(scripted_device) -> None:
+def test_an_address_is_driven_by_one_process() -> None:
     with subprocess.Popen(  # noqa: S603
         [sys.executable, "-c", HOLDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as holder:
-        assert holder.stdout.readline() == "held\n"
-        with pytest.raises(DeviceError, match="driven by another session"), driven(scripted_device(), PORT):
+        assert known(holder.stdout).readline() == "held\n"
+        with pytest.raises(DeviceError, match="driven by another session"), driven(ScriptedDevice(), PORT):
             pass
         holder.kill()  # as a crash would: what it held is free again
         holder.wait()
-        with driven(scripted_device(), PORT):
+        with driven(ScriptedDevice(), PORT):
             pass

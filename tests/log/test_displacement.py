@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Never
 
@@ -14,66 +15,71 @@ from isiw.errors import LogError
 from isiw.log.durable import DurableFile
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
+from isiw.log.schema import Header
 from isiw.log.writer import LogWriter
+from known import known
+from log.written import write_trials
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows does not let an open file be moved or deleted")
 
 
-def delete(part) -> None:
+def delete(part: Path) -> None:
     part.unlink()
 
 
-def move(part) -> None:
+def move(part: Path) -> None:
     part.rename(part.with_name("elsewhere"))
 
 
-def delete_folder(part) -> None:
+def delete_folder(part: Path) -> None:
     shutil.rmtree(part.parent)
 
 
-def move_folder(part) -> None:
+def move_folder(part: Path) -> None:
     part.parent.rename(part.parent.with_name("elsewhere"))
 
 
-def replace(part) -> None:
+def replace(part: Path) -> None:
     content = part.read_bytes()
     part.unlink()
     part.write_bytes(content)
 
 
-def truncate(part) -> None:
+def truncate(part: Path) -> None:
     os.truncate(part, part.stat().st_size // 2)
 
 
-def lengthen(part) -> None:
+def lengthen(part: Path) -> None:
     with part.open("ab") as file:
         file.write(b"more")
 
 
 @pytest.fixture
-def path(tmp_path):
+def path(tmp_path: Path) -> Path:
     return tmp_path / "folder" / "s.mcap"
 
 
 @pytest.fixture
-def log(path, header, writes):
+def log(path: Path, header: Header) -> LogWriter:
     log = LogWriter.create(path, header)
-    writes(log, range(5))
+    write_trials(log, range(5))
     return log
 
 
 def kept(error: LogError) -> Path:
     """The copy that an error's message names."""
-    return Path(error.remedy.removeprefix("What the session still held of it is in ").removesuffix("."))
+    return Path(known(error.remedy).removeprefix("What the session still held of it is in ").removesuffix("."))
 
 
-def test_a_log_in_its_place_is_accepted(log) -> None:
+def test_a_log_in_its_place_is_accepted(log: LogWriter) -> None:
     log.require_in_place()
     log.close()
 
 
 @pytest.mark.parametrize("happen", [delete, move, delete_folder, move_folder, replace, truncate, lengthen])
-def test_a_log_that_is_not_as_it_was_written_is_an_error(log, path, happen) -> None:
+def test_a_log_that_is_not_as_it_was_written_is_an_error(
+    log: LogWriter, path: Path, happen: Callable[[Path], None]
+) -> None:
     happen(path.with_name("s.mcap.part"))
     with pytest.raises(LogError, match="no longer as it was written"):
         log.require_in_place()
@@ -82,7 +88,9 @@ def test_a_log_that_is_not_as_it_was_written_is_an_error(log, path, happen) -> N
 
 
 @pytest.mark.parametrize("happen", [delete, move, delete_folder, move_folder, replace, lengthen])
-def test_all_that_the_open_file_holds_is_saved_and_the_message_says_where(log, path, happen) -> None:
+def test_all_that_the_open_file_holds_is_saved_and_the_message_says_where(
+    log: LogWriter, path: Path, happen: Callable[[Path], None]
+) -> None:
     happen(path.with_name("s.mcap.part"))
     with pytest.raises(LogError) as caught:
         log.close()
@@ -90,16 +98,16 @@ def test_all_that_the_open_file_holds_is_saved_and_the_message_says_where(log, p
     assert len(read_session(kept(caught.value)).table) == 5
 
 
-def test_a_log_that_was_shortened_before_more_was_written_is_an_error(log, path, writes) -> None:
+def test_a_log_that_was_shortened_before_more_was_written_is_an_error(log: LogWriter, path: Path) -> None:
     truncate(path.with_name("s.mcap.part"))
-    writes(log, [5])
+    write_trials(log, [5])
     with pytest.raises(LogError, match="bytes instead of"):
         log.require_in_place()
     with pytest.raises(LogError, match="bytes instead of"):
         log.close()
 
 
-def test_a_copy_replaces_no_other_copy(log, path) -> None:
+def test_a_copy_replaces_no_other_copy(log: LogWriter, path: Path) -> None:
     path.with_name("s.rescued.mcap").write_bytes(b"precious")
     delete(path.with_name("s.mcap.part"))
     with pytest.raises(LogError) as caught:
@@ -109,7 +117,7 @@ def test_a_copy_replaces_no_other_copy(log, path) -> None:
 
 
 def test_where_the_folder_cannot_be_made_again_the_copy_is_among_the_temporary_files(
-    log, path, tmp_path, monkeypatch
+    log: LogWriter, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     delete_folder(path.with_name("s.mcap.part"))
     path.parent.write_text("a file in the folder's place")
@@ -122,11 +130,13 @@ def test_where_the_folder_cannot_be_made_again_the_copy_is_among_the_temporary_f
     assert len(read_session(kept(caught.value)).table) == 5
 
 
-def no_rename(path, target) -> Never:
+def no_rename(path: Path, target: Path) -> Never:
     raise OSError(errno.EACCES, os.strerror(errno.EACCES), path, target)
 
 
-def test_a_log_that_cannot_be_renamed_says_where_it_is(log, path, monkeypatch) -> None:
+def test_a_log_that_cannot_be_renamed_says_where_it_is(
+    log: LogWriter, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(Path, "replace", no_rename)
     with pytest.raises(LogError, match=r"cannot be given its name.*s\.mcap\.part"):
         log.close()
@@ -134,7 +144,9 @@ def test_a_log_that_cannot_be_renamed_says_where_it_is(log, path, monkeypatch) -
     assert len(read_session(path).table) == 5
 
 
-def test_a_log_that_cannot_go_on_for_its_name_stays_as_it_was(finished_log, header, monkeypatch) -> None:
+def test_a_log_that_cannot_go_on_for_its_name_stays_as_it_was(
+    finished_log: Path, header: Header, monkeypatch: pytest.MonkeyPatch
+) -> None:
     before = finished_log.read_bytes()
     with monkeypatch.context() as patched:
         patched.setattr(Path, "replace", no_rename)
@@ -144,20 +156,20 @@ def test_a_log_that_cannot_go_on_for_its_name_stays_as_it_was(finished_log, head
     assert list(finished_log.parent.iterdir()) == [finished_log]
 
 
-def test_a_discarded_log_leaves_nothing_and_can_be_made_again(log, path, header) -> None:
+def test_a_discarded_log_leaves_nothing_and_can_be_made_again(log: LogWriter, path: Path, header: Header) -> None:
     log.discard()
     assert list(path.parent.iterdir()) == []
     LogWriter.create(path, header).close()
 
 
-def test_a_log_is_closed_once(log, path) -> None:
+def test_a_log_is_closed_once(log: LogWriter, path: Path) -> None:
     log.close()
     path.unlink()
     log.close()
     assert not path.exists()
 
 
-def test_the_size_of_a_file_that_is_being_written_is_its_own(tmp_path) -> None:
+def test_the_size_of_a_file_that_is_being_written_is_its_own(tmp_path: Path) -> None:
     file = DurableFile(tmp_path / "file")
     file.write(b"some")
     file.sync()

@@ -15,16 +15,17 @@ from isiw.errors import LogError
 from isiw.log.durable import take_free_place
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event
+from isiw.log.schema import Event, Header
 from isiw.log.writer import LogWriter
 from isiw.session.resume import exclude
+from log.written import write_trials
 
 
 @pytest.fixture
-def another(tmp_path: Path, header: Any, writes: Any) -> Any:
+def another(tmp_path: Path, header: Header) -> Any:
     """The bytes of another person's finished log."""
     with LogWriter.create(tmp_path / "elsewhere" / "s.mcap", header.model_copy(update={"subject": "P02"})) as log:
-        writes(log, range(3))
+        write_trials(log, range(3))
     content = (tmp_path / "elsewhere" / "s.mcap").read_bytes()
     shutil.rmtree(tmp_path / "elsewhere")
     return content

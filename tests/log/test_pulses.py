@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Container
+from pathlib import Path
 
 import pytest
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.pulses import earlier_pulses_s, pulses_s
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Intent
+from isiw.log.schema import Event, Header, Intent
 from isiw.log.writer import LogWriter
 
 HOUR_S = 3600.0
 
 
-def make_log(path, header, intents=3, refused=()):
+def make_log(path: Path, header: Header, intents: int = 3, refused: Container[int] = ()) -> Path:
     with LogWriter.create(path, header) as log:
         for trial in range(intents):
             log.append(Intent(trial=trial, isi_ms=50.0))
@@ -25,18 +27,18 @@ def make_log(path, header, intents=3, refused=()):
     return path
 
 
-def earlier(folder, subject="P07"):
+def earlier(folder: Path, subject: str = "P07") -> list[float]:
     return earlier_pulses_s(folder, subject, HOUR_S, but=folder / "mine.mcap")
 
 
-def test_every_intent_counts_by_its_time_unless_it_was_refused(tmp_path, header) -> None:
+def test_every_intent_counts_by_its_time_unless_it_was_refused(tmp_path: Path, header: Header) -> None:
     found = salvage(make_log(tmp_path / "a.mcap", header, intents=3, refused=[1]))
     times_ns = [message.log_time_ns for message in found.messages if message.topic == "/intent"]
     now_ns = times_ns[-1] + 10_000_000_000
     assert pulses_s(found, now_ns) == [(now_ns - times_ns[0]) / 1e9, 10.0]
 
 
-def test_the_subjects_logs_of_a_folder_count_and_no_others(tmp_path, header) -> None:
+def test_the_subjects_logs_of_a_folder_count_and_no_others(tmp_path: Path, header: Header) -> None:
     make_log(tmp_path / "a.mcap", header, intents=3)
     make_log(tmp_path / "b.mcap", header, intents=2)
     make_log(tmp_path / "other.mcap", header.model_copy(update={"subject": "P08"}))
@@ -49,24 +51,24 @@ def test_the_subjects_logs_of_a_folder_count_and_no_others(tmp_path, header) -> 
     assert len(earlier(tmp_path, "P08")) == 3
 
 
-def test_a_session_that_never_closed_its_log_counts(tmp_path, header) -> None:
+def test_a_session_that_never_closed_its_log_counts(tmp_path: Path, header: Header) -> None:
     make_log(tmp_path / "a.mcap", header).rename(tmp_path / "a.mcap.part")
     assert len(earlier(tmp_path)) == 3
 
 
-def test_what_is_older_than_the_period_is_not_even_read(tmp_path, header) -> None:
+def test_what_is_older_than_the_period_is_not_even_read(tmp_path: Path, header: Header) -> None:
     old = make_log(tmp_path / "a.mcap", header)
     old.write_bytes(b"no log any more")
     os.utime(old, (0, 0))
     assert earlier(tmp_path) == []
 
 
-def test_a_log_that_cannot_be_read_is_an_error_as_nobody_knows_what_it_holds(tmp_path) -> None:
+def test_a_log_that_cannot_be_read_is_an_error_as_nobody_knows_what_it_holds(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").write_bytes(b"no log")
     with pytest.raises(DamagedLogError):
         earlier(tmp_path)
 
 
-def test_a_folder_that_is_not_there_is_an_error(tmp_path) -> None:
+def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="no such folder"):
         earlier(tmp_path / "nowhere")

@@ -13,6 +13,7 @@ from isiw.log.salvage import current_file, salvage
 from isiw.log.schema import Header, Intent, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel, Status, Trial
+from log.written import write_trials
 
 
 def sample(below: int, size: int) -> list[int]:
@@ -213,9 +214,9 @@ def test_blocks_that_changed_places_are_read_in_their_order_and_reported(broken_
     assert any("out of order" in loss for loss in record.losses)
 
 
-def test_a_second_record_of_a_trial_is_left_out_and_reported(tmp_path: Path, header: Any, writes: Any) -> None:
+def test_a_second_record_of_a_trial_is_left_out_and_reported(tmp_path: Path, header: Header) -> None:
     with LogWriter.create(tmp_path / "s.mcap", header) as log:
-        writes(log, [0, 1])
+        write_trials(log, [0, 1])
         log.append(Trial(1, Status.ACCEPTED, 5.0, isi_ms=5.0, mep_mv=9.0))
     record = read_session(tmp_path / "s.mcap")
     assert [trial.mep_mv for trial in record.table] == [0.0, 0.01]

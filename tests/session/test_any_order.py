@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any, TypeAlias
 
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from conftest import SPACE, ScriptedDevice, make_scripted_strategy
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, NotDelivered
 from isiw.log.reader import read_session
-from isiw.session.loop import Session
+from isiw.session.loop import Session, SessionUpdate
 from isiw.session.resume import exclude, resume
 from isiw.session.safeguards import Safeguards
 from isiw.testing import Fired, check_ledger
-from isiw.trials import Measurement
+from isiw.trials import Measurement, Stimulus
+from known import known
+from scripted import SPACE, ScriptedDevice, scripted_strategy
+
+Fire: TypeAlias = Callable[[Stimulus], Measurement]
+Answers: TypeAlias = Callable[[Stimulus, Fire], Measurement]
 
 TRIALS = 40
 LIMITS = Limits.of_space(SPACE, max_pulses=TRIALS)
@@ -43,32 +49,34 @@ class SessionsInAnyOrder(RuleBasedStateMachine):
     def teardown(self) -> None:
         shutil.rmtree(self.folder)
 
-    def go_on(self, answer, *, pause_at=None, on_pause=None) -> None:
+    def go_on(
+        self, answer: Answers, *, pause_at: int | None = None, on_pause: Callable[[str], bool] | None = None
+    ) -> None:
         """Run or resume with a device that answers so, until something ends it."""
 
-        def fire(stimulus):
+        def fire(stimulus: Stimulus) -> Measurement:
             # What is fired has its intent on disk already.
             last = read_session(self.log).intents[-1]
             assert (last.trial, last.isi_ms) == (stimulus.trial, stimulus.isi_ms)
             self.ledger.append(Fired(stimulus.trial, stimulus.isi_ms, self.clock.now_s()))
-            return Measurement(0.01 + stimulus.isi_ms / 1e4, stimulus.isi_ms)
+            return Measurement(0.01 + known(stimulus.isi_ms) / 1e4, stimulus.isi_ms)
 
-        def on_trial(update) -> None:
+        def on_trial(update: SessionUpdate) -> None:
             if update.trial.index == pause_at:
                 session.pause("a break")
 
         device = ScriptedDevice(lambda stimulus: answer(stimulus, fire))
-        settings = {
+        arguments: dict[str, Any] = {
             "clock": self.clock,
             "limits": LIMITS,
             "on_trial": on_trial,
             "safeguards": Safeguards(retries=1, on_pause=on_pause),
         }
-        strategy = make_scripted_strategy(TRIALS)
+        strategy = scripted_strategy(TRIALS)
         if self.log.exists() or self.log.with_name("s.mcap.part").exists():
-            session = resume(self.log, device, strategy, **settings)
+            session = resume(self.log, device, strategy, **arguments)
         else:
-            session = Session(device, strategy, log=self.log, **settings)
+            session = Session(device, strategy, log=self.log, **arguments)
         with suppress(DeviceError, KilledError):
             session.run()
         assert device.calls[-2:] == ["stop", "unstage"]
@@ -79,16 +87,16 @@ class SessionsInAnyOrder(RuleBasedStateMachine):
         return len(read_session(self.log).table) if any(path.exists() for path in known) else 0
 
     @rule(trials=st.integers(1, 4))
-    def deliver(self, trials) -> None:
+    def deliver(self, trials: int) -> None:
         """Deliver some trials, then pause where nobody is there to go on."""
         self.go_on(lambda stimulus, fire: fire(stimulus), pause_at=self.next_trial + trials - 1)
 
     @rule(trials=st.integers(1, 3))
-    def pause_and_go_on(self, trials) -> None:
+    def pause_and_go_on(self, trials: int) -> None:
         """Pause, go on where the operator says so, and fail later."""
         first = self.next_trial
 
-        def answer(stimulus, fire):
+        def answer(stimulus: Stimulus, fire: Fire) -> Measurement:
             if stimulus.trial == first + trials + 1:
                 raise DeviceError("unplugged")
             return fire(stimulus)
@@ -96,11 +104,11 @@ class SessionsInAnyOrder(RuleBasedStateMachine):
         self.go_on(answer, pause_at=first + trials - 1, on_pause=lambda _: True)
 
     @rule(fired=st.booleans(), trials=st.integers(0, 3))
-    def fault(self, fired, trials) -> None:
+    def fault(self, *, fired: bool, trials: int) -> None:
         """Fail before or after firing; the outcome is unknown."""
         last = self.next_trial + trials
 
-        def answer(stimulus, fire):
+        def answer(stimulus: Stimulus, fire: Fire) -> Measurement:
             if stimulus.trial == last:
                 if fired:
                     fire(stimulus)
@@ -110,11 +118,11 @@ class SessionsInAnyOrder(RuleBasedStateMachine):
         self.go_on(answer)
 
     @rule(refusals=st.integers(1, 3), trials=st.integers(0, 2))
-    def refuse(self, refusals, trials) -> None:
+    def refuse(self, refusals: int, trials: int) -> None:
         """Refuse before firing: once is tried again, twice ends the session."""
         at, left = self.next_trial + trials, [refusals]
 
-        def answer(stimulus, fire):
+        def answer(stimulus: Stimulus, fire: Fire) -> Measurement:
             if stimulus.trial == at and left[0]:
                 left[0] -= 1
                 raise NotDelivered("charging")
@@ -125,11 +133,11 @@ class SessionsInAnyOrder(RuleBasedStateMachine):
         self.go_on(answer)
 
     @rule(fired=st.booleans(), trials=st.integers(0, 3))
-    def kill(self, fired, trials) -> None:
+    def kill(self, *, fired: bool, trials: int) -> None:
         """End the process in the middle of a delivery: only what was synced is left."""
         last, part, kept = self.next_trial + trials, self.log.with_name("s.mcap.part"), self.folder / "kept"
 
-        def answer(stimulus, fire):
+        def answer(stimulus: Stimulus, fire: Fire) -> Measurement:
             if stimulus.trial == last:
                 if fired:
                     fire(stimulus)
@@ -144,7 +152,7 @@ class SessionsInAnyOrder(RuleBasedStateMachine):
 
     @precondition(lambda self: self.next_trial > 0)
     @rule(data=st.data())
-    def exclude(self, data) -> None:
+    def exclude(self, data: st.DataObject) -> None:
         """Exclude a trial that counts."""
         told = [trial.index for trial in read_session(self.log).table.told]
         if told:
@@ -163,7 +171,7 @@ class SessionsInAnyOrder(RuleBasedStateMachine):
     @invariant()
     def every_ask_is_the_same_again(self) -> None:
         if self.next_trial:
-            resume(self.log, ScriptedDevice(), make_scripted_strategy(TRIALS))  # raises where it asks differently
+            resume(self.log, ScriptedDevice(), scripted_strategy(TRIALS))  # raises where it asks differently
 
 
 TestSessionsInAnyOrder = SessionsInAnyOrder.TestCase

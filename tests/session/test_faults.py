@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Never
 
@@ -21,43 +22,43 @@ from isiw.session.lastresort import STILL_ARMED
 from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.safeguards import Safeguards
-from isiw.trials import Channel, Measurement, MistrialReason, Sweep
+from isiw.trials import Channel, Measurement, MistrialReason, Stimulus, Sweep
+from known import known
+from scripted import ScriptedDevice, scripted_strategy, told_to
 
 TESTS = Path(__file__).parents[1]
 
 
 @pytest.fixture
-def log(tmp_path):
+def log(tmp_path: Path) -> Path:
     return tmp_path / "s.mcap"
 
 
 @pytest.fixture
-def released():
+def released() -> Iterator[threading.Event]:
     """What hangs, hangs until this is set, at the end of the test."""
     event = threading.Event()
     yield event
     event.set()
 
 
-def refusing(refusals, error=None):
+def refusing(refusals: int, error: Exception | None = None) -> Callable[[Stimulus], Measurement]:
     """Answers after so many refusals of each trial."""
-    left = {}
+    left: dict[int, int] = {}
 
-    def answer(stimulus):
+    def answer(stimulus: Stimulus) -> Measurement:
         left[stimulus.trial] = left.get(stimulus.trial, refusals) - 1
         if left[stimulus.trial] >= 0:
             raise error or NotDelivered("the stimulator is charging")
-        return Measurement(0.01 + stimulus.isi_ms / 1e4, stimulus.isi_ms)
+        return Measurement(0.01 + known(stimulus.isi_ms) / 1e4, stimulus.isi_ms)
 
     return answer
 
 
-def test_what_the_device_refused_before_firing_is_tried_again_and_does_not_count(
-    scripted_strategy, scripted_device, log, tmp_path
-) -> None:
-    undisturbed = Session(scripted_device(), scripted_strategy(4), log=tmp_path / "undisturbed.mcap").run()
+def test_what_the_device_refused_before_firing_is_tried_again_and_does_not_count(log: Path, tmp_path: Path) -> None:
+    undisturbed = Session(ScriptedDevice(), scripted_strategy(4), log=tmp_path / "undisturbed.mcap").run()
     limits = Limits(0, 200, 5.0, max_pulses=4)
-    result = Session(scripted_device(refusing(2)), scripted_strategy(4), log=log, limits=limits).run()
+    result = Session(ScriptedDevice(refusing(2)), scripted_strategy(4), log=log, limits=limits).run()
     assert result.trials == undisturbed.trials
     record = read_session(log)
     assert [event.kind for event in record.events] == ["refused"] * 8
@@ -66,60 +67,56 @@ def test_what_the_device_refused_before_firing_is_tried_again_and_does_not_count
     assert record.unknown == ()
 
 
-def test_each_retry_waits_twice_as_long(scripted_strategy, scripted_device, log) -> None:
+def test_each_retry_waits_twice_as_long(log: Path) -> None:
     guards = Safeguards(retries=3, backoff_s=2.0)
-    Session(scripted_device(refusing(3)), scripted_strategy(1), log=log, safeguards=guards).run()
+    Session(ScriptedDevice(refusing(3)), scripted_strategy(1), log=log, safeguards=guards).run()
     assert [intent.t_s for intent in read_session(log).intents] == [5.0, 7.0, 11.0, 19.0]
 
 
-def test_a_device_that_goes_on_refusing_ends_the_session_and_it_can_be_resumed(
-    scripted_strategy, scripted_device, log
-) -> None:
+def test_a_device_that_goes_on_refusing_ends_the_session_and_it_can_be_resumed(log: Path) -> None:
     with pytest.raises(NotDelivered, match="charging"):
-        Session(scripted_device(refusing(99)), scripted_strategy(4), log=log).run()
+        Session(ScriptedDevice(refusing(99)), scripted_strategy(4), log=log).run()
     record = read_session(log)
     assert len(record.intents) == 4
     assert record.unknown == ()
     assert len(record.table) == 0
     assert pulses_s(salvage(log)) == []
-    resumed = resume(log, scripted_device(), scripted_strategy(4)).run()
+    resumed = resume(log, ScriptedDevice(), scripted_strategy(4)).run()
     assert [trial.told for trial in resumed.trials] == [True] * 4
 
 
 def test_a_device_that_cannot_be_staged_is_stopped_and_leaves_no_log_in_the_way(
-    scripted_strategy, scripted_device, log
+    log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    device = scripted_device()
+    device = ScriptedDevice()
 
     def stage() -> Never:
         raise DeviceError("no air pressure")
 
-    device.stage = stage
+    monkeypatch.setattr(device, "stage", stage)
     with pytest.raises(DeviceError, match="no air pressure"):
         Session(device, scripted_strategy(), log=log).run()
     assert device.calls == ["stop", "unstage"]
     assert list(log.parent.iterdir()) == []
-    assert len(Session(scripted_device(), scripted_strategy(3), log=log).run().trials) == 3
+    assert len(Session(ScriptedDevice(), scripted_strategy(3), log=log).run().trials) == 3
 
 
-def test_a_resumption_that_cannot_be_staged_leaves_its_log(scripted_strategy, scripted_device, log) -> None:
+def test_a_resumption_that_cannot_be_staged_leaves_its_log(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(NotDelivered):
-        Session(scripted_device(refusing(99)), scripted_strategy(4), log=log).run()
-    device = scripted_device()
+        Session(ScriptedDevice(refusing(99)), scripted_strategy(4), log=log).run()
+    device = ScriptedDevice()
 
     def stage() -> Never:
         raise DeviceError("no air pressure")
 
-    device.stage = stage
+    monkeypatch.setattr(device, "stage", stage)
     with pytest.raises(DeviceError, match="no air pressure"):
         resume(log, device, scripted_strategy(4)).run()
     assert "no air pressure" in read_session(log).events[-1].text
 
 
-def test_a_delivery_past_its_deadline_ends_the_session_disarmed(
-    scripted_strategy, scripted_device, log, released
-) -> None:
-    device = scripted_device(lambda stimulus: released.wait(60) and Measurement(0.1, stimulus.isi_ms))
+def test_a_delivery_past_its_deadline_ends_the_session_disarmed(log: Path, released: threading.Event) -> None:
+    device = ScriptedDevice(lambda stimulus: released.wait(60) and Measurement(0.1, stimulus.isi_ms))
     guards = Safeguards(deadlines=Deadlines(stop_s=0.2))
     with pytest.raises(DeviceTimeoutError, match="deliver took too long"):
         Session(device, scripted_strategy(), log=log, timeout_s=0.05, safeguards=guards).run()
@@ -130,15 +127,15 @@ def test_a_delivery_past_its_deadline_ends_the_session_disarmed(
 
 
 def test_an_answer_past_its_deadline_is_logged_as_late_with_its_waveforms_and_not_told(
-    scripted_strategy, scripted_device, log, released
+    log: Path, released: threading.Event, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def answer(stimulus):
+    def answer(stimulus: Stimulus) -> Sweep:
         released.wait(60)
         emg = Channel(np.zeros(300), 3000.0, "mV", -50.0)
-        return Sweep({"emg": emg}, t_valve_ms=-stimulus.isi_ms, t_tms_ms=0.0)
+        return Sweep({"emg": emg}, t_valve_ms=-known(stimulus.isi_ms), t_tms_ms=0.0)
 
-    device = scripted_device(answer)
-    device.stop = released.set
+    device = ScriptedDevice(answer)
+    monkeypatch.setattr(device, "stop", released.set)
     strategy = scripted_strategy()
     with pytest.raises(DeviceTimeoutError):
         Session(device, strategy, log=log, timeout_s=0.05).run()
@@ -146,16 +143,16 @@ def test_an_answer_past_its_deadline_is_logged_as_late_with_its_waveforms_and_no
     assert [(event.kind, event.trial) for event in record.events] == [("late", 0), ("fault", 0)]
     assert record.sweep(0)["emg"].values.shape == (300,)
     assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
-    assert strategy.posterior.told == ()
+    assert told_to(strategy) == ()
 
 
 def test_where_delivering_and_disarming_and_letting_go_fail_all_of_it_is_logged(
-    scripted_strategy, scripted_device, log
+    log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def answer(_) -> Never:
+    def answer(_: Stimulus) -> Never:
         raise DeviceError("coil too hot")
 
-    device = scripted_device(answer)
+    device = ScriptedDevice(answer)
     failures = [OSError("port busy")]
 
     def stop() -> None:
@@ -165,7 +162,8 @@ def test_where_delivering_and_disarming_and_letting_go_fail_all_of_it_is_logged(
     def unstage() -> Never:
         raise OSError("port gone")
 
-    device.stop, device.unstage = stop, unstage
+    monkeypatch.setattr(device, "stop", stop)
+    monkeypatch.setattr(device, "unstage", unstage)
     with pytest.raises(DeviceError, match="coil too hot") as caught:
         Session(device, scripted_strategy(), log=log).run()
     assert "port gone" in caught.value.__notes__[0]
@@ -183,12 +181,12 @@ class SpeechlessError(Exception):
 @pytest.mark.parametrize(
     "error", [SpeechlessError(), DeviceError("half a sign: \ud83d"), RuntimeError("\x00 " + "x" * 10**6)]
 )
-def test_a_fault_is_told_whatever_its_text(scripted_strategy, scripted_device, log, error) -> None:
-    def answer(_) -> Never:
+def test_a_fault_is_told_whatever_its_text(log: Path, error: BaseException) -> None:
+    def answer(_: Stimulus) -> Never:
         raise error
 
     with pytest.raises(type(error)):
-        Session(scripted_device(answer), scripted_strategy(), log=log).run()
+        Session(ScriptedDevice(answer), scripted_strategy(), log=log).run()
     record = read_session(log)
     assert record.losses == ()
     assert type(error).__name__ in record.events[-1].text
@@ -198,32 +196,30 @@ def test_a_fault_is_told_whatever_its_text(scripted_strategy, scripted_device, l
 @pytest.mark.parametrize(
     ("name", "unit"), [("left\ud800", "mV"), ("a\nb", "mV"), ("force", "N\udfff"), ("event", "mV")]
 )
-def test_a_channel_that_json_cannot_hold_is_an_error_and_the_log_stays_whole(
-    scripted_strategy, scripted_device, log, name, unit
-) -> None:
-    def answer(stimulus):
+def test_a_channel_that_json_cannot_hold_is_an_error_and_the_log_stays_whole(log: Path, name: str, unit: str) -> None:
+    def answer(stimulus: Stimulus) -> Sweep:
         channels = {"emg": Channel(np.zeros(300), 3000.0, "mV", -50.0), name: Channel(np.zeros(3), 100.0, unit)}
-        return Sweep(channels, t_valve_ms=-stimulus.isi_ms, t_tms_ms=0.0)
+        return Sweep(channels, t_valve_ms=-known(stimulus.isi_ms), t_tms_ms=0.0)
 
     with pytest.raises(InvalidValueError, match=r"cannot have this name|cannot be written as JSON"):
-        Session(scripted_device(answer), scripted_strategy(), log=log).run()
+        Session(ScriptedDevice(answer), scripted_strategy(), log=log).run()
     record = read_session(log)
     assert record.losses == ()
     assert record.finished
     assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
 
 
-def test_two_sessions_do_not_drive_one_device_at_once(scripted_strategy, scripted_device, tmp_path) -> None:
-    second = []
+def test_two_sessions_do_not_drive_one_device_at_once(tmp_path: Path) -> None:
+    second: list[int] = []
 
-    def answer(stimulus):
+    def answer(stimulus: Stimulus) -> Measurement:
         if stimulus.trial == 1:
             with pytest.raises(DeviceError, match="driven by another session"):
                 Session(device, scripted_strategy(3), log=tmp_path / "b.mcap").run()
             second.append(device.calls.count("stage"))
         return Measurement(0.1, stimulus.isi_ms)
 
-    device = scripted_device(answer)
+    device = ScriptedDevice(answer)
     assert len(Session(device, scripted_strategy(3), log=tmp_path / "a.mcap").run().trials) == 3
     assert second == [1]
     assert not list(tmp_path.glob("b.mcap*"))
@@ -232,7 +228,7 @@ def test_two_sessions_do_not_drive_one_device_at_once(scripted_strategy, scripte
 LOST = """
 import sys, threading
 sys.path.insert(0, {tests!r})
-from conftest import ScriptedDevice, make_scripted_strategy
+from scripted import ScriptedDevice, scripted_strategy
 from isiw.devices.deadlines import Deadlines
 from isiw.session.loop import Session
 from isiw.session.safeguards import Safeguards
@@ -244,14 +240,14 @@ def stop():
     raise OSError("port gone")
 device.stop = stop
 guards = Safeguards(deadlines=Deadlines(stop_s=0.3, stop_attempts=2))
-Session(device, make_scripted_strategy(3), log={log!r}, safeguards=guards).run()
+Session(device, scripted_strategy(3), log={log!r}, safeguards=guards).run()
 print("went on")
 """
 
 
 @pytest.mark.parametrize("how", ["hangs", "fails"])
 def test_where_a_device_cannot_be_disarmed_the_process_ends_with_the_reason_on_screen_and_in_the_log(
-    log, how, scripted_strategy, scripted_device
+    log: Path, how: str
 ) -> None:
     script = LOST.format(tests=str(TESTS), how=how, log=str(log))
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)  # noqa: S603
@@ -263,16 +259,16 @@ def test_where_a_device_cannot_be_disarmed_the_process_ends_with_the_reason_on_s
     assert record.losses == ()
     assert len(record.table) == 3
     assert "cannot be disarmed" in record.events[-1].text
-    assert resume(log, scripted_device(), scripted_strategy(3)).run().decision.stop
+    assert resume(log, ScriptedDevice(), scripted_strategy(3)).run().decision.stop
 
 
-def test_only_what_can_be_resumed_is_suggested_to_be_resumed(scripted_strategy, scripted_device, log) -> None:
+def test_only_what_can_be_resumed_is_suggested_to_be_resumed(log: Path) -> None:
     log.write_bytes(b"no log at all")
     with pytest.raises(LogError) as caught:
-        Session(scripted_device(), scripted_strategy(3), log=log).run()
-    assert "resume" not in caught.value.remedy
+        Session(ScriptedDevice(), scripted_strategy(3), log=log).run()
+    assert "resume" not in known(caught.value.remedy)
     log.unlink()
-    Session(scripted_device(), scripted_strategy(3), log=log).run()
+    Session(ScriptedDevice(), scripted_strategy(3), log=log).run()
     with pytest.raises(LogError, match=r"isiw\.resume"):
-        Session(scripted_device(), scripted_strategy(3), log=log).run()
-    resume(log, scripted_device(), scripted_strategy(3)).run()
+        Session(ScriptedDevice(), scripted_strategy(3), log=log).run()
+    resume(log, ScriptedDevice(), scripted_strategy(3)).run()

@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from isiw.errors import LogError
 from isiw.log.reader import read_session
-from isiw.session.loop import Session
+from isiw.session.loop import Session, SessionUpdate
 from isiw.session.resume import resume
-from isiw.trials import Measurement
+from isiw.trials import Measurement, Stimulus
+from scripted import ScriptedDevice, scripted_strategy
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows does not let an open file be moved or deleted")
 
 
 @pytest.fixture
-def log(tmp_path):
+def log(tmp_path: Path) -> Path:
     return tmp_path / "folder" / "s.mcap"
 
 
-HAPPENINGS = {
+HAPPENINGS: dict[str, Callable[[Path], object]] = {
     "deleted": lambda part: part.unlink(),
     "moved": lambda part: part.rename(part.with_name("elsewhere")),
     "its folder deleted": lambda part: shutil.rmtree(part.parent),
@@ -32,15 +35,13 @@ HAPPENINGS = {
 
 
 @pytest.mark.parametrize("happening", HAPPENINGS)
-def test_a_log_that_is_gone_stops_the_session_before_the_next_stimulus(
-    scripted_strategy, scripted_device, log, happening
-) -> None:
-    def answer(stimulus):
+def test_a_log_that_is_gone_stops_the_session_before_the_next_stimulus(log: Path, happening: str) -> None:
+    def answer(stimulus: Stimulus) -> Measurement:
         if stimulus.trial == 2:
             HAPPENINGS[happening](log.with_name("s.mcap.part"))
         return Measurement(0.1, stimulus.isi_ms)
 
-    device = scripted_device(answer)
+    device = ScriptedDevice(answer)
     with pytest.raises(LogError, match="no longer as it was written"):
         Session(device, scripted_strategy(9), log=log).run()
     assert len(device.delivered) == 3
@@ -48,30 +49,28 @@ def test_a_log_that_is_gone_stops_the_session_before_the_next_stimulus(
 
 
 @pytest.mark.parametrize("happening", ["deleted", "moved", "its folder deleted", "its folder moved"])
-def test_what_the_session_held_of_its_log_is_saved_and_can_be_resumed(
-    scripted_strategy, scripted_device, log, happening
-) -> None:
-    def answer(stimulus):
+def test_what_the_session_held_of_its_log_is_saved_and_can_be_resumed(log: Path, happening: str) -> None:
+    def answer(stimulus: Stimulus) -> Measurement:
         if stimulus.trial == 2:
             HAPPENINGS[happening](log.with_name("s.mcap.part"))
         return Measurement(0.1, stimulus.isi_ms)
 
     with pytest.raises(LogError, match=r"s\.rescued\.mcap"):
-        Session(scripted_device(answer), scripted_strategy(9), log=log).run()
+        Session(ScriptedDevice(answer), scripted_strategy(9), log=log).run()
     saved = log.with_name("s.rescued.mcap")
     record = read_session(saved)
     assert record.finished
     assert record.losses == ()
     assert len(record.table) == 3
     assert "LogError" in record.events[-1].text
-    assert len(resume(saved, scripted_device(), scripted_strategy(9)).run().trials) == 9
+    assert len(resume(saved, ScriptedDevice(), scripted_strategy(9)).run().trials) == 9
 
 
-def test_a_log_that_is_gone_after_the_last_stimulus_is_no_success(scripted_strategy, scripted_device, log) -> None:
-    def on_trial(update) -> None:
+def test_a_log_that_is_gone_after_the_last_stimulus_is_no_success(log: Path) -> None:
+    def on_trial(update: SessionUpdate) -> None:
         if update.decision.stop:
             log.with_name("s.mcap.part").unlink()
 
     with pytest.raises(LogError, match=r"s\.rescued\.mcap"):
-        Session(scripted_device(), scripted_strategy(3), log=log, on_trial=on_trial).run()
+        Session(ScriptedDevice(), scripted_strategy(3), log=log, on_trial=on_trial).run()
     assert len(read_session(log.with_name("s.rescued.mcap")).table) == 3

@@ -8,17 +8,21 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from isiw.log.reader import read_session
 from isiw.session.lastresort import INTERRUPTED
-from isiw.session.loop import Session
+from isiw.session.loop import Session, SessionUpdate
 from isiw.session.resume import resume
 from isiw.session.safeguards import Safeguards
-from isiw.trials import Measurement
+from isiw.trials import Measurement, Stimulus
+from known import known
+from scripted import ScriptedDevice, scripted_strategy
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 
@@ -27,23 +31,33 @@ HANG_S = 20.0  # what hangs is interrupted at once; where it is not, the test fa
 
 
 @pytest.fixture
-def log(tmp_path):
+def log(tmp_path: Path) -> Path:
     return tmp_path / "s.mcap"
 
 
 @pytest.fixture(autouse=True)
-def terminal():
+def terminal() -> Iterator[None]:
     """A terminal whose closing is heard, also where the tests themselves run under nohup."""
     before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
     yield
     signal.signal(signal.SIGHUP, before)
 
 
-def hanging_once(call, number, when):
+def goes_on_after(reasons: list[str]) -> Callable[[str], bool]:
+    """What goes on after every pause, and keeps the reasons."""
+
+    def on_pause(reason: str) -> bool:
+        reasons.append(reason)
+        return True
+
+    return on_pause
+
+
+def hanging_once(call: Callable[..., Any], number: signal.Signals, when: Callable[[], bool]) -> Callable[..., Any]:
     """Sends a signal and hangs, the first time that `when` holds."""
     state = {"left": 1}
 
-    def wrapped(*args, **kwargs):
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
         if state["left"] and when():
             state["left"] = 0
             signal.raise_signal(number)
@@ -54,8 +68,10 @@ def hanging_once(call, number, when):
     return wrapped
 
 
-def session_hanging_in(verb, number, scripted_strategy, scripted_device, log, on_pause=None):
-    device, strategy = scripted_device(), scripted_strategy(6)
+def session_hanging_in(
+    verb: str, number: signal.Signals, log: Path, on_pause: Callable[[str], bool] | None = None
+) -> tuple[ScriptedDevice, Session]:
+    device, strategy = ScriptedDevice(), scripted_strategy(6)
 
     def when() -> bool:
         return len(device.delivered) == 2
@@ -68,8 +84,8 @@ def session_hanging_in(verb, number, scripted_strategy, scripted_device, log, on
 
 @pytest.mark.parametrize("verb", ["ask", "tell", "estimate", "decision", "on_trial"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
-def test_a_signal_is_heard_while_nothing_is_in_flight(scripted_strategy, scripted_device, log, verb, number) -> None:
-    device, session = session_hanging_in(verb, number, scripted_strategy, scripted_device, log)
+def test_a_signal_is_heard_while_nothing_is_in_flight(log: Path, verb: str, number: signal.Signals) -> None:
+    device, session = session_hanging_in(verb, number, log)
     with pytest.raises(KeyboardInterrupt):
         session.run()
     assert "stop" in device.calls
@@ -77,21 +93,21 @@ def test_a_signal_is_heard_while_nothing_is_in_flight(scripted_strategy, scripte
     record = read_session(log)
     assert record.finished
     assert len(record.table) == 2
-    assert resume(log, scripted_device(), scripted_strategy(6)).run().decision.stop
+    assert resume(log, ScriptedDevice(), scripted_strategy(6)).run().decision.stop
 
 
 @pytest.mark.parametrize("verb", ["ask", "tell", "estimate", "decision", "on_trial"])
 def test_after_ctrl_c_a_session_goes_on_as_if_nothing_had_happened_where_the_operator_says_so(
-    scripted_strategy, scripted_device, log, tmp_path, verb
+    log: Path, tmp_path: Path, verb: str
 ) -> None:
-    undisturbed = Session(scripted_device(), scripted_strategy(6), log=tmp_path / "undisturbed.mcap").run()
-    disarmed_when_asked = []
+    undisturbed = Session(ScriptedDevice(), scripted_strategy(6), log=tmp_path / "undisturbed.mcap").run()
+    disarmed_when_asked: list[tuple[str, str]] = []
 
-    def on_pause(reason) -> bool:
+    def on_pause(reason: str) -> bool:
         disarmed_when_asked.append((reason, device.calls[-1]))
         return True
 
-    device, session = session_hanging_in(verb, signal.SIGINT, scripted_strategy, scripted_device, log, on_pause)
+    device, session = session_hanging_in(verb, signal.SIGINT, log, on_pause)
     result = session.run()
     assert disarmed_when_asked == [("Interrupted by the operator.", "stop")]
     assert device.calls.count("stage") == 2
@@ -101,14 +117,14 @@ def test_after_ctrl_c_a_session_goes_on_as_if_nothing_had_happened_where_the_ope
     assert len(record.estimates) == 6
 
 
-def test_a_second_ctrl_c_while_the_operator_is_asked_ends_the_session(scripted_strategy, scripted_device, log) -> None:
-    def on_pause(reason) -> bool:
+def test_a_second_ctrl_c_while_the_operator_is_asked_ends_the_session(log: Path) -> None:
+    def on_pause(reason: str) -> bool:
         del reason
         signal.raise_signal(signal.SIGINT)
         time.sleep(HANG_S)
         return True
 
-    device, session = session_hanging_in("ask", signal.SIGINT, scripted_strategy, scripted_device, log, on_pause)
+    device, session = session_hanging_in("ask", signal.SIGINT, log, on_pause)
     with pytest.raises(KeyboardInterrupt):
         session.run()
     assert len(device.delivered) == 2
@@ -117,23 +133,21 @@ def test_a_second_ctrl_c_while_the_operator_is_asked_ends_the_session(scripted_s
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGQUIT])
-def test_a_request_to_end_is_no_question(scripted_strategy, scripted_device, log, number) -> None:
-    asked = []
-    _, session = session_hanging_in("ask", number, scripted_strategy, scripted_device, log, asked.append)
+def test_a_request_to_end_is_no_question(log: Path, number: signal.Signals) -> None:
+    asked: list[str] = []
+    _, session = session_hanging_in("ask", number, log, goes_on_after(asked))
     with pytest.raises(KeyboardInterrupt):
         session.run()
     assert asked == []
 
 
-def test_a_ctrl_c_that_somebody_swallows_stops_the_session_all_the_same(
-    scripted_strategy, scripted_device, log
-) -> None:
-    def on_trial(update) -> None:
+def test_a_ctrl_c_that_somebody_swallows_stops_the_session_all_the_same(log: Path) -> None:
+    def on_trial(update: SessionUpdate) -> None:
         if update.trial.index == 2:
             with suppress(KeyboardInterrupt):
                 signal.raise_signal(signal.SIGINT)
 
-    device = scripted_device()
+    device = ScriptedDevice()
     with pytest.raises(KeyboardInterrupt):
         Session(device, scripted_strategy(6), log=log, on_trial=on_trial).run()
     assert len(device.delivered) == 3
@@ -141,18 +155,18 @@ def test_a_ctrl_c_that_somebody_swallows_stops_the_session_all_the_same(
 
 
 def test_ctrl_c_in_the_middle_of_a_delivery_disarms_at_once_and_loses_no_outcome(
-    scripted_strategy, scripted_device, log
+    log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stopped = threading.Event()
 
-    def answer(stimulus):
+    def answer(stimulus: Stimulus) -> Measurement:
         if stimulus.trial == 2:
             os.kill(os.getpid(), signal.SIGINT)
             assert stopped.wait(HANG_S)
         return Measurement(0.1, stimulus.isi_ms)
 
-    device = scripted_device(answer)
-    device.stop = stopped.set
+    device = ScriptedDevice(answer)
+    monkeypatch.setattr(device, "stop", stopped.set)
     with pytest.raises(KeyboardInterrupt):
         Session(device, scripted_strategy(6), log=log).run()
     record = read_session(log)
@@ -160,19 +174,17 @@ def test_ctrl_c_in_the_middle_of_a_delivery_disarms_at_once_and_loses_no_outcome
     assert len(device.delivered) == 3
 
 
-def test_a_pause_disarms_at_once_and_goes_on_armed_where_the_operator_says_so(
-    scripted_strategy, scripted_device, log, tmp_path
-) -> None:
-    undisturbed = Session(scripted_device(), scripted_strategy(6), log=tmp_path / "undisturbed.mcap").run()
-    calls_then = []
+def test_a_pause_disarms_at_once_and_goes_on_armed_where_the_operator_says_so(log: Path, tmp_path: Path) -> None:
+    undisturbed = Session(ScriptedDevice(), scripted_strategy(6), log=tmp_path / "undisturbed.mcap").run()
+    calls_then: list[list[str]] = []
 
-    def on_trial(update) -> None:
+    def on_trial(update: SessionUpdate) -> None:
         if update.trial.index == 2:
             session.pause("The subject needs a break.")
             calls_then.append(list(device.calls))
 
-    device, reasons = scripted_device(), []
-    guards = Safeguards(on_pause=lambda reason: reasons.append(reason) or True)
+    device, reasons = ScriptedDevice(), list[str]()
+    guards = Safeguards(on_pause=goes_on_after(reasons))
     session = Session(device, scripted_strategy(6), log=log, on_trial=on_trial, safeguards=guards)
     result = session.run()
     assert calls_then == [["stage", "stop"]]
@@ -181,27 +193,25 @@ def test_a_pause_disarms_at_once_and_goes_on_armed_where_the_operator_says_so(
     assert result.trials == undisturbed.trials
 
 
-def test_without_anybody_to_ask_a_pause_ends_the_session_and_it_can_be_resumed(
-    scripted_strategy, scripted_device, log
-) -> None:
-    def on_trial(update) -> None:
+def test_without_anybody_to_ask_a_pause_ends_the_session_and_it_can_be_resumed(log: Path) -> None:
+    def on_trial(update: SessionUpdate) -> None:
         if update.trial.index == 2:
             session.pause("Three mistrials in a row.")
 
-    session = Session(scripted_device(), scripted_strategy(6), log=log, on_trial=on_trial)
+    session = Session(ScriptedDevice(), scripted_strategy(6), log=log, on_trial=on_trial)
     result = session.run()
     assert result.decision.reason == "The session is paused: Three mistrials in a row."
     assert len(result.trials) == 3
-    assert len(resume(log, scripted_device(), scripted_strategy(6)).run().trials) == 6
+    assert len(resume(log, ScriptedDevice(), scripted_strategy(6)).run().trials) == 6
 
 
 VICTIM = """
 import hashlib, sys, threading, time
 sys.path.insert(0, {tests!r})
-from conftest import ScriptedDevice, make_scripted_strategy
+from scripted import ScriptedDevice, scripted_strategy
 from isiw.session.loop import Session
 
-device, strategy = ScriptedDevice(), make_scripted_strategy(10)
+device, strategy = ScriptedDevice(), scripted_strategy(10)
 device.stop = lambda: print("disarmed", flush=True)
 ask = strategy.ask
 def asked(*_):
@@ -215,40 +225,38 @@ Session(device, strategy, log={log!r}).run()
 BUSY_IN_C = 'hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)'
 
 
-def victim(log, hang):
+def victim(log: Path, hang: str) -> subprocess.Popen[str]:
     script = VICTIM.format(tests=str(TESTS), log=str(log), hang=hang)
     process = subprocess.Popen(  # noqa: S603
         [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    assert process.stdout.readline() == "hanging\n"
+    assert known(process.stdout).readline() == "hanging\n"
     return process
 
 
 def test_a_session_that_is_busy_outside_python_is_disarmed_by_the_first_signal_and_ended_by_the_second(
-    log, scripted_strategy, scripted_device
+    log: Path,
 ) -> None:
     with victim(log, BUSY_IN_C) as process:
         process.send_signal(signal.SIGINT)
-        assert process.stdout.readline() == "disarmed\n"
+        assert known(process.stdout).readline() == "disarmed\n"
         process.send_signal(signal.SIGINT)
         assert process.wait(300) == INTERRUPTED
-        assert "does not react" in process.stderr.read()
+        assert "does not react" in known(process.stderr).read()
     record = read_session(log)
     assert record.losses == ()
     assert len(record.table) == 3
     assert "does not react" in record.events[-1].text
-    assert len(resume(log, scripted_device(), scripted_strategy(10)).run().trials) == 10
+    assert len(resume(log, ScriptedDevice(), scripted_strategy(10)).run().trials) == 10
 
 
-def test_ctrl_z_disarms_before_it_suspends_and_a_continued_session_arms_for_nobody(
-    log, scripted_strategy, scripted_device
-) -> None:
+def test_ctrl_z_disarms_before_it_suspends_and_a_continued_session_arms_for_nobody(log: Path) -> None:
     with victim(log, "time.sleep(600)") as process:
         process.send_signal(signal.SIGTSTP)
         _, status = os.waitpid(process.pid, os.WUNTRACED)
         assert os.WIFSTOPPED(status)
-        assert process.stdout.readline() == "disarmed\n"
+        assert known(process.stdout).readline() == "disarmed\n"
         process.send_signal(signal.SIGCONT)
         assert process.wait(300) != 0
     assert len(read_session(log).table) == 3
-    assert len(resume(log, scripted_device(), scripted_strategy(10)).run().trials) == 10
+    assert len(resume(log, ScriptedDevice(), scripted_strategy(10)).run().trials) == 10

@@ -154,10 +154,6 @@ def put(path: Path, content: bytes, *, replacing: bool, through: Path | None = N
         raise
 
 
-def _exclusive(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_EXCL, 0o666)
-
-
 class DurableFile:
     """A new binary file that can be renamed while it is written.
 
@@ -171,8 +167,9 @@ class DurableFile:
     def __init__(self, path: Path) -> None:
         with disk_errors(path, "the log cannot be created", "Choose another path."):
             path.parent.mkdir(parents=True, exist_ok=True)
+            path.touch(exist_ok=False)
             # Appending, so that a file that is shortened behind our back stays shorter than what was written.
-            self._file: IO[bytes] = open(path, "a+b", opener=_exclusive)  # noqa: SIM115 - Path has no opener
+            self._file: IO[bytes] = path.open("a+b")
         self.path, self._size = path, 0
         try:
             lock(self._file, path)

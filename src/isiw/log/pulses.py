@@ -5,38 +5,46 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from isiw.errors import LogError
+from isiw.errors import DamagedLogError, LogError
 from isiw.log.durable import log_of
 from isiw.log.reader import read_salvaged
-from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import Event, decode
+from isiw.log.salvage import Message, Salvage, salvage
+from isiw.log.schema import Event, Intent, Record, decode
+from isiw.trials import Trial
 
 __all__ = ["earlier_pulses_s", "pulses_s"]
+
+_TIMED = ("/intent", "/trial", "/event")
 
 
 def pulses_s(salvaged: Salvage, now_ns: int | None = None) -> list[float]:
     """How long ago each stimulus of a log was about to be delivered [s]; refused ones do not count.
+
+    A stimulus whose intent is lost counts by the record of its trial.
 
     Args:
         salvaged: what was read from the log.
         now_ns: the time now [ns since 1970].
     """
     now_ns = time.time_ns() if now_ns is None else now_ns
-    at_ns: list[int] = []
+    at_ns: dict[int, int] = {}
     for message in salvaged.messages:
-        if message.topic == "/intent":
-            at_ns.append(message.log_time_ns)
-        elif message.topic == "/event" and at_ns and _refuses(message.data):
-            at_ns.pop()
-    return [max(0.0, (now_ns - each_ns) / 1e9) for each_ns in at_ns]
+        record = _timed(message)
+        if isinstance(record, Intent):
+            at_ns[record.trial] = message.log_time_ns
+        elif isinstance(record, Trial):
+            at_ns.setdefault(record.index, message.log_time_ns)
+        elif isinstance(record, Event) and record.kind == "refused" and record.trial is not None:
+            at_ns.pop(record.trial, None)
+    return [max(0.0, (now_ns - each_ns) / 1e9) for each_ns in at_ns.values()]
 
 
-def _refuses(data: bytes) -> bool:
+def _timed(message: Message) -> Record | None:
+    """A record that says when a stimulus was; None for any other, and for one that makes no sense."""
     try:
-        event = decode("/event", data)
+        return decode(message.topic, message.data) if message.topic in _TIMED else None
     except ValueError:
-        return False
-    return isinstance(event, Event) and event.kind == "refused"
+        return None
 
 
 def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: Path) -> list[float]:
@@ -49,7 +57,8 @@ def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: 
         but: a log that does not count, finished or not.
 
     Raises:
-        LogError: there is no such folder, or a log in it cannot be read: nobody knows what it holds.
+        LogError: there is no such folder, or a log in it cannot be read or has lost its end: nobody knows what it told
+            of.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -64,4 +73,12 @@ def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: 
 def _of_subject(log: Path, subject: str) -> list[float]:
     salvaged = salvage(log)
     header = read_salvaged(salvaged).header
-    return pulses_s(salvaged) if header.subject == subject and not header.device.simulated else []
+    if header.subject != subject or header.device.simulated:
+        return []
+    if salvaged.end_lost:
+        raise DamagedLogError(
+            "the end of an earlier log of this subject is missing, so nobody knows how many stimuli were given",
+            got=str(log),
+            remedy="Resume that session with the number of pulses that were lost, or wait until the period is over.",
+        )
+    return pulses_s(salvaged)

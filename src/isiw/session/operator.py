@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 
+from isiw.texts import plain
+
 __all__ = ["alarm", "goes_on"]
 
 
@@ -27,7 +29,7 @@ def alarm(text: str, *, end: str = "\n") -> None:
         end: what to put behind it.
     """
     if sys.stderr is not None:  # as under pythonw
-        sys.stderr.write(f"{text}{end}")
+        sys.stderr.write(f"{plain(text)}{end}")
         sys.stderr.flush()
 
 

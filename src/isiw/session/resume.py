@@ -6,7 +6,6 @@ import dataclasses
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -118,7 +117,11 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         as_resumed = as_resumed.model_copy(update={"created": header.created})
         return LogWriter.continuing(path, salvaged, header, as_resumed)
 
-    session.continue_from(replayed.trials, open_log, (*replayed.unknown, event), partial(pulses_s, salvaged))
+    def earlier_s() -> list[float]:
+        known_s = pulses_s(salvaged)
+        return [*known_s, *[0.0] * (len(replayed.trials) - len(known_s))]  # nobody knows when the lost ones were
+
+    session.continue_from(replayed.trials, open_log, (*replayed.unknown, event), earlier_s)
     return session
 
 
