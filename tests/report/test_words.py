@@ -1,14 +1,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from isiw.design import DesignSpace
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import Estimate
+from isiw.log.schema import Estimate, Event, StrategyRecipe
 from isiw.report.words import (
     PROGRESS_HEADINGS,
     TRIAL_HEADINGS,
@@ -70,9 +72,86 @@ def test_an_unusual_window_is_said_with_its_probability_once_it_is_worth_saying(
     )
 
 
-def test_no_window_is_an_answer(record: SessionRecord) -> None:
-    statement = final_statement(with_estimate(record, segments_ms=(), probability=0.07))
-    assert statement.startswith("No window was found (probability of a window: 0.07). 4 pairs")
+@pytest.mark.parametrize(
+    ("probability", "said"),
+    [
+        (0.05, "No window was found (probability of a window: 0.05). 4 pairs"),
+        (0.07, "It is undecided whether there is a window (probability of a window: 0.07). 4 pairs"),
+        (None, "No window was found. 4 pairs"),
+    ],
+)
+def test_no_window_is_a_finding_once_it_has_95_percent(
+    record: SessionRecord, probability: float | None, said: str
+) -> None:
+    assert final_statement(with_estimate(record, segments_ms=(), probability=probability)).startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("excluded_mv", "pct_rmt", "said"),
+    [
+        (0.0142, 8.7, "An enhancement of more than 14 µV (8.7 % of RMT) is excluded with 90 % probability."),
+        (0.0142, 12.3, "An enhancement of more than 14 µV (12 % of RMT) is excluded with 90 % probability."),
+        (0.0049, None, "An enhancement of more than 4.9 µV is excluded with 90 % probability."),
+    ],
+)
+def test_without_a_window_the_largest_enhancement_that_is_excluded_is_said(
+    record: SessionRecord, excluded_mv: float, pct_rmt: float | None, said: str
+) -> None:
+    excluded = {"excluded_mv": excluded_mv, "excluded_pct_rmt": pct_rmt}
+    assert said in final_statement(with_estimate(record, segments_ms=(), probability=0.02, **excluded))
+    assert "An enhancement" not in final_statement(with_estimate(record, **excluded))
+
+
+def test_the_best_isi_is_said_with_its_interval_where_there_is_a_window(record: SessionRecord) -> None:
+    said = "The largest MEP is expected at 64 ms, with 90 % probability between 51 and 78 ms."
+    best = {"best_isi_ms": (64.2, 51.0, 77.6)}
+    assert said in final_statement(with_estimate(record, **best))
+    assert "The largest MEP" not in final_statement(with_estimate(record, segments_ms=(), probability=0.02, **best))
+
+
+def test_the_expected_f1_is_said(record: SessionRecord) -> None:
+    assert "The expected F1 of this result is 0.84." in final_statement(with_estimate(record, expected_f1=0.841))
+
+
+def run_by(record: SessionRecord, name: str, *, delay_ms: tuple[float, float] | None, **settings: Any) -> SessionRecord:
+    strategy = StrategyRecipe(name=name, seed=0, settings=settings)
+    device = replace(record.header.device, hit_delay_ms=delay_ms)
+    return replace(record, header=record.header.model_copy(update={"strategy": strategy, "device": device}))
+
+
+def test_a_hit_delay_that_nobody_stated_is_said_to_have_cost_stimuli(record: SessionRecord) -> None:
+    said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms), which would have saved stimuli;"
+    statement = final_statement(run_by(record, "default", delay_ms=None))
+    assert f"{said} isiw timing {record.path} measures it." in statement
+
+
+@pytest.mark.parametrize(
+    ("name", "delay_ms", "settings"),
+    [
+        ("default", (150.0, 5.0), {}),
+        ("default", None, {"hit_delay_ms": [150.0, 5.0]}),
+        ("nr", None, {}),
+        ("one-of-another-version", None, {}),
+        ("", None, {}),
+    ],
+)
+def test_a_hit_delay_that_was_stated_or_is_of_no_use_is_not_asked_for(
+    record: SessionRecord, name: str, delay_ms: tuple[float, float] | None, settings: dict[str, Any]
+) -> None:
+    assert "hit delay" not in final_statement(run_by(record, name, delay_ms=delay_ms, **settings))
+
+
+def test_isis_that_count_from_the_impact_need_no_hit_delay(record: SessionRecord) -> None:
+    by_default = run_by(record, "default", delay_ms=None)
+    header = by_default.header.model_copy(update={"space": DesignSpace(0, 200, reference="impact")})
+    assert "hit delay" not in final_statement(replace(by_default, header=header))
+
+
+def test_trials_in_which_the_fit_had_trouble_are_counted(record: SessionRecord) -> None:
+    troubles = tuple(Event(kind="fit", trial=trial, text="no descent") for trial in (0, 2, 2))
+    statement = final_statement(replace(record, history=(*troubles, *record.history)))
+    assert "The fit had trouble in 2 of 4 trials; isiw show lists them." in statement
+    assert "The fit" not in final_statement(record)
 
 
 def test_a_window_of_two_segments_is_named_so(record: SessionRecord) -> None:
@@ -97,8 +176,11 @@ def test_without_a_trial_there_is_nothing_to_say(record: SessionRecord) -> None:
 
 
 def test_the_truth_is_compared_by_f1(record: SessionRecord) -> None:
-    assert truth_sentence(record, Window(33, 93)).endswith("has the window 33–93 ms; the result has an F1 of 1.00.")
-    assert truth_sentence(record, None).endswith("has no window; the result has an F1 of 0.00.")
+    said = truth_sentence(record, Window(33, 93))
+    assert said.endswith("has the window 33–93 ms; the F1 of the reported one is 1.00.")
+    assert truth_sentence(record, None).endswith("has no window; the F1 of the reported one is 0.00.")
+    unreported = with_estimate(record, segments_ms=(), probability=0.02)
+    assert truth_sentence(unreported, Window(33, 93)).endswith("33–93 ms; none was reported (F1 0.00).")
 
 
 def test_every_trial_has_a_row(record: SessionRecord) -> None:

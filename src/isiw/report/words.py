@@ -11,6 +11,7 @@ from isiw.log.schema import Estimate, Event
 from isiw.metrics import f1
 from isiw.report.evidence import contradiction, nothing_measured
 from isiw.session.loop import SessionUpdate
+from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.trials import Trial
 from isiw.window import Interval, Window, WindowEstimate
 
@@ -25,6 +26,9 @@ TRIAL_HEADINGS = ("trial", "asked", "outcome", "realised")
 WORTH_SAYING = 0.1
 """Probability from which on an unusual window is mentioned."""
 
+SURE = 0.95
+"""Probability that there is none, from which on no window was found; below it that is undecided."""
+
 _AFTER = {"impact": "after the impact", "valve": "after the valve command"}
 
 
@@ -37,7 +41,7 @@ def final_statement(record: SessionRecord) -> str:
     if not record.estimates:
         return "No trial has been completed."
     last = record.estimates[-1]
-    sentences = [*_findings(record, last), _counts(record), last.reason]
+    sentences = [*_findings(record, last), _counts(record), _fits(record), _unstated_hit_delay(record), last.reason]
     if record.end_lost:
         sentences.append(
             "The log's end is missing; go on with the number of pulses that the stimulator counted besides: "
@@ -54,14 +58,22 @@ def _findings(record: SessionRecord, estimate: Estimate) -> list[str]:
     space, nothing = record.header.space, nothing_measured(record)
     if nothing is not None:
         return [nothing]
-    return [_finding(estimate, space), _edges(estimate, space), contradiction(estimate.window, record.table.told) or ""]
+    return [
+        _finding(estimate, space),
+        _edges(estimate, space),
+        contradiction(estimate.window, record.table.told) or "",
+        _best_isi(estimate),
+        _excluded(estimate),
+        _expected_f1(estimate),
+    ]
 
 
 def _finding(estimate: Estimate, space: DesignSpace) -> str:
     window, probability = estimate.window, estimate.probability
     chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
     if window is None:
-        return f"No window was found{chance}."
+        undecided = probability is not None and 1 - probability < SURE
+        return f"It is undecided whether there is a window{chance}." if undecided else f"No window was found{chance}."
     return f"The tap enhances the MEP at ISIs of {window} {_AFTER[space.reference]}{chance}."
 
 
@@ -77,6 +89,29 @@ def _edges(estimate: Estimate, space: DesignSpace) -> str:
     }
     said = [f"it {what} with probability {p:.2f}" for what, p in unusual.items() if p is not None and p >= WORTH_SAYING]
     return f"{edges} Given a window, {', '.join(said)}." if said else edges
+
+
+def _best_isi(estimate: Estimate) -> str:
+    if estimate.window is None or not estimate.best_isi_ms:
+        return ""
+    best, low, high = estimate.best_isi_ms
+    return f"The largest MEP is expected at {best:.0f} ms, with 90 % probability between {low:.0f} and {high:.0f} ms."
+
+
+def _excluded(estimate: Estimate) -> str:
+    if estimate.window is not None or estimate.excluded_mv is None:
+        return ""
+    share = "" if estimate.excluded_pct_rmt is None else f" ({_figure(estimate.excluded_pct_rmt)} % of RMT)"
+    enhancement = f"An enhancement of more than {_figure(1e3 * estimate.excluded_mv)} µV{share}"
+    return f"{enhancement} is excluded with 90 % probability."
+
+
+def _figure(value: float) -> str:
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
+
+
+def _expected_f1(estimate: Estimate) -> str:
+    return "" if estimate.expected_f1 is None else f"The expected F1 of this result is {estimate.expected_f1:.2f}."
 
 
 def _between(interval: tuple[float | None, float | None], space: DesignSpace) -> str:
@@ -103,6 +138,26 @@ def _counts(record: SessionRecord) -> str:
     if excluded:
         parts.append(f"{excluded} excluded")
     return "; ".join(parts) + "."
+
+
+def _fits(record: SessionRecord) -> str:
+    troubled = len({event.trial for event in record.events if event.kind == "fit"})
+    return f"The fit had trouble in {troubled} of {len(record.table)} trials; isiw show lists them." if troubled else ""
+
+
+def _unstated_hit_delay(record: SessionRecord) -> str:
+    """That stimuli went into what the rig could have stated, where the strategy could have used it."""
+    header, recipe = record.header, record.header.strategy
+    if header.space.reference != "valve" or header.device.hit_delay_ms is not None or not record.rests_on_data:
+        return ""
+    if recipe.name not in list_strategies() or "hit_delay_ms" in recipe.settings:
+        return ""
+    if not known_settings(recipe.name, {"hit_delay_ms": True}):
+        return ""
+    return (
+        "The device does not state its hit delay (DeviceInfo.hit_delay_ms), which would have saved stimuli; "
+        f"isiw timing {record.path} measures it."
+    )
 
 
 def _excluded_since(record: SessionRecord) -> bool:
