@@ -3,22 +3,37 @@
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar, cast, get_args, get_type_hints
+from typing import Any, Final, TypeVar, cast, get_args, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
 from isiw.errors import ConfigError, IsiwError
 
-__all__ = ["checked", "read_toml"]
+__all__ = ["checked", "parsed", "read_toml"]
 
 _T = TypeVar("_T")
 
 _UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
+
+_TOO_MANY_PARTS: Final = re.compile(r"(?:\.\s*[\w\"'-]{1,40}\s*){100}")
+
+
+def parsed(text: str) -> dict[str, Any]:
+    """The values of a TOML text.
+
+    Raises:
+        ValueError: it is not TOML, or has a key of more than a hundred parts, which would take gigabytes to read.
+        RecursionError: it is nested without end.
+    """
+    if _TOO_MANY_PARTS.search(text):
+        raise ValueError("a key has more than a hundred parts")
+    return tomllib.loads(text)
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
@@ -28,7 +43,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         ConfigError: it cannot be read, or is not TOML.
     """
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return parsed(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(
             f"the configuration cannot be read: {error.strerror}", got=str(path), remedy="Check the path."

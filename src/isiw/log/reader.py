@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,6 +17,7 @@ from isiw.log.salvage import Message, Salvage, salvage
 from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Estimate, Event, Header, Intent, Record, Waveform, decode
 from isiw.log.writer import CONFIGURATION
 from isiw.strategy.stopping import StopDecision
+from isiw.toml_files import parsed
 from isiw.trials import Channel, Trial, TrialTable
 from isiw.window import ENOUGH_PAIRS
 
@@ -209,7 +209,7 @@ def _shortened(losses: Sequence[str]) -> tuple[str, ...]:
 def _header_from_attachment(salvaged: Salvage) -> Header:
     text = salvaged.attachments.get(CONFIGURATION, b"")[:MOST_CONFIGURATION]
     try:
-        return Header.model_validate(tomllib.loads(text.decode()))
+        return Header.model_validate(parsed(text.decode()))
     except (ValueError, RecursionError) as error:
         raise DamagedLogError(
             "the log's header is lost",
