@@ -55,7 +55,7 @@ def test_limits_of_a_space_hold_exactly_its_isis(space: DesignSpace) -> None:
         {"intensity_pct_mso": -1.0},
     ],
 )
-def test_limits_of_another_kind_are_refused(values) -> None:
+def test_limits_of_another_kind_are_refused(values: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         Limits(**({"low_ms": 0, "high_ms": 200} | values))
 
