@@ -21,5 +21,6 @@ def logged_session(subject: SimulatedSubject, name: str, seed: int, trials: int,
     """
     respond = partial(subject.begin(seed).respond, reference="valve")
     device = isiw.SimulatedDevice(isiw.SimulatedPerson(respond, "valve"))
-    strategy = isiw.make_strategy(seed=seed, max_trials=trials, stop_width_ms=1e-3, stop_no_window=1.0)
+    never = {"stop_width_ms": 1e-3, "stop_no_window": 1.0, "stop_expected_f1": 1.0, "stop_gain": 0.0}
+    strategy = isiw.make_strategy(seed=seed, max_trials=trials, **never)
     return isiw.Session(device, strategy, log=folder / f"{name}.mcap", subject=name).run().log

@@ -20,37 +20,40 @@ from rich.progress import Progress
 from acquisition import MARKS, facts_of, run, run_oracle, write
 from isiw.studies import Study, StudyStrategy
 
-# The laws of the cohorts; scales are median, SD and tail, of the logarithm where it is one. Uniform and fixed numbers
-# have the SD that they have, the fixed one a small one.
-PEOPLE: dict[str, Any] = {
-    "start_ms": [5.0, 110.0],
-    "hit_delay_ms": [180.0, 5.8],
-    "p_anywhere": 0.0,
-    "width_ms": [100.0, 0.42, 0.0],
-    "p_shape": [1.0, 0.0, 0.0, 0.0],
-    "drift_sd": 0.0,
-    "startup": [0.0, 0.0],
+# The laws of the cohorts, as one component a block; a number that is the same in everybody has a small SD.
+PROFILE: dict[str, Any] = {
+    "shapes": {"gaussian": 1.0, "skewed": 0.0, "plateau": 0.0, "two_peak": 0.0},
+    "start": {
+        "spans": [{"share": 1.0, "low_ms": 5.0, "high_ms": 110.0}],
+        "hit_delay_ms": [180.0, 5.8],
+        "p_anywhere": 0.0,
+    },
+    "widths": [{"share": 1.0, "width_ms": [100.0, 0.42]}],
 }
+PEOPLE: dict[str, Any] = {"profile": PROFILE, "session": {"drift_sd": 0.01, "startup": [0.0, 0.01]}}
 TOLD: dict[str, dict[str, Any]] = {
     "recruitment": PEOPLE
     | {
-        "p_noise": [0.0, 0.0, 1.0, 0.0],
-        "p_hand": 0.0,
-        "floor_mv": [0.010, 0.25, 0.0],
-        "floor_log_sd": [0.18, 0.2, 0.0],
-        "recruitment_ratio": [16.0, 0.43, 0.0],
-        "input_sd": [2.1, 0.17, 0.0],
-        "output_sd": [0.39, 0.15, 0.0],
-        "boost": [3.4, 0.33, 0.0],
-        "rest": [-4.5, 0.35, 0.0],
+        "noise": {"constant_cv": 0.0, "missing": 0.0, "recruitment": 1.0, "all_or_none": 0.0},
+        "floors": [{"share": 1.0, "median_mv": [0.010, 0.25], "log_sd": [0.18, 0.2]}],
+        "muscles": [
+            {
+                "name": "forearm",
+                "share": 1.0,
+                "ratio": [16.0, 0.43],
+                "slope_per_pct": [0.30, 0.01],
+                "input_sd": [2.1, 0.17],
+                "sigma_y": [0.39, 0.15],
+                "boost_pct": [11.3, 0.33],
+                "rest_pct": [-15.0, 1.2],
+            }
+        ],
     },
     "gaussian": PEOPLE
     | {
-        "p_noise": [1.0, 0.0, 0.0, 0.0],
-        "floor_mv": [0.008, 0.3, 0.0],
-        "floor_log_sd": [0.35, 0.02, 0.0],
-        "gain_ratio": [7.5, 0.58, 0.0],
-        "cv": [0.63, 0.23, 0.0],
+        "noise": {"constant_cv": 1.0, "missing": 0.0, "recruitment": 0.0, "all_or_none": 0.0},
+        "floors": [{"share": 1.0, "median_mv": [0.008, 0.3], "log_sd": [0.35, 0.02]}],
+        "gains": [{"share": 1.0, "ratio": [7.5, 0.58], "cv": [0.63, 0.23]}],
     },
 }
 
@@ -60,7 +63,9 @@ def studies(plan: dict[str, Any]) -> dict[str, Study]:
     planned = {}
     for cohort, laws in TOLD.items():
         told = StudyStrategy("default", {"prior": laws}, label=f"told-{cohort}")
-        certain = StudyStrategy("default", {"prior": laws | {"p_window": 1.0}}, label=f"told-{cohort}-and-window")
+        certain = StudyStrategy(
+            "default", {"prior": laws | {"profile": PROFILE | {"p_window": 1.0}}}, label=f"told-{cohort}-and-window"
+        )
         planned[cohort] = Study((StudyStrategy("default"), told, certain), (cohort,), **plan)
         planned[f"{cohort}-nonresponder"] = Study((told,), ("nonresponder",), **plan)
     return planned
