@@ -55,12 +55,24 @@ def place(share: float, mean: FloatArray, sd: FloatArray, reference: Reference) 
 
 
 def floor(share: float, mean: FloatArray, sd: FloatArray) -> Floor:
-    """A law of the floor's logarithms; `mean` and `sd` of shape (2,)."""
+    """A law of the floor.
+
+    Args:
+        share: its probability.
+        mean: of the logarithms of both latents, shape (2,).
+        sd: their SDs, shape (2,).
+    """
     return Floor(share, *_log_scales(mean, sd))
 
 
 def gain(share: float, mean: FloatArray, sd: FloatArray) -> Gain:
-    """A law of the gain's logarithms; `mean` and `sd` of shape (2,)."""
+    """A law of the gain.
+
+    Args:
+        share: its probability.
+        mean: of the logarithms of both latents, shape (2,).
+        sd: their SDs, shape (2,).
+    """
     return Gain(share, *_log_scales(mean, sd))
 
 
@@ -94,11 +106,23 @@ def beside(usual: tuple[Component, ...], learnt: Sequence[Component]) -> tuple[C
 
 
 def mixed(learnt: float, usual: float, share: float) -> float:
-    """A probability as learnt, with a share of the usual one."""
+    """A probability as learnt, with a share of the usual one.
+
+    Args:
+        learnt: as learnt.
+        usual: as in the built-in prior.
+        share: of the usual one.
+    """
     return (1.0 - share) * learnt + share * usual
 
 
 def mixed_shares(learnt: Sequence[float], usual: _Shares, share: float) -> _Shares:
-    """Shares of kinds as learnt, with a share of the usual ones."""
+    """Shares of kinds as learnt, with a share of the usual ones.
+
+    Args:
+        learnt: as learnt, one a kind.
+        usual: as in the built-in prior.
+        share: of the usual ones.
+    """
     pairs = zip(learnt, astuple(usual), strict=True)
     return type(usual)(*(mixed(float(new), old, share) for new, old in pairs))

@@ -130,14 +130,14 @@ def test_a_strategy_steps_by_5_ms_after_twelve_trials_whatever_the_range(space: 
     asked = []
     for _ in range(30):
         asked.append(strategy.ask())
-        strategy.tell(asked[-1], 0.01)
+        strategy.learn(asked[-1], 0.01)
     assert asked == [0.0] * 12 + [5.0] * 12 + [10.0] * 6
 
 
 def test_tms_alone_does_not_move_the_sweep_on() -> None:
     strategy = make_strategy("incremental")
     for _ in range(12):
-        strategy.tell(None, 0.01)
+        strategy.learn(None, 0.01)
     assert strategy.ask_batch(13) == [0.0] * 12 + [5.0]
 
 
@@ -146,7 +146,9 @@ def test_the_sweep_ends_when_it_has_left_the_window_behind() -> None:
     rng = np.random.default_rng(1)
     while not strategy.decision().stop:
         isi_ms = strategy.ask()
-        strategy.tell(isi_ms, 0.01 * float(np.exp(0.1 * rng.standard_normal())) + float(bell_mv(isi_ms, mean_ms=150.0)))
+        strategy.learn(
+            isi_ms, 0.01 * float(np.exp(0.1 * rng.standard_normal())) + float(bell_mv(isi_ms, mean_ms=150.0))
+        )
     assert "passed the window" in strategy.decision().reason
     window = strategy.estimate().window
     # The run reaches as far as means exceed the baseline: somewhat beyond the 100–200 ms of the 0.135 rule.

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -21,10 +22,12 @@ def drawn(likelihood: Likelihood, space: DesignSpace, prior: WindowPrior | None 
 def test_windows_start_up_to_an_eighth_of_a_second_after_the_impact_or_rarely_anywhere(
     space: DesignSpace, shift_ms: float
 ) -> None:
-    start_ms = drawn("gamma", space).start_ms
+    # One in five lies anywhere in the range, or up to 100 ms before it; some of these near the usual ones.
+    prior = WindowPrior(start=replace(WindowPrior().start, hit_delay_ms=(180.0, 6.0)))
+    start_ms = drawn("gamma", space, prior).start_ms
     inside = (start_ms > shift_ms - 15) & (start_ms < shift_ms + 125 + 15)
     assert 0.8 < inside.double().mean() < 0.92
-    assert start_ms.min() >= space.low_ms - 50
+    assert start_ms.min() >= space.low_ms - 100
     assert start_ms.max() <= space.high_ms
 
 

@@ -29,7 +29,12 @@ class Mixture:
 
     @classmethod
     def of(cls, components: list[tuple[float, list[tuple[float, float]]]], device: torch.device | str) -> Mixture:
-        """A mixture of components, each a share and the (mean, SD) of every latent."""
+        """A mixture of components.
+
+        Args:
+            components: of each its share, and the (mean, SD) of every latent.
+            device: torch device.
+        """
         shares = torch.tensor([share for share, _ in components], device=device)
         laws = torch.tensor([latents for _, latents in components], device=device)
         return cls(shares / shares.sum(), laws[..., 0], laws[..., 1])
@@ -71,7 +76,12 @@ class JointMixture:
         self._log_shares = torch.stack(shares, dim=-1).log() - self._sds.log() @ self._belongs
 
     def sample(self, size: tuple[int, ...], generator: torch.Generator) -> Tensor:
-        """Draws, shape (*size, d)."""
+        """Draws, shape (*size, d).
+
+        Args:
+            size: how many.
+            generator: source of randomness.
+        """
         device = generator.device
         uniform = torch.rand((*size, len(self._below)), generator=generator, device=device)
         component = (uniform.unsqueeze(-1) > self._below.to(device)).sum(-1)[..., self._block.to(device)]

@@ -62,7 +62,13 @@ class Span:
         return density
 
     def later(self, mean_ms: float, sd_ms: float, share: float = 1.0) -> Span:
-        """The same counted from an event that is so much earlier, give or take an SD, and a share of its share."""
+        """The same counted from an earlier event.
+
+        Args:
+            mean_ms: how much earlier it is [ms].
+            sd_ms: SD of that [ms].
+            share: the share of this span's share that the result has.
+        """
         blur_ms = math.hypot(self.sd_ms, sd_ms)
         return Span(share * self.share, self.low_ms + mean_ms, self.high_ms + mean_ms, blur_ms)
 
@@ -99,12 +105,22 @@ class StartPrior:
             object.__setattr__(self, "hit_delay_ms", (mean, sd))
 
     def start_ms(self, quantile: Tensor, space: DesignSpace) -> Tensor:
-        """Starts in a space [ms] at some quantiles of the prior in 0–1, same shape."""
+        """Starts in a space [ms] at some quantiles of the prior, same shape.
+
+        Args:
+            quantile: the quantiles in 0–1, any shape.
+            space: the design space.
+        """
         law = _law(space, self)
         return _interpolate(quantile, law.below.to(quantile), law.knots_ms.to(quantile))
 
     def log_density(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
-        """Log density at some starts in a space [ms], same shape; -inf where no start can be."""
+        """Log density at some starts, same shape; -inf where no start can be.
+
+        Args:
+            start_ms: the starts [ms], any shape.
+            space: the design space.
+        """
         law = _law(space, self)
         inside = (start_ms >= law.knots_ms[0]) & (start_ms <= law.knots_ms[-1])
         density = _interpolate(start_ms, law.knots_ms.to(start_ms), law.density.to(start_ms))
