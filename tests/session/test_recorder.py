@@ -14,7 +14,14 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
-from isiw.errors import ImplausibleDataWarning, InvalidValueError, LimitExceededError, LogError, StrategyError
+from isiw.errors import (
+    DamagedLogError,
+    ImplausibleDataWarning,
+    InvalidValueError,
+    LimitExceededError,
+    LogError,
+    StrategyError,
+)
 from isiw.log.reader import read_session
 from isiw.log.schema import Estimate, Intent
 from isiw.report import final_statement
@@ -22,6 +29,7 @@ from isiw.session.recorder import Recorder, open_session
 from isiw.session.resume import resume
 from isiw.trials import MistrialReason, Trial
 from known import known
+from logs import cut_after
 from scripted import ScriptedDevice, scripted_strategy, told_to
 
 
@@ -174,6 +182,17 @@ def test_a_resumed_session_asks_what_an_uninterrupted_one_would_have(log: Path, 
         assert first + run(session, 2) == whole
     assert [event.kind for event in read_session(log).events] == ["resume"]
     assert len(read_session(log).table) == 6
+
+
+def test_a_log_without_its_end_goes_on_once_somebody_says_how_many_stimuli_it_lost(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        run(session, 6)
+    cut_after(log, 4)
+    with pytest.raises(DamagedLogError, match="stimulator's counter"):
+        open_session(scripted_strategy(9), log, resume=True)
+    with open_session(scripted_strategy(9), log, resume=True, lost_pulses=2) as session:
+        assert [trial.told for trial in session.trials] == [True] * 4 + [False] * 2
+    assert "cut off" in read_session(log).events[-1].text
 
 
 def test_a_session_with_a_device_goes_on_with_the_log(log: Path) -> None:

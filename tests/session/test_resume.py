@@ -27,6 +27,7 @@ from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Measurement, MistrialReason, Stimulus
 from known import known
+from logs import cut_after
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 
 
@@ -414,18 +415,11 @@ def test_a_measured_zero_and_its_uncertainty_are_replayed(log: Path) -> None:
     assert [trial.isi_sd_ms for trial in session.trials] == [2.0, 2.0]
 
 
-def cut_at_a_records_end(log: Path, trials: int) -> None:
-    """What is left of a closed log that was copied in part: so many trials, and no end."""
-    whole = log.read_bytes()
-    blocks = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
-    log.write_bytes(whole[: blocks[3 * trials + 1]])  # a header, then intent, trial and estimate of each
-
-
 @pytest.fixture
 def cut(log: Path) -> Any:
     """A closed log of six trials, of which the last two were cut off."""
     Session(ScriptedDevice(), scripted_strategy(6), log=log).run()
-    cut_at_a_records_end(log, 4)
+    cut_after(log, 4)
     assert len(read_session(log).table) == 4
     return log
 

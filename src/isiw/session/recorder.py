@@ -22,7 +22,7 @@ from isiw.log.salvage import salvage
 from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, StrategyRecipe
 from isiw.log.writer import LogWriter
 from isiw.session.loop import learn, versions
-from isiw.session.resume import replay
+from isiw.session.resume import replay, resumption_text, warn_where_differing, with_lost_pulses
 from isiw.signals.faults import remedy_for
 from isiw.signals.judgement import SignalLimits
 from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
@@ -43,6 +43,7 @@ def open_session(
     clock: Clock | None = None,
     subject: str = "",
     config: Mapping[str, Any] | None = None,
+    lost_pulses: int | None = None,
 ) -> Recorder:
     """Open a session whose loop is your own: ask it for ISIs, and tell it what came of them.
 
@@ -55,10 +56,16 @@ def open_session(
         clock: tells the time, and waits in `ask` until an inter-trial interval of the limits has passed.
         subject: the person's code, for the log.
         config: anything that should be kept in the log, as TOML values.
+        lost_pulses: as for `isiw.resume`: needed where the end of the log is missing.
 
     Raises:
+        DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
+        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there.
         LogError: there is a log already, or it cannot be written or read.
         StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
+
+    Warns:
+        OtherVersionsWarning: with other versions than those that were logged the strategy asks something else.
     """
     path = log_of(Path(log))
     if strategy.delivered:
@@ -72,19 +79,16 @@ def open_session(
     clock = clock or MonotonicClock()
     if not (resume and (path.exists() or part_of(path).exists())):
         return Recorder(strategy, LogWriter.create(path, header), limits, clock)
-    return _resumed(path, strategy, header, limits, clock)
-
-
-def _resumed(path: Path, strategy: Strategy, header: Header, limits: Limits, clock: Clock) -> Recorder:
     salvaged = salvage(path)
-    record = read_salvaged(salvaged)
+    record = with_lost_pulses(read_salvaged(salvaged), lost_pulses)
     replayed = replay(record, strategy)
+    warn_where_differing(replayed, record.header)
     kept = {"created": record.header.created, "subject": header.subject or record.header.subject}
-    log = LogWriter.continuing(path, salvaged, record.header, header.model_copy(update=kept))
-    recorder = Recorder(replayed.strategy, log, limits, clock, replayed.trials)
+    writer = LogWriter.continuing(path, salvaged, record.header, header.model_copy(update=kept))
+    recorder = Recorder(replayed.strategy, writer, limits, clock, replayed.trials)
     for trial in replayed.unknown:
-        log.append(trial)
-    recorder.log_event("resume", f"Resumed after {len(replayed.trials)} trials.")
+        writer.append(trial)
+    recorder.log_event("resume", resumption_text(record, replayed))
     return recorder
 
 

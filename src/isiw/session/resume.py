@@ -33,7 +33,16 @@ from isiw.strategy.strategy import Strategy
 from isiw.texts import plain
 from isiw.trials import Stimulus, Trial, TrialTable
 
-__all__ = ["Replayed", "exclude", "replay", "resume", "strategy_of"]
+__all__ = [
+    "Replayed",
+    "exclude",
+    "replay",
+    "resume",
+    "resumption_text",
+    "strategy_of",
+    "warn_where_differing",
+    "with_lost_pulses",
+]
 
 _COMPARED_AT_EACH_END = 50
 
@@ -90,10 +99,9 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     record = read_salvaged(salvaged)
     header = record.header
     _require_as_real(device, header)
-    record = _with_lost_pulses(record, lost_pulses)
+    record = with_lost_pulses(record, lost_pulses)
     replayed = replay(record, strategy.restarted() if strategy else strategy_of(header), verify=verify)
-    if replayed.differing:
-        warnings.warn(_differing_text(replayed, header), OtherVersionsWarning, stacklevel=2)
+    warn_where_differing(replayed, header)
     if isinstance(device, HasMemory):
         device.resume_after([Stimulus(trial.index, trial.commanded_isi_ms) for trial in replayed.trials])
     session = Session(
@@ -111,7 +119,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         safeguards=safeguards,
     )
     last = len(replayed.trials) - 1 if replayed.trials else None
-    event = Event(kind="resume", trial=last, text=_resumption_text(record, replayed))
+    event = Event(kind="resume", trial=last, text=resumption_text(record, replayed))
 
     def open_log(as_resumed: Header) -> LogWriter:
         as_resumed = as_resumed.model_copy(update={"created": header.created})
@@ -213,8 +221,17 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
             log.append(Event(kind="fault", trial=trial, text=" ".join(record.losses)))
 
 
-def _with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> SessionRecord:
-    """A log with the stimuli that its missing end told of."""
+def with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> SessionRecord:
+    """A log with the stimuli that its missing end told of.
+
+    Args:
+        record: the log.
+        lost_pulses: how many stimuli were given that are not in it any more; None where it has its end.
+
+    Raises:
+        DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
+        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there.
+    """
     if lost_pulses is None:
         _require_end(record)
         return record
@@ -313,6 +330,17 @@ def _versions_text(header: Header) -> str:
     return plain(", ".join(f"{name} {version}" for name, version in logged.items()))
 
 
+def warn_where_differing(replayed: Replayed, header: Header) -> None:
+    """Warn whoever resumes a session that other versions would have asked something else.
+
+    Args:
+        replayed: the strategy that has learned the log.
+        header: the log's.
+    """
+    if replayed.differing:
+        warnings.warn(_differing_text(replayed, header), OtherVersionsWarning, stacklevel=3)
+
+
 def _differing_text(replayed: Replayed, header: Header) -> str:
     return (
         f"The session was logged with {_versions_text(header)}, log schema {header.schema_version}. With the versions "
@@ -322,7 +350,13 @@ def _differing_text(replayed: Replayed, header: Header) -> str:
     )
 
 
-def _resumption_text(record: SessionRecord, replayed: Replayed) -> str:
+def resumption_text(record: SessionRecord, replayed: Replayed) -> str:
+    """What the log says about a resumption.
+
+    Args:
+        record: the log.
+        replayed: the strategy that has learned it.
+    """
     sentences = [f"Resumed after {len(replayed.trials)} trials."]
     if replayed.differing:
         sentences.append(_differing_text(replayed, record.header))
