@@ -30,7 +30,7 @@ from isiw.session.resume import resume
 from isiw.trials import MistrialReason, Trial
 from known import known
 from logs import cut_after
-from scripted import ScriptedDevice, scripted_strategy, told_to
+from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 
 
 @pytest.fixture
@@ -198,7 +198,7 @@ def test_a_log_without_its_end_goes_on_once_somebody_says_how_many_stimuli_it_lo
 def test_a_session_with_a_device_goes_on_with_the_log(log: Path) -> None:
     with open_session(scripted_strategy(6), log) as session:
         run(session, 4)
-    result = resume(log, ScriptedDevice(simulated=False), scripted_strategy(6), clock=VirtualClock()).run()
+    result = resume(log, ScriptedDevice(simulated=False), scripted_strategy(6), clock=FakeRealClock()).run()
     assert len(result.trials) == 6
 
 

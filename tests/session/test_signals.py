@@ -82,7 +82,7 @@ def session_hanging_in(
     return device, Session(device, strategy, log=log, on_trial=on_trial, safeguards=Safeguards(on_pause=on_pause))
 
 
-@pytest.mark.parametrize("verb", ["ask", "tell", "estimate", "decision", "on_trial"])
+@pytest.mark.parametrize("verb", ["ask", "learn", "estimate", "decision", "on_trial"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
 def test_a_signal_is_heard_while_nothing_is_in_flight(log: Path, verb: str, number: signal.Signals) -> None:
     device, session = session_hanging_in(verb, number, log)
@@ -96,7 +96,7 @@ def test_a_signal_is_heard_while_nothing_is_in_flight(log: Path, verb: str, numb
     assert resume(log, ScriptedDevice(), scripted_strategy(6)).run().decision.stop
 
 
-@pytest.mark.parametrize("verb", ["ask", "tell", "estimate", "decision", "on_trial"])
+@pytest.mark.parametrize("verb", ["ask", "learn", "estimate", "decision", "on_trial"])
 def test_after_ctrl_c_a_session_goes_on_as_if_nothing_had_happened_where_the_operator_says_so(
     log: Path, tmp_path: Path, verb: str
 ) -> None:

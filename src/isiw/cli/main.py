@@ -6,7 +6,7 @@ import itertools
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -230,7 +230,16 @@ def _heading(setting: DescribedSetting) -> str:
     if setting.value is None:
         return f"{setting.key}  # not set"
     comment = "; ".join(filter(None, (setting.unit, ", ".join(setting.parts))))
-    return f"{setting.key} = {json.dumps(setting.value)}{f'  # {comment}' if comment else ''}"
+    return f"{setting.key} = {_inline(setting.value)}{f'  # {comment}' if comment else ''}"
+
+
+def _inline(value: Any) -> str:
+    """A value as TOML has it on one line."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{key} = {_inline(inner)}' for key, inner in value.items() if inner is not None)} }}"
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(_inline, value))}]"
+    return json.dumps(value)
 
 
 def _is_log(source: str) -> bool:

@@ -33,5 +33,5 @@ def test_a_group_comes_before_its_members_which_are_named_after_it() -> None:
 
 
 def test_numbers_that_belong_together_are_named() -> None:
-    ratio = next(entry for entry in list_settings("default") if entry.key == "prior.muscles[1].ratio")
+    ratio = next(entry for entry in list_settings("default") if entry.key == "prior.switch.reliability")
     assert ratio.parts == ("median", "sd", "tail")

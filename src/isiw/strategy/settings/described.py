@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from typing import Any, Final
 
 import docstring_parser
@@ -24,8 +24,9 @@ class DescribedSetting:
     """One setting, or a group of them.
 
     Args:
-        key: its name as in a configuration or a call of `make_strategy`; those of a group follow it, after a dot.
-        value: what it is by default; None where it is not set, and for a group.
+        key: its name as in a configuration or a call of `make_strategy`; those of a group follow it, after a dot, and
+            what the tables of a list have, after brackets.
+        value: what it is by default; None where it is not set, and for a group. A list of tables is set as a whole.
         unit: of the value; empty where it has none.
         meaning: what it is, in a sentence.
         group: whether its values are those of its members.
@@ -59,14 +60,17 @@ def described(settings: Settings) -> tuple[DescribedSetting, ...]:
 def _entries(key: str, value: Any, meaning: str) -> Iterator[DescribedSetting]:
     unit = _UNITS.get(key.rpartition("_")[2], "")
     plain = re.sub(rf"\s*\[{re.escape(unit)}\]", "", meaning) if unit else meaning
-    several = isinstance(value, tuple) and any(is_dataclass(each) for each in value)
-    group = is_dataclass(value) or several
+    if isinstance(value, tuple) and any(is_dataclass(each) for each in value):
+        yield DescribedSetting(key, tuple(asdict(each) for each in value), unit, plain, group=False)
+        for name, said in _meanings(type(value[0])).items():
+            yield DescribedSetting(f"{key}[].{name}", None, "", said, group=True)
+        return
+    group = is_dataclass(value)
     yield DescribedSetting(key, None if group else value, unit, plain, group)
-    for member in value if several else [value] if group else []:
-        meanings = _meanings(type(member))
-        within = f"{key}[{value.index(member)}]" if several else key
-        for f in fields(member):
-            yield from _entries(f"{within}.{f.name}", getattr(member, f.name), meanings[f.name])
+    if group:
+        meanings = _meanings(type(value))
+        for f in fields(value):
+            yield from _entries(f"{key}.{f.name}", getattr(value, f.name), meanings[f.name])
 
 
 def _meanings(owner: type) -> dict[str, str]:
