@@ -16,8 +16,11 @@ torch.set_num_threads(1)  # workers share the cores, and answers are the same ag
 hypothesis.settings.register_profile("isiw", deadline=None)  # how fast a machine is, is not what is tested
 hypothesis.settings.load_profile("isiw")
 
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a shell sets it for what it runs in the background
+# A shell lets what it runs in the background ignore these.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+if hasattr(signal, "SIGQUIT") and signal.getsignal(signal.SIGQUIT) is signal.SIG_IGN:
+    signal.signal(signal.SIGQUIT, signal.SIG_DFL)
 
 
 @pytest.fixture
