@@ -187,7 +187,7 @@ def test_show_of_an_unreadable_log_exits_3(isiw: Command, tmp_path: Path) -> Non
 
 
 def test_plot_draws_beside_the_log_where_no_file_is_given(isiw: Command, log: Path) -> None:
-    log.with_suffix(".png").unlink()
+    assert not log.with_suffix(".png").exists()
     assert isiw("plot", log).exit_code == 0
     assert log.with_suffix(".png").exists()
 
