@@ -105,7 +105,7 @@ def test_a_strategys_settings_are_listed_as_a_configuration_has_them_with_unit_a
     output = isiw("strategies", "default").output
     assert "\nmax_trials = 80\n    stop after this many stimuli; mistrials count." in output
     assert "\nstop_width_ms = 30.0  # ms\n" in output
-    assert "\nprior.switch.reliability = [0.2, 0.7, 0.0]  # median, sd, tail\n" in output
+    assert "\nprior.profile.width_ms = [100.0, 0.42, 0.02]  # ms; median, sd, tail\n" in output
     assert "\nprior.profile\n" in output
     assert "\nfixed  # not set\n" in isiw("strategies", "gp-variance").output
 
@@ -187,7 +187,7 @@ def test_show_of_an_unreadable_log_exits_3(isiw: Command, tmp_path: Path) -> Non
 
 
 def test_plot_draws_beside_the_log_where_no_file_is_given(isiw: Command, log: Path) -> None:
-    log.with_suffix(".png").unlink(missing_ok=True)
+    assert not log.with_suffix(".png").exists()
     assert isiw("plot", log).exit_code == 0
     assert log.with_suffix(".png").exists()
 
