@@ -105,7 +105,7 @@ def test_a_strategys_settings_are_listed_as_a_configuration_has_them_with_unit_a
     output = isiw("strategies", "default").output
     assert "\nmax_trials = 80\n    stop after this many stimuli; mistrials count." in output
     assert "\nstop_width_ms = 30.0  # ms\n" in output
-    assert "\nprior.profile.width_ms = [100.0, 0.42, 0.02]  # ms; median, sd, tail\n" in output
+    assert "\nprior.switch.reliability = [0.2, 0.7, 0.0]  # median, sd, tail\n" in output
     assert "\nprior.profile\n" in output
     assert "\nfixed  # not set\n" in isiw("strategies", "gp-variance").output
 
