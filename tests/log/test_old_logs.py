@@ -14,6 +14,7 @@ import isiw
 from isiw.errors import OtherVersionsWarning
 from isiw.plots import save_session_plot
 from isiw.report import final_statement
+from isiw.session.loop import SessionUpdate
 from isiw.session.resume import strategy_of
 from isiw.trials import MistrialReason
 
@@ -122,3 +123,17 @@ def test_settings_by_their_earlier_name_are_kept() -> None:
     recipe = header.strategy.model_copy(update={"name": "gp-ei", "settings": {"zero_below_mv": 0.004}})
     strategy = strategy_of(header.model_copy(update={"strategy": recipe}))
     assert strategy.recipe.settings["threshold_mv"] == 0.004
+
+
+def test_a_session_of_an_earlier_version_that_is_interrupted_again_goes_on_again(copy: Callable[[str], Path]) -> None:
+    class InterruptedHereError(Exception):
+        pass
+
+    def interrupt(update: SessionUpdate) -> None:
+        raise InterruptedHereError(update)
+
+    path = copy("06ce820-killed.mcap.part")
+    with pytest.warns(OtherVersionsWarning), pytest.raises(InterruptedHereError):
+        isiw.resume(path, isiw.SimulatedDevice(person(path.name)), on_trial=interrupt).run()
+    assert isiw.resume(path, isiw.SimulatedDevice(person(path.name))).run().decision.stop
+    assert isiw.read_session(path).header.asks_from > 0

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -156,7 +157,42 @@ def test_the_limits_hold(log: Path, space: DesignSpace) -> None:
         run(session, 3)
         with pytest.raises(LimitExceededError, match="3 pulses"):
             session.ask()
-    assert [intent.t_s for intent in read_session(log).intents] == [0.0, 7.0, 14.0]
+    assert [intent.t_s for intent in read_session(log).intents] == [7.0, 14.0, 21.0]
+
+
+def test_rests_between_blocks_are_waited_for_also_after_resuming(log: Path, space: DesignSpace) -> None:
+    clock = VirtualClock(1000.0)
+    limits = replace(Limits.of_space(space, min_iti_s=5.0), max_block_pulses=2, rest_s=120.0)
+    with open_session(scripted_strategy(9), log, limits=limits, clock=clock) as session:
+        run(session, 3)
+    with open_session(scripted_strategy(9), log, resume=True, limits=limits, clock=clock) as session:
+        run(session, 2)
+    t_s = [intent.t_s for intent in read_session(log).intents]
+    assert t_s[:3] == [1005.0, 1010.0, 1130.0]
+    assert t_s[3] >= 1130.0 + 120.0 - 1.0  # by the calendar, on which all three were just now
+
+
+@pytest.mark.parametrize("limit", [{"max_coil_c": 40.0}, {"intensity_pct_mso": 60.0}])
+def test_a_limit_of_what_nobody_reports_here_allows_nothing(
+    log: Path, space: DesignSpace, limit: dict[str, float]
+) -> None:
+    limits = replace(Limits.of_space(space, min_iti_s=0.0), **limit)  # type: ignore[arg-type] # all are numbers
+    with open_session(scripted_strategy(9), log, limits=limits) as session:
+        with pytest.raises(LimitExceededError, match="not known"):
+            session.ask()
+        assert not read_session(log).intents
+
+
+def test_an_error_without_words_of_its_own_is_logged_and_the_log_closed(log: Path) -> None:
+    class SpeechlessError(Exception):
+        def __str__(self) -> str:
+            raise RuntimeError("no words")
+
+    with pytest.raises(SpeechlessError), open_session(scripted_strategy(9), log):
+        raise SpeechlessError
+    record = read_session(log)
+    assert record.finished
+    assert "Speechless" in record.events[-1].text
 
 
 def test_an_excluded_trial_is_unlearnt_and_stays_so(log: Path) -> None:

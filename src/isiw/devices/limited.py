@@ -100,11 +100,7 @@ class LimitedDevice:
                 the dead man's switch.
             NotDelivered: the device is not ready.
         """
-        if not self.pulses_left:
-            raise LimitExceededError(
-                f"the limit of {self._limits.max_pulses} pulses is reached",
-                remedy="Nothing was delivered. End the session, or start one with a higher max_pulses.",
-            )
+        self._limits.require_left(self._delivered)
         if stimulus.isi_ms is not None:
             self._limits.require_isi(stimulus.isi_ms)
         if (wait_s := self.wait_s()) > _ROUNDING_S:

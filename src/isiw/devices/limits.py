@@ -86,6 +86,21 @@ class Limits:
             max_consecutive_mistrials=max_consecutive_mistrials,
         )
 
+    def require_left(self, delivered: int) -> None:
+        """Raise where no delivery is left.
+
+        Args:
+            delivered: deliveries of the session so far.
+
+        Raises:
+            LimitExceededError: as many as are allowed.
+        """
+        if delivered >= self.max_pulses:
+            raise LimitExceededError(
+                f"the limit of {self.max_pulses} pulses is reached",
+                remedy="Nothing was delivered. End the session, or start one with a higher max_pulses.",
+            )
+
     def require_isi(self, isi_ms: float) -> None:
         """Raise where an ISI must not be delivered.
 

@@ -84,7 +84,10 @@ class StrategyRecipe(_Record):
 
 
 class Header(_Record):
-    """What a session is, written before anything else, and again before it goes on: the last one holds."""
+    """What a session is, written before anything else, and again before it goes on: the last one holds.
+
+    `asks_from` is the first trial that was asked with these versions.
+    """
 
     schema_version: int = SCHEMA_VERSION
     isiw_version: str
@@ -99,6 +102,7 @@ class Header(_Record):
     timeout_s: float = 30.0
     ask_deadline_s: float | None = None
     versions: dict[str, str] = Field(default_factory=dict)
+    asks_from: int = 0
     config: dict[str, Any] = Field(default_factory=dict)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import itertools
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -14,15 +14,15 @@ import isiw
 from isiw.checks import number
 from isiw.devices.clock import Clock, MonotonicClock
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
-from isiw.errors import ImplausibleDataWarning, InvalidValueError, LimitExceededError, StrategyError
+from isiw.devices.protocol import DeviceInfo, Readiness
+from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, told
 from isiw.log.durable import log_of, part_of
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, StrategyRecipe
 from isiw.log.writer import LogWriter
 from isiw.session.loop import learn, versions
-from isiw.session.resume import replay, resumption_text, warn_where_differing, with_lost_pulses
+from isiw.session.resume import ages_s, replay, resumption_text, warn_where_differing, with_lost_pulses
 from isiw.signals.faults import remedy_for
 from isiw.signals.judgement import SignalLimits
 from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
@@ -53,7 +53,9 @@ def open_session(
         resume: whether to go on with the log where there is one. What was asked and has no outcome in it becomes a
             mistrial.
         limits: what may be asked; the strategy's space and 200 pulses by default, without an inter-trial interval.
-        clock: tells the time, and waits in `ask` until an inter-trial interval of the limits has passed.
+            Limits of the coil and of the intensity allow nothing, as nobody reports these here.
+        clock: tells the time, and waits in `ask` until the interval, the rest and the period of the limits have passed,
+            before the first stimulus, too, as nobody knows what came before.
         subject: the person's code, for the log.
         config: anything that should be kept in the log, as TOML values.
         lost_pulses: as for `isiw.resume`: needed where the end of the log is missing.
@@ -83,9 +85,14 @@ def open_session(
     record = with_lost_pulses(read_salvaged(salvaged), lost_pulses)
     replayed = replay(record, strategy)
     warn_where_differing(replayed, record.header)
-    kept = {"created": record.header.created, "subject": header.subject or record.header.subject}
+    kept = {
+        "created": record.header.created,
+        "subject": header.subject or record.header.subject,
+        "asks_from": replayed.asks_from,
+    }
     writer = LogWriter.continuing(path, salvaged, record.header, header.model_copy(update=kept))
-    recorder = Recorder(replayed.strategy, writer, limits, clock, replayed.trials)
+    ages = ages_s(salvaged, len(replayed.trials))
+    recorder = Recorder(replayed.strategy, writer, limits, clock, replayed.trials, ages)
     for trial in replayed.unknown:
         writer.append(trial)
     recorder.log_event("resume", resumption_text(record, replayed))
@@ -118,15 +125,24 @@ class Recorder:
         limits: what may be asked.
         clock: tells the time, and waits.
         trials: what was delivered before; the strategy has learned it.
+        earlier_s: how long ago each of these was [s].
     """
 
     def __init__(
-        self, strategy: Strategy, log: LogWriter, limits: Limits, clock: Clock, trials: TrialTable | None = None
+        self,
+        strategy: Strategy,
+        log: LogWriter,
+        limits: Limits,
+        clock: Clock,
+        trials: TrialTable | None = None,
+        earlier_s: Sequence[float] = (),
     ) -> None:
         self.strategy, self.trials = strategy, trials or TrialTable()
         self._log, self._limits, self._clock = log, limits, clock
         self._asked: Stimulus | None = None
-        self._last_s = clock.now_s() if self.trials else None
+        now_s = clock.now_s()
+        self._not_before_s = now_s + limits.min_iti_s
+        self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
         self._doubted: set[DoubtKind] = set()
 
     def ask(self, deadline_s: float | None = None) -> float:
@@ -150,27 +166,15 @@ class Recorder:
     def _begin(self, isi_ms: float | None) -> None:
         """Put on disk what is about to be delivered, once the limits allow it."""
         stimulus = Stimulus(len(self.trials), isi_ms)
-        self._require_within_limits(stimulus)
-        if self._last_s is not None:
-            self._clock.sleep_s(self._last_s + self._limits.min_iti_s - self._clock.now_s())
+        self._limits.require_left(stimulus.trial)
+        if isi_ms is not None:
+            self._limits.require_isi(isi_ms)
+        self._limits.require_state(Readiness())
+        earliest_s = max(self._not_before_s, self._limits.earliest_s(self._times_s))
+        self._clock.sleep_s(earliest_s - self._clock.now_s())
         self._log.append(Intent(trial=stimulus.trial, isi_ms=isi_ms, t_s=self._clock.now_s()))
         self._log.sync()
         self._asked = stimulus
-
-    def _require_within_limits(self, stimulus: Stimulus) -> None:
-        limits, isi_ms = self._limits, stimulus.isi_ms
-        if len(self.trials) >= limits.max_pulses:
-            raise LimitExceededError(
-                f"the limit of {limits.max_pulses} pulses is reached",
-                remedy="Deliver nothing. End the session, or go on with a higher max_pulses.",
-            )
-        if isi_ms is not None and not limits.low_ms <= isi_ms <= limits.high_ms:
-            raise LimitExceededError(
-                "the ISI is beyond the limits",
-                got=isi_ms,
-                expected=f"{limits.low_ms:g} to {limits.high_ms:g} ms",
-                remedy="Deliver nothing. Let the limits hold the whole design space.",
-            )
 
     def tell(
         self,
@@ -214,7 +218,7 @@ class Recorder:
         trial = Trial(asked.trial, Status.ACCEPTED, asked.isi_ms, isi_ms=isi_ms, mep_mv=mep_mv,
                       isi_sd_ms=isi_sd_ms, background_rms_uv=background_rms_uv)  # fmt: skip
         self._conclude(trial)
-        doubt = doubt or doubt_of([told.mep_mv for told in self.trials.told if told.mep_mv is not None])
+        doubt = doubt or doubt_of([known.mep_mv for known in self.trials.told if known.mep_mv is not None])
         if doubt is not None and doubt.kind not in self._doubted:
             self._doubted.add(doubt.kind)
             self._warn(doubt.text)
@@ -259,18 +263,18 @@ class Recorder:
         Raises:
             InvalidValueError: no accepted trial has this number.
         """
-        if trial not in {told.index for told in self.trials.told}:
+        if trial not in {accepted.index for accepted in self.trials.told}:
             raise InvalidValueError(
                 "there is no such trial to exclude",
                 got=trial,
-                expected=", ".join(str(told.index) for told in self.trials.told) or "one that was told",
+                expected=", ".join(str(accepted.index) for accepted in self.trials.told) or "one that was told",
             )
         self._log.append(Event(kind="exclusion", trial=trial, text=reason))
         self._log.sync()
         self.trials = self.trials.excluding([trial])
         self.strategy = self.strategy.restarted()
-        for told in self.trials:
-            learn(self.strategy, told)
+        for earlier in self.trials:
+            learn(self.strategy, earlier)
 
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""
@@ -290,12 +294,12 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if error is not None:
-            interrupted = isinstance(error, KeyboardInterrupt)
-            self.log_event(
-                "fault", "Interrupted by the operator." if interrupted else f"{type(error).__name__}: {error}"
-            )
-        self.close()
+        try:
+            if error is not None:
+                interrupted = isinstance(error, KeyboardInterrupt)
+                self.log_event("fault", "Interrupted by the operator." if interrupted else told(error))
+        finally:
+            self.close()
 
     def log_event(self, kind: EventKind, text: str) -> None:
         """Put on disk that something happened.
@@ -319,7 +323,7 @@ class Recorder:
         self._log.append(trial)
         self._log.sync()
         self.trials, self._asked = self.trials.appended(trial), None
-        self._last_s = self._clock.now_s()
+        self._times_s.append(self._clock.now_s())
         learn(self.strategy, trial)
         if trial.told and self.strategy.trouble is not None:
             self._log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))

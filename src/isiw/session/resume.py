@@ -6,6 +6,7 @@ import dataclasses
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,7 +24,7 @@ from isiw.errors import (
 )
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord, read_salvaged
-from isiw.log.salvage import salvage
+from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Event, Header, Intent, StrategyRecipe
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session, SessionUpdate, learn, versions
@@ -35,6 +36,7 @@ from isiw.trials import Stimulus, Trial, TrialTable
 
 __all__ = [
     "Replayed",
+    "ages_s",
     "exclude",
     "replay",
     "resume",
@@ -122,15 +124,23 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     event = Event(kind="resume", trial=last, text=resumption_text(record, replayed))
 
     def open_log(as_resumed: Header) -> LogWriter:
-        as_resumed = as_resumed.model_copy(update={"created": header.created})
+        as_resumed = as_resumed.model_copy(update={"created": header.created, "asks_from": replayed.asks_from})
         return LogWriter.continuing(path, salvaged, header, as_resumed)
 
-    def earlier_s() -> list[float]:
-        known_s = pulses_s(salvaged)
-        return [*known_s, *[0.0] * (len(replayed.trials) - len(known_s))]  # nobody knows when the lost ones were
-
+    earlier_s = partial(ages_s, salvaged, len(replayed.trials))
     session.continue_from(replayed.trials, open_log, (*replayed.unknown, event), earlier_s)
     return session
+
+
+def ages_s(salvaged: Salvage, trials: int) -> list[float]:
+    """How long ago each stimulus of a log was [s]; 0 for those of which nobody knows when they were.
+
+    Args:
+        salvaged: the log.
+        trials: how many stimuli there were.
+    """
+    known_s = pulses_s(salvaged)
+    return [*known_s, *[0.0] * (trials - len(known_s))]
 
 
 @dataclass(frozen=True)
@@ -142,12 +152,15 @@ class Replayed:
         trials: all trials, those with unknown outcome included.
         unknown: the trials whose outcome is not in the log.
         differing: trials in which it would have asked something else than was logged with other versions.
+        asks_from: the first trial whose ask can be compared with the strategy's from here on; those before were asked
+            with other versions, or never compared.
     """
 
     strategy: Strategy
     trials: TrialTable
     unknown: tuple[Trial, ...]
     differing: tuple[int, ...] = ()
+    asks_from: int = 0
 
 
 def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) -> Replayed:
@@ -166,13 +179,14 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
     """
     told: list[Trial] = []
     differing: list[int] = []
+    first = record.header.asks_from
     by_fallback = {event.trial for event in record.events if event.kind == "fallback"}
     last = max((intent.trial for intent in record.intents), default=0)
     for entry in record.history:
         if isinstance(entry, Intent):
             # Behind a lost trial the strategy knew more than the log does.
-            comparable = entry.trial == len(told) and entry.trial not in by_fallback
-            near_an_end = min(entry.trial, last - entry.trial) < _COMPARED_AT_EACH_END
+            comparable = entry.trial == len(told) and entry.trial >= first and entry.trial not in by_fallback
+            near_an_end = min(entry.trial - first, last - entry.trial) < _COMPARED_AT_EACH_END
             if verify and comparable and near_an_end and (asked_ms := strategy.ask()) != entry.isi_ms:
                 _require_other_versions(entry, asked_ms, record.header)
                 differing.append(entry.trial)
@@ -189,7 +203,7 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
     for trial in unknown:
         learn(strategy, trial)
     table = TrialTable(tuple(sorted((*told, *unknown), key=lambda trial: trial.index)))
-    return Replayed(strategy, table, unknown, tuple(differing))
+    return Replayed(strategy, table, unknown, tuple(differing), len(table) if differing or not verify else first)
 
 
 def exclude(path: str | Path, trial: int, reason: str) -> None:
