@@ -22,8 +22,9 @@ from rich.progress import Progress
 
 import isiw
 from earlier import logged_session
+from isiw.models.particles.laws import Floor, Muscle, NoiseShares, ShapeShares
 from isiw.models.particles.places import Place
-from isiw.models.particles.prior import Floor, Muscle, NoiseShares, Prior, ShapeShares
+from isiw.models.particles.prior import Prior
 from isiw.models.shared.scales import Scale
 from isiw.priors import LabPrior
 from isiw.studies import Failure, Processes, SimulatedSession, simulate

@@ -9,7 +9,8 @@ import pandas as pd
 import torch
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
-from isiw.models.particles.prior import LATENTS, Prior
+from isiw.models.particles.latents import LATENTS
+from isiw.models.particles.prior import Prior
 from isiw.priors.lab import LabPrior
 from isiw.types import FloatArray
 

@@ -10,8 +10,9 @@ from typing import Final, TypeVar
 
 import torch
 
+from isiw.models.particles.latents import latents_of
+from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares, ShapeShares
 from isiw.models.particles.places import Place
-from isiw.models.particles.prior import Floor, Gain, Muscle, NoiseShares, ShapeShares, latents_of
 from isiw.models.shared.scales import Scale
 from isiw.types import FloatArray, Reference
 

@@ -19,8 +19,9 @@ from isiw.checks import check_numbers, check_probabilities
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord
 from isiw.models.particles import ParticlePosterior
+from isiw.models.particles.latents import LATENTS, Latents, used_by
 from isiw.models.particles.places import Place
-from isiw.models.particles.prior import LATENTS, Latents, Prior, used_by
+from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Tensor
 from isiw.models.randomness import systematic
 from isiw.priors.components import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place

@@ -14,8 +14,9 @@ import isiw
 from isiw.checks import check_probabilities
 from isiw.errors import LogError
 from isiw.log.reader import SessionRecord, read_session
+from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares, ShapeShares
 from isiw.models.particles.places import Place
-from isiw.models.particles.prior import Floor, Gain, Muscle, NoiseShares, Prior, ShapeShares
+from isiw.models.particles.prior import Prior
 from isiw.priors.components import beside, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.priors.people import hyper_prior, people_of, usual_shares
 from isiw.priors.population import Law, Population, learnt

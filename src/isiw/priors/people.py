@@ -11,7 +11,8 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.models.particles import ParticlePosterior
-from isiw.models.particles.prior import Latents, Prior, used_by
+from isiw.models.particles.latents import Latents, used_by
+from isiw.models.particles.prior import Prior
 from isiw.models.randomness import systematic
 from isiw.priors.components import LATENT_BLOCKS, columns
 from isiw.priors.population import Block, HyperPrior, People

@@ -10,12 +10,14 @@ from isiw.acquisition.information import mutual_information
 from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.metrics import covers
+from isiw.models.particles.latents import LATENTS
+from isiw.models.particles.laws import FOREARM, NoiseShares, ProfilePrior
 from isiw.models.particles.likelihood import levels, total_log_likelihood
 from isiw.models.particles.model import Moving, ParticleModel, ParticlePosterior
 from isiw.models.particles.moves import Mover
 from isiw.models.particles.noise import NoiseKind, draw_log_mep, log_gain, log_likelihood
 from isiw.models.particles.predictions import PersonSample
-from isiw.models.particles.prior import FOREARM, LATENTS, NoiseShares, Person, Prior, ProfilePrior
+from isiw.models.particles.prior import Person, Prior
 from isiw.models.protocol import (
     Observation,
     Posterior,

@@ -6,8 +6,9 @@ import torch
 
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1
+from isiw.models.particles.laws import ProfilePrior
 from isiw.models.particles.predictions import PersonSample
-from isiw.models.particles.prior import Prior, ProfilePrior
+from isiw.models.particles.prior import Prior
 from isiw.models.shared.start import StartPrior
 from isiw.window import Window, window_from_excess
 

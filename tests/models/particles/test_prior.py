@@ -8,26 +8,22 @@ import torch
 
 from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
-from isiw.models.particles.noise import NoiseKind
-from isiw.models.particles.prior import (
-    BLOCKS,
+from isiw.models.particles.latents import BLOCKS, LATENTS, latents_of, used_by
+from isiw.models.particles.laws import (
     FOREARM,
     HAND,
-    LATENTS,
     Floor,
     Gain,
     Muscle,
     NoiseShares,
-    Person,
-    Prior,
     ProfilePrior,
     SessionPrior,
     ShapeShares,
     SwitchPrior,
     Width,
-    latents_of,
-    used_by,
 )
+from isiw.models.particles.noise import NoiseKind
+from isiw.models.particles.prior import Person, Prior
 from isiw.models.particles.shapes import ShapeKind
 from isiw.models.shared.scales import Scale
 
@@ -60,6 +56,7 @@ def test_kinds_come_as_often_as_the_prior_says() -> None:
         (Floor, {"median_mv": Scale(0.009, 0.0)}),
         (SessionPrior, {"drift_sd": -0.1}),
         (SessionPrior, {"startup": Scale(0.5, -0.5)}),
+        (SwitchPrior, {"reliability": Scale(0.2, 0.7, 0.1)}),  # a mixture has other components instead of tails
     ],
 )
 def test_an_invalid_part_is_refused(part: type, wrong: dict[str, object]) -> None:

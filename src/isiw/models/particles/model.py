@@ -16,11 +16,12 @@ import torch
 from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
+from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import levels, total_log_likelihood
 from isiw.models.particles.moves import Mover
 from isiw.models.particles.noise import NoiseKind, Response, draw_log_mep, log_gain
 from isiw.models.particles.predictions import PersonSample
-from isiw.models.particles.prior import Latents, Person, Prior
+from isiw.models.particles.prior import Person, Prior
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Observation, SimulatedPerson, Tensor
 from isiw.models.randomness import SIMULATED, step_generator, systematic

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import torch
 
 from isiw.design import DesignSpace
+from isiw.models.particles.latents import PROFILE_BLOCKS, RESPONSE_BLOCKS, Latents, latents_of, used_by
 from isiw.models.particles.likelihood import total_log_likelihood
-from isiw.models.particles.prior import PROFILE_BLOCKS, RESPONSE_BLOCKS, Latents, Prior, latents_of, used_by
+from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 

@@ -35,8 +35,8 @@ class Place:
 
     def __post_init__(self) -> None:
         check_probabilities(self, "share")
-        check_scales(self, "start_ms", positive=False)
-        check_scales(self, "width_ms")
+        check_scales(self, "start_ms", positive=False, tailed=False)
+        check_scales(self, "width_ms", tailed=False)
         check_choice(self, "reference", get_args(Reference))
 
 

@@ -39,24 +39,25 @@ class Scale(NamedTuple):
         return torch.sigmoid(self.normal(z))
 
 
-def check_scales(owner: object, *names: str, positive: bool = True) -> None:
+def check_scales(owner: object, *names: str, positive: bool = True, tailed: bool = True) -> None:
     """Check fields of a frozen dataclass that are scales, and make scales of tuples and lists.
 
     Args:
         owner: the instance.
         *names: its fields.
         positive: whether the quantities are positive.
+        tailed: whether they may have a tail; where not, another than 0 is refused.
 
     Raises:
         InvalidValueError: a field that is not a scale.
     """
     for name in names:
         value = tuple(getattr(owner, name))
-        if not _is_scale(value, positive=positive):
+        if not _is_scale(value, positive=positive) or (any(value[2:]) and not tailed):
             raise InvalidValueError(
                 f"{type(owner).__name__}.{name} must be a scale",
                 got=value,
-                expected="a median, an SD, and a cubic tail",
+                expected="a median, an SD, and a cubic tail" if tailed else "a median and an SD",
             )
         object.__setattr__(owner, name, Scale(*map(float, value)))
 

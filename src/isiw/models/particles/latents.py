@@ -1,0 +1,81 @@
+"""The latents of a particle: a vector of numbers of one meaning each, in blocks by what they are about."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import torch
+
+from isiw.models.particles.noise import NoiseKind
+from isiw.models.protocol import Tensor
+
+__all__ = ["BLOCKS", "LATENTS", "PROFILE_BLOCKS", "RESPONSE_BLOCKS", "Latents", "latents_of", "used_by"]
+
+BLOCKS: Final = {
+    "start": ("start_ms",),
+    "width": ("log_width_ms",),
+    "form": ("form",),
+    "floor": ("log_floor_mv", "log_floor_sd"),
+    "session": ("drift", "startup"),
+    "gain": ("log_gain", "log_cv"),
+    "reliability": ("reliability",),
+    "switch": ("switched_on", "switched_off"),
+    "recruitment": ("log_ceiling", "log_slope", "log_input_sd", "log_sigma_y", "log_boost", "rest"),
+}
+"""The latents by what they are about."""
+
+LATENTS: Final = tuple(name for names in BLOCKS.values() for name in names)
+"""Names of the latents, in order."""
+
+PROFILE_BLOCKS: Final = ("start", "width", "form")
+RESPONSE_BLOCKS: Final = ("gain", "reliability", "switch", "recruitment")
+
+_COMMON: Final = ("floor", "session")
+_USED: Final = {
+    NoiseKind.CONSTANT_CV: ("gain",),
+    NoiseKind.MISSING: ("gain", "reliability"),
+    NoiseKind.RECRUITMENT: ("recruitment",),
+    NoiseKind.ALL_OR_NONE: ("gain", "switch"),
+}
+
+
+def latents_of(*blocks: str, device: torch.device) -> Tensor:
+    """Which latents belong to some of `BLOCKS`, shape (d,).
+
+    Args:
+        *blocks: names of the blocks.
+        device: torch device.
+    """
+    chosen = {latent for block in blocks for latent in BLOCKS[block]}
+    return torch.tensor([latent in chosen for latent in LATENTS], device=device)
+
+
+def used_by(noise: Tensor, present: Tensor) -> Tensor:
+    """Which latents mean anything to particles of some kinds; all others are as the prior draws them.
+
+    Args:
+        noise: one of `NoiseKind`, shape (b, p).
+        present: whether there is any facilitation, shape (b, p).
+
+    Returns:
+        Shape (b, p, d).
+    """
+    device = noise.device
+    by_kind = torch.stack([latents_of(*_COMMON, *_USED[kind], device=device) for kind in NoiseKind])
+    return by_kind[noise] | (present.unsqueeze(-1) & latents_of(*PROFILE_BLOCKS, device=device))
+
+
+class Latents(NamedTuple):
+    """Particles of b people.
+
+    Args:
+        values: of the latents, in the order of `LATENTS`, shape (b, p, d).
+        shape: one of `ShapeKind`, shape (b, p).
+        noise: one of `NoiseKind`, shape (b, p).
+        present: whether there is any facilitation, shape (b, p).
+    """
+
+    values: Tensor
+    shape: Tensor
+    noise: Tensor
+    present: Tensor

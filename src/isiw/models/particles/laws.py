@@ -1,0 +1,312 @@
+"""What is believed of each part of a person before the first trial, and where each belief comes from.
+
+The first of several laws is what is usual, the others say what else may be.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Final
+
+from isiw.checks import check_numbers, check_probabilities
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.models.particles.places import Place
+from isiw.models.shared.scales import Scale, check_scales
+from isiw.models.shared.start import StartPrior
+
+__all__ = [
+    "FOREARM",
+    "HAND",
+    "OTHER_MUSCLE",
+    "Floor",
+    "Gain",
+    "Muscle",
+    "NoiseShares",
+    "ProfilePrior",
+    "SessionPrior",
+    "ShapeShares",
+    "SwitchPrior",
+    "Width",
+]
+
+
+def _check_shares(shares: object) -> None:
+    names = [f.name for f in fields(shares)]  # type: ignore[arg-type] # a dataclass
+    check_probabilities(shares, *names)
+    total = math.fsum(getattr(shares, name) for name in names)
+    if not math.isclose(total, 1.0, abs_tol=1e-6):
+        raise InvalidValueError(f"the probabilities of {type(shares).__name__} must sum to 1", got=total)
+
+
+@dataclass(frozen=True)
+class ShapeShares:
+    """Probabilities of the families of profiles, in the order of `ShapeKind`.
+
+    Most profiles pass a normality test (dissertation, 4.2: 8 of 11), the others are described in its outlook (8.1).
+
+    Args:
+        gaussian: of Gaussian profiles.
+        skewed: of skewed ones.
+        plateau: of flat-topped ones.
+        two_peak: of those with two peaks.
+
+    Raises:
+        InvalidValueError: probabilities that do not sum to 1.
+    """
+
+    gaussian: float = 0.68
+    skewed: float = 0.12
+    plateau: float = 0.08
+    two_peak: float = 0.12
+
+    def __post_init__(self) -> None:
+        _check_shares(self)
+
+
+@dataclass(frozen=True)
+class NoiseShares:
+    """Probabilities of the kinds of noise, in the order of `NoiseKind`.
+
+    Args:
+        constant_cv: of noise of a constant CV.
+        missing: of the same with missing responses.
+        recruitment: of a recruitment curve with noise on its input.
+        all_or_none: of responses that are all or none: those of a very steep curve.
+
+    Raises:
+        InvalidValueError: probabilities that do not sum to 1.
+    """
+
+    constant_cv: float = 0.37
+    missing: float = 0.11
+    recruitment: float = 0.44
+    all_or_none: float = 0.08
+
+    def __post_init__(self) -> None:
+        _check_shares(self)
+
+
+@dataclass(frozen=True)
+class Width:
+    """A law of the window's width.
+
+    Args:
+        share: its probability.
+        width_ms: the width.
+
+    Raises:
+        InvalidValueError: an invalid share or scale.
+    """
+
+    share: float
+    width_ms: Scale
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "share")
+        check_scales(self, "width_ms", tailed=False)
+
+
+@dataclass(frozen=True)
+class ProfilePrior:
+    """Of the facilitation by ISI.
+
+    Args:
+        p_window: probability that there is any facilitation.
+        shapes: probabilities of the families.
+        start: where windows start.
+        widths: how wide they are; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
+        places: where and how wide they are as far as earlier sessions say; the rest of the probability is that of
+            `start` and `widths`.
+
+    Raises:
+        InvalidValueError: an invalid probability, places that leave nothing to the rest, or that count from different
+            events.
+    """
+
+    p_window: float = 0.72
+    shapes: ShapeShares = field(default_factory=ShapeShares)
+    start: StartPrior = field(default_factory=StartPrior)
+    widths: tuple[Width, ...] = (Width(0.8, Scale(100.0, 0.42)), Width(0.2, Scale(150.0, 0.6)))
+    places: tuple[Place, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "p_window")
+        if self.p_place >= 1.0:
+            raise InvalidValueError("the shares of ProfilePrior.places must sum to less than 1", got=self.p_place)
+        if len(references := {place.reference for place in self.places}) > 1:
+            raise InvalidValueError("ProfilePrior.places must count from one event", got=sorted(references))
+
+    @property
+    def p_place(self) -> float:
+        """Probability that a window is where earlier sessions say."""
+        return math.fsum(place.share for place in self.places)
+
+    def require_space(self, space: DesignSpace) -> None:
+        """Check that the places mean something in a space.
+
+        Raises:
+            InvalidValueError: they count from another event than the space.
+        """
+        if self.places and self.places[0].reference != space.reference:
+            raise InvalidValueError(
+                "the prior's places and the design space count ISIs from different events",
+                got=f"{space.reference} in the space",
+                expected=self.places[0].reference,
+                remedy="Use the prior with the kind of space that it was learnt in.",
+            )
+
+
+@dataclass(frozen=True)
+class Muscle:
+    """A law of recruitment curves: `s = A / (1 + exp(-k (x + sigma_x z1 - x50))) exp(sigma_y z2)` (Goetz et al.).
+
+    Args:
+        name: what it is called.
+        share: its probability.
+        ratio: the largest MEP over the floor, A.
+        slope_per_pct: k [1 / % RMT].
+        input_sd: SD of the noise on the input, k sigma_x: about the same in steep curves and flat ones.
+        sigma_y: SD of the noise on the output, natural log.
+        boost_pct: shift of the input at the best ISI [% RMT].
+        rest_pct: the input without a tap, intensity − x50 [% RMT].
+
+    Raises:
+        InvalidValueError: an invalid share or scale.
+    """
+
+    name: str
+    share: float
+    ratio: Scale
+    slope_per_pct: Scale
+    input_sd: Scale
+    sigma_y: Scale
+    boost_pct: Scale
+    rest_pct: Scale
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "share")
+        check_scales(self, "ratio", "slope_per_pct", "input_sd", "sigma_y", "boost_pct", tailed=False)
+        check_scales(self, "rest_pct", positive=False, tailed=False)
+
+
+FOREARM: Final = Muscle(
+    name="forearm",
+    share=0.54,
+    ratio=Scale(16.0, 0.45),  # 0.1–0.25 mV over the floor
+    slope_per_pct=Scale(0.30, 0.06),
+    input_sd=Scale(2.1, 0.20),  # 5–9 % RMT
+    sigma_y=Scale(0.39, 0.19),  # 0.3–0.5
+    boost_pct=Scale(11.3, 0.36),  # 5–18 % RMT
+    rest_pct=Scale(-15.0, 1.5),  # 90 % RMT, half of the largest MEP at RMT + 4 %
+)
+
+HAND: Final = Muscle(
+    name="hand",
+    share=0.16,
+    ratio=Scale(90.0, 0.85),  # 0.2–3 mV over the floor
+    slope_per_pct=Scale(0.23, 0.1),
+    input_sd=Scale(1.65, 0.25),
+    sigma_y=Scale(0.39, 0.19),
+    boost_pct=Scale(15.0, 0.5),  # nobody has measured it
+    rest_pct=Scale(-19.0, 6.0),  # 90–110 % RMT, half of the largest MEP at RMT + 17 %
+)
+
+OTHER_MUSCLE: Final = Muscle(
+    name="other muscle",
+    share=0.30,
+    ratio=Scale(18.0, 0.7),
+    slope_per_pct=Scale(0.36, 0.5),
+    input_sd=Scale(2.0, 0.3),
+    sigma_y=Scale(0.39, 0.3),
+    boost_pct=Scale(10.5, 0.45),
+    rest_pct=Scale(-14.5, 5.0),
+)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A law of responses in proportion to the facilitation, with noise of a constant CV.
+
+    Args:
+        share: its probability.
+        ratio: the best expected MEP over the floor; MEPs peak at 0.03–0.3 mV (dissertation, 4.2).
+        cv: the CV.
+
+    Raises:
+        InvalidValueError: an invalid share or scale.
+    """
+
+    share: float
+    ratio: Scale
+    cv: Scale
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "share")
+        check_scales(self, "ratio", "cv", tailed=False)
+
+
+@dataclass(frozen=True)
+class SwitchPrior:
+    """Of the probabilities with which responses come, where they may be missing or are all or none; in logits.
+
+    Args:
+        reliability: of a response at the best ISI where responses may be missing; often about one half (dissertation,
+            Fig. 6.5).
+        switched_on: of a response at the best ISI where responses are all or none.
+        switched_off: of such a response without a tap; 0.05–0.25 of the trials at 90 % RMT are above 50 µV in the hand,
+            next to none in the forearm.
+
+    Raises:
+        InvalidValueError: an invalid scale.
+    """
+
+    reliability: Scale = Scale(0.2, 0.7)
+    switched_on: Scale = Scale(1.2, 0.9)
+    switched_off: Scale = Scale(-3.3, 1.0)
+
+    def __post_init__(self) -> None:
+        check_scales(self, "reliability", "switched_on", "switched_off", positive=False, tailed=False)
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A law of the EMG floor.
+
+    Args:
+        share: its probability.
+        median_mv: its median [mV]; 6–20 µV measured.
+        log_sd: its SD from trial to trial, natural log; 0.12–0.35.
+
+    Raises:
+        InvalidValueError: an invalid share or scale.
+    """
+
+    share: float
+    median_mv: Scale
+    log_sd: Scale
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "share")
+        check_scales(self, "median_mv", "log_sd", tailed=False)
+
+
+@dataclass(frozen=True)
+class SessionPrior:
+    """Of what changes within a session.
+
+    Args:
+        drift_sd: SD of what the log of evoked MEPs drifts by in the long run; about 0.26 over a session measured.
+        startup: how strongly the first trials startle, 1 being as much as in blocks of plain TMS.
+
+    Raises:
+        InvalidValueError: an SD that is not positive, or an invalid scale.
+    """
+
+    drift_sd: float = 0.3
+    startup: Scale = Scale(0.5, 0.5)
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "drift_sd", above=0)
+        check_scales(self, "startup", positive=False, tailed=False)
