@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias
 
@@ -191,6 +192,7 @@ class WindowEstimate:
         expected_f1: posterior mean of the F1 of the reported decision.
         best_isi: the ISI of the largest expected MEP.
         largest_excluded: an enhancement that, with 90 % probability, is larger than the largest at any ISI.
+        unusual: how probable it is that parts of this person are of another law than the usual one, by their names.
         pairs: how many pairs of stimuli it rests on; None where that is not known.
 
     Raises:
@@ -212,6 +214,7 @@ class WindowEstimate:
     expected_f1: float | None = None
     best_isi: BestISI | None = None
     largest_excluded: Enhancement | None = None
+    unusual: Mapping[str, float] = field(default_factory=dict, repr=False)
     pairs: int | None = None
 
     def __post_init__(self) -> None:

@@ -208,3 +208,10 @@ def test_progress_of_a_method_without_posterior_has_gaps() -> None:
     assert progress_row(update_with(WindowEstimate(None, None), trial)) == (
         "3", "–", "mistrial: no impact", "", "none", "", "", "17"
     )  # fmt: skip
+
+
+def test_a_person_unlike_most_is_told_so(record: SessionRecord) -> None:
+    shares = {"the width of the window": 0.97, "the EMG floor": 0.4}
+    statement = final_statement(with_estimate(record, unusual=shares))
+    assert "This person is unlike most in the width of the window (probability 0.97)." in statement
+    assert "EMG floor" not in statement

@@ -148,9 +148,9 @@ class Estimate(_Record):
     """What was believed after a trial, whether to stop, and what is asked next.
 
     `start_beyond`, `end_beyond` and `split` are probabilities given a window: that an edge lies beyond the range, and
-    that there is more than one segment. `hypotheses` are probabilities by name, `best_isi_ms` is the median and the
-    ends of the 90 % interval; `excluded_mv` and `excluded_pct_rmt` are the largest enhancement that is excluded with
-    90 % probability.
+    that there is more than one segment. `hypotheses` and `unusual` are probabilities by name, `best_isi_ms` is the
+    median and the ends of the 90 % interval; `excluded_mv` and `excluded_pct_rmt` are the largest enhancement that is
+    excluded with 90 % probability.
     """
 
     trial: TrialNumber
@@ -166,6 +166,7 @@ class Estimate(_Record):
     end_beyond: float | None = None
     split: float | None = None
     hypotheses: dict[str, float] = Field(default_factory=dict)
+    unusual: dict[str, float] = Field(default_factory=dict)
     expected_f1: float | None = None
     best_isi_ms: tuple[float, ...] = ()
     excluded_mv: float | None = None
@@ -205,6 +206,7 @@ class Estimate(_Record):
             end_beyond=beyond[1],
             split=estimate.split_probability,
             hypotheses=estimate.hypotheses or {},
+            unusual=dict(estimate.unusual),
             expected_f1=estimate.expected_f1,
             best_isi_ms=tuple(estimate.best_isi or ()),
             excluded_mv=None if excluded is None else excluded.mep_mv,

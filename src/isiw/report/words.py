@@ -29,6 +29,9 @@ WORTH_SAYING = 0.1
 SURE = 0.95
 """Probability that there is none, from which on no window was found; below it that is undecided."""
 
+UNUSUAL = 0.9
+"""Probability from which on a person is told to be unlike most."""
+
 _AFTER = {"impact": "after the impact", "valve": "after the valve command"}
 
 
@@ -65,6 +68,7 @@ def _findings(record: SessionRecord, estimate: Estimate) -> list[str]:
         _best_isi(estimate),
         _excluded(estimate),
         _expected_f1(estimate),
+        _unusual(estimate),
     ]
 
 
@@ -112,6 +116,11 @@ def _figure(value: float) -> str:
 
 def _expected_f1(estimate: Estimate) -> str:
     return "" if estimate.expected_f1 is None else f"The expected F1 of this result is {estimate.expected_f1:.2f}."
+
+
+def _unusual(estimate: Estimate) -> str:
+    said = [f"{what} (probability {p:.2f})" for what, p in estimate.unusual.items() if p >= UNUSUAL]
+    return f"This person is unlike most in {', '.join(said)}." if said else ""
 
 
 def _between(interval: tuple[float | None, float | None], space: DesignSpace) -> str:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from dataclasses import astuple, fields, replace
 from typing import Any
 
@@ -26,6 +27,7 @@ from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Person, Prior
 from isiw.models.particles.shapes import ShapeKind
 from isiw.models.shared.scales import Scale
+from isiw.models.shared.start import StartPrior
 
 MANY = 20_000
 ONLY_CURVES = NoiseShares(0.0, 0.0, 1.0, 0.0)
@@ -145,3 +147,26 @@ def test_the_density_is_the_law_that_samples_are_drawn_from() -> None:
     ratio = (there.log_density(latents.values, VALVE_SPACE) - here.log_density(latents.values, VALVE_SPACE)).exp()
     assert ratio.mean().item() == pytest.approx(1.0, abs=0.02)
     assert ratio.std().item() > 0.1
+
+
+def test_a_person_unlike_most_is_told_by_the_part_that_is_unusual() -> None:
+    prior = Prior(ProfilePrior(start=StartPrior(hit_delay_ms=(180.0, 6.2))))
+    latents = prior.sample(1, 500, torch.Generator().manual_seed(0), VALVE_SPACE)
+    usual = latents.values.clone()
+    usual[..., LATENTS.index("start_ms")] = 240.0
+    usual[..., LATENTS.index("log_width_ms")] = math.log(90.0)
+    usual[..., LATENTS.index("log_floor_mv")] = math.log(0.009)
+    usual[..., LATENTS.index("log_floor_sd")] = math.log(0.22)
+    assert max(prior.unusual(latents._replace(values=usual), VALVE_SPACE).values()) < 0.4
+    for name, latent, value in (
+        ("the start of the window", "start_ms", 400.0),
+        ("the width of the window", "log_width_ms", math.log(400.0)),
+        ("the EMG floor", "log_floor_mv", math.log(0.2)),
+    ):
+        changed = usual.clone()
+        changed[..., LATENTS.index(latent)] = value
+        shares = prior.unusual(latents._replace(values=changed), VALVE_SPACE)
+        assert shares.pop(name) > 0.95
+        assert max(shares.values()) < 0.4
+    nobody = latents._replace(present=torch.zeros_like(latents.present))
+    assert list(prior.unusual(nobody, VALVE_SPACE)) == ["the EMG floor"]

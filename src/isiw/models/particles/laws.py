@@ -128,7 +128,7 @@ class ProfilePrior:
     p_window: float = 0.72
     shapes: ShapeShares = field(default_factory=ShapeShares)
     start: StartPrior = field(default_factory=StartPrior)
-    widths: tuple[Width, ...] = (Width(0.8, Scale(100.0, 0.42)), Width(0.2, Scale(150.0, 0.6)))
+    widths: tuple[Width, ...] = (Width(0.7, Scale(100.0, 0.42)), Width(0.3, Scale(170.0, 0.5)))
     places: tuple[Place, ...] = ()
 
     def __post_init__(self) -> None:

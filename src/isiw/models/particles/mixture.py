@@ -50,6 +50,11 @@ class Mixture:
         density: Tensor = torch.logsumexp(self.log_parts(x), dim=-1)
         return density
 
+    def usual(self, x: Tensor) -> Tensor:
+        """Probability that x (..., d) is of the first component, shape (...)."""
+        share: Tensor = torch.softmax(self.log_parts(x), dim=-1)[..., 0]
+        return share
+
     def component(self, x: Tensor) -> Tensor:
         """The component that most probably explains x (..., d), shape (...)."""
         return self.log_parts(x).argmax(-1)

@@ -259,7 +259,11 @@ class ParticlePosterior:
         profiles = SampledProfiles(profiles_mv[0], thinned.baselines_mv()[0])
         hypotheses = SampledHypotheses(self.model.prior.hypothesis(latents)[0], self.model.prior.hypotheses)
         estimate = sampled_estimate(sample.window_masks(grid)[0], profiles, self.space, hypotheses)
-        return replace(estimate, largest_excluded=self._with_shift(estimate.largest_excluded, latents))
+        return replace(
+            estimate,
+            largest_excluded=self._with_shift(estimate.largest_excluded, latents),
+            unusual=self.model.prior.unusual(latents, self.space),
+        )
 
     def _with_shift(self, excluded: Enhancement | None, latents: Latents) -> Enhancement | None:
         """The same, with the shift of the input that recruitment curves exclude."""

@@ -210,6 +210,26 @@ class Prior:
             kind = torch.where(latents.noise == noise, number, kind)
         return kind
 
+    def unusual(self, latents: Latents, space: DesignSpace) -> dict[str, float]:
+        """How probable it is that parts of a person are of another law than the usual one, by what they are called.
+
+        Args:
+            latents: equally weighted particles of one person, fields of shape (1, p); those without facilitation say
+                nothing about a window.
+            space: the design space that the window is in.
+        """
+        values = latents.values
+        start, width = values[..., 0], values[..., latents_of("width", device=values.device)]
+        anywhere = torch.softmax(self.log_places(values, space), dim=-1)[..., 0]
+        unusual = {
+            "the start of the window": anywhere * (1.0 - self.profile.start.usual(start, space)),
+            "the width of the window": anywhere * (1.0 - self.mixtures["width"].usual(width)),
+        }
+        floor = values[..., latents_of("floor", device=values.device)]
+        given = {name: share[latents.present] for name, share in unusual.items()}
+        given["the EMG floor"] = 1.0 - self.mixtures["floor"].usual(floor)
+        return {name: float(share.mean()) for name, share in given.items() if share.numel()}
+
     def shift_pct_rmt(self, latents: Latents) -> Tensor:
         """Shift of the recruitment curve's input at the best ISI [% RMT], 0 without facilitation, shape (b, p)."""
         return torch.where(latents.present, latents.values[..., LATENTS.index("log_boost")].exp(), 0.0)

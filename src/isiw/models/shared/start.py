@@ -90,7 +90,7 @@ class StartPrior:
         InvalidValueError: shares that do not sum to 1, a hit delay that is not positive, or an invalid probability.
     """
 
-    spans: tuple[Span, ...] = (Span(0.8, 0.0, 115.0), Span(0.2, -30.0, 260.0, 20.0))
+    spans: tuple[Span, ...] = (Span(0.7, 0.0, 115.0), Span(0.3, -30.0, 260.0, 20.0))
     hit_delay_ms: tuple[float, float] | None = None
     p_robot: float = 0.5
     p_anywhere: float = 0.04
@@ -125,6 +125,17 @@ class StartPrior:
         inside = (start_ms >= law.knots_ms[0]) & (start_ms <= law.knots_ms[-1])
         density = _interpolate(start_ms, law.knots_ms.to(start_ms), law.density.to(start_ms))
         return torch.where(inside, density.clamp_min(1e-30).log(), -torch.inf)
+
+    def usual(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
+        """Probability that some starts are of the usual span, same shape.
+
+        Args:
+            start_ms: the starts [ms], any shape.
+            space: the design space.
+        """
+        spans = [span.share * span.density(start_ms) for span in self.in_space(space)]
+        even = self.p_anywhere / (space.high_ms - space.low_ms + BEFORE_MS)
+        return (1.0 - self.p_anywhere) * spans[0] / ((1.0 - self.p_anywhere) * torch.stack(spans).sum(0) + even)
 
     def in_space(self, space: DesignSpace) -> tuple[Span, ...]:
         """The spans on the clock of a space."""
