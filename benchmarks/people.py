@@ -20,10 +20,12 @@ import typer
 from rich.progress import Progress
 
 from acquisition import facts_of, run
+from isiw.models.particles.prior import Prior
 from isiw.studies import Study, StudyStrategy
 
-MARKS = (5, 10, 15, 20, 25, 30, 40, 50, 60)
+MARKS = (5, 10, 15, 20, 25, 30, 40, 50, 60, 80)
 TENTHS = 10
+NONRESPONDER = "nonresponder"
 
 
 def by_trial(rows: pd.DataFrame) -> pd.DataFrame:
@@ -47,11 +49,35 @@ def at_stopping(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def foretold(rows: pd.DataFrame) -> pd.DataFrame:
-    """Expected against actual F1, by tenths of the expected."""
+    """Expected against actual F1, by tenths of the expected; non-responders weigh as much as the prior believes.
+
+    What is called "no window" is right as often as there are non-responders, so that the share of them decides whether
+    an expected F1 comes true.
+    """
     tenth = (rows["expected_f1"] * TENTHS).astype(int).clip(0, TENTHS - 1) / TENTHS
-    grouped = rows.groupby(tenth.rename("expected_from"))
-    people = rows.assign(tenth=tenth).groupby(["tenth", "cohort", "person"])["f1"].mean().groupby("tenth").size()
-    return _means(grouped, ["expected_f1", "f1"]).assign(sessions=people)
+    weighed = rows.assign(expected_from=tenth, weight=_weights(rows["cohort"]))
+    means = [_weighted_mean(part).rename(start) for start, part in weighed.groupby("expected_from")]
+    return pd.DataFrame(means).rename_axis("expected_from")
+
+
+def _weights(cohorts: pd.Series) -> pd.Series:
+    """Weights that give non-responders the share that the prior believes in, where there are any."""
+    nobody = cohorts == NONRESPONDER
+    if not nobody.any() or nobody.all():
+        return pd.Series(1.0, cohorts.index)
+    share = 1.0 - Prior().profile.p_window
+    return nobody.map({True: share / nobody.mean(), False: (1.0 - share) / (1.0 - nobody.mean())})
+
+
+def _weighted_mean(part: pd.DataFrame) -> pd.Series:
+    """Expected and actual F1 of one tenth; the standard error is that between sessions."""
+    sessions = part.groupby(["cohort", "person"])[["expected_f1", "f1", "weight"]].mean()
+    marks = part.groupby(["cohort", "person"]).size()
+    weights = (sessions["weight"] * marks / (sessions["weight"] * marks).sum()).to_numpy()
+    means = weights @ sessions[["expected_f1", "f1"]].to_numpy()
+    residuals = sessions["f1"].to_numpy() - means[1]
+    error = float(np.sqrt((weights**2 * residuals**2).sum()))
+    return pd.Series({"sessions": len(sessions), "expected_f1": means[0], "f1": means[1], "f1_se": error})
 
 
 def _means(groups: pd.core.groupby.DataFrameGroupBy, names: list[str]) -> pd.DataFrame:

@@ -202,8 +202,8 @@ class SmallGain:
 
     gain: float = 0.02
     last: int = 10
-    min_told: int = 30
-    min_probability: float = 0.9
+    min_told: int = 40
+    min_probability: float = 0.7
 
     def __post_init__(self) -> None:
         check_probabilities(self, "gain", "min_probability")
