@@ -30,8 +30,9 @@ from isiw.plots.study import save_study_plot
 from isiw.studies import Processes, Study, StudyStrategy, conduct, paired_sessions, run_study, summarise
 from isiw.subjects.cohorts import COHORTS
 from oracle import SPANS, simulate_oracle
+from zero_trials import fixed_windows
 
-MARKS = (5, 10, 12, 15, 20, 25, 30, 40, 60, 80)
+MARKS = (0, 5, 10, 12, 15, 20, 25, 30, 40, 60, 80)
 CRITERIA = (0.8, 0.9, 0.95)
 SPACES = {"valve": VALVE_SPACE, "impact": IMPACT_SPACE}
 KEYS = ["cohort", "strategy", "trial"]
@@ -114,12 +115,13 @@ def facts_of(script: str, seed: int, people: int) -> dict[str, object]:
     return {"command": command, "versions": versions, "seed": seed, "people": people}
 
 
-def write(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
+def write(rows: pd.DataFrame, facts: dict[str, object], fixed: pd.DataFrame, out: Path) -> None:
     """Tables and picture."""
     out.parent.mkdir(parents=True, exist_ok=True)
     table = summary(rows)
     tables = {
         "F1 by trial": table,
+        "The best fixed window: F1 without any trial": fixed,
         "Pairs delivered from which on mean F1 is kept (among the marked trials)": reached(table),
         "False decisions": decisions(rows),
         "At the stopping rule": at_stopping(rows),
@@ -216,7 +218,8 @@ def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
         tables = [run(part, folder / str(number), workers, progress) for number, part in enumerate(studies)]
         if amplitude == 1.0:
             tables.append(run_oracle(replace(study, people=min(people, oracle_people)), workers, progress))
-    write(pd.concat(tables, ignore_index=True), facts_of("benchmarks/acquisition.py", seed, people), out)
+    fixed = fixed_windows(names, people, seed, study.space)
+    write(pd.concat(tables, ignore_index=True), facts_of("benchmarks/acquisition.py", seed, people), fixed, out)
     print(out.with_suffix(".md").read_text())
 
 

@@ -22,8 +22,9 @@ from rich.progress import Progress
 from acquisition import facts_of, run
 from isiw.models.particles.prior import Prior
 from isiw.studies import Study, StudyStrategy
+from zero_trials import fixed_windows
 
-MARKS = (5, 10, 15, 20, 25, 30, 40, 50, 60, 80)
+MARKS = (0, 5, 10, 15, 20, 25, 30, 40, 50, 60, 80)
 TENTHS = 10
 NONRESPONDER = "nonresponder"
 
@@ -110,7 +111,12 @@ def main(
     )
     with Progress() as progress:
         rows = run(study, out.with_suffix(".study"), workers, progress)
-    tables = {"By trial": by_trial(rows), "At the stopping rule": at_stopping(rows), "Expected F1": foretold(rows)}
+    tables = {
+        "By trial": by_trial(rows),
+        "The best fixed window: F1 without any trial": fixed_windows(study.cohorts, people, seed, study.space),
+        "At the stopping rule": at_stopping(rows),
+        "Expected F1": foretold(rows),
+    }
     facts = facts_of("benchmarks/people.py", seed, people)
     header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
     parts = [f"## {title}\n\n{part.to_markdown(floatfmt='.3f')}\n" for title, part in tables.items()]

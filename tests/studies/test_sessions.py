@@ -7,6 +7,7 @@ import pytest
 
 from isiw.design import IMPACT_SPACE
 from isiw.errors import InvalidValueError, StudyError
+from isiw.metrics import f1
 from isiw.studies import SimulatedSession, paired_sessions, play, run_study, simulate
 from isiw.window import Window
 from known import known
@@ -44,6 +45,17 @@ def test_each_mark_is_a_row_and_the_perfect_player_scores_one() -> None:
     assert rows["f1"].tolist() == [1.0, 1.0]
     assert rows["start_covered"].isna().all()
     assert rows["reported_window"].all()
+
+
+def test_a_mark_of_zero_is_what_is_believed_before_any_trial() -> None:
+    session = replace(small(), marks=(0, 4))
+    rows = simulate(session)
+    before = session.player().estimate()
+    assert rows["trial"].tolist() == [0, 4]
+    assert rows["delivered"].tolist() == [0, 4]
+    assert rows["probability"][0] == before.probability
+    assert rows["f1"][0] == f1(before, session.subject().window(session.space), session.space)
+    assert rows["tell_ms"].isna().tolist() == [True, False]
 
 
 def test_every_player_meets_the_same_person_with_the_same_noise() -> None:

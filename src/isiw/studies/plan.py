@@ -119,7 +119,7 @@ class Study:
         people: how many people of each.
         seed: seed of the people, their trial noise and the strategies; 0–999 are for development.
         trials: how many trials a session has at most.
-        marks: after which trials the estimate is recorded; by default each fifth and the last.
+        marks: after which trials the estimate is recorded, 0 being before any; by default each fifth and the last.
         space: the design space.
         stopping: whether a strategy's stopping rule is `"ignored"`, or it is `"noted"` when it fires (an estimate
             after each trial), or `"ends"` the session.
@@ -157,8 +157,8 @@ class Study:
         if not self.marks:
             object.__setattr__(self, "marks", (*range(5, self.trials, 5), self.trials))
         check_numbers(self, "amplitude", above=0)
-        if list(self.marks) != sorted(set(self.marks)) or not 1 <= self.marks[0] <= self.marks[-1] <= self.trials:
-            raise InvalidValueError("marks ascend from 1 to the number of trials", got=self.marks)
+        if list(self.marks) != sorted(set(self.marks)) or not 0 <= self.marks[0] <= self.marks[-1] <= self.trials:
+            raise InvalidValueError("marks ascend from 0 to the number of trials", got=self.marks)
         check_choice(self, "stopping", get_args(Stopping))
         check_choice(self, "engine", get_args(Engine))
         check_choice(self, "hit_delay", get_args(HitDelay))

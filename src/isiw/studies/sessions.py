@@ -95,7 +95,7 @@ class SimulatedSession:
         person: which person of it, from 0.
         seed: seed of the cohort; trial noise and strategy use `seed + person`.
         trials: how many trials to run at most.
-        marks: after which trials the estimate is recorded.
+        marks: after which trials the estimate is recorded; 0 is before any.
         space: the design space.
         settings: settings of the strategy, as (name, value) pairs.
         label: what the strategy is called in the table; by default its name.
@@ -178,6 +178,8 @@ def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
         StudyError: a person's realised ISIs are hardly ever near enough to the commanded ones.
     """
     people = [_Person(session, number, crowd) for number, session in enumerate(sessions)]
+    for person in people:
+        person.note_before()
     for trial in range(1, sessions[0].trials + 1):
         began_s = time.perf_counter()
         choices = crowd.ask()
@@ -228,6 +230,10 @@ class _Person:
             expected=f"ISIs within {space.tolerance_ms:g} ms of it",
             remedy="Give the space a wider tolerance_ms.",
         )
+
+    def note_before(self) -> None:
+        if 0 in self.session.marks:
+            self.rows.append(self._row(0) | dict.fromkeys(TIMES, math.nan))
 
     def note(self, trial: int, choice: Choice, spent_ms: dict[str, float]) -> None:
         if self.ended:
