@@ -89,19 +89,24 @@ def _reported(hit_delay_ms: tuple[float, float], space: DesignSpace) -> Window |
     return isiw.make_strategy("default", space=space, hit_delay_ms=hit_delay_ms).estimate().window
 
 
+def without_any_trial(cohorts: Sequence[str], people: int, seed: int, space: DesignSpace) -> pd.DataFrame:
+    """One row a cohort: mean F1 of the default before any trial, and of the best fixed window; as `fixed_windows`."""
+    fixed = fixed_windows(cohorts, people, seed, space)
+    before = [before_any_trial(cohort, people, seed, space) for cohort in cohorts]
+    fixed.insert(1, "default before any trial", before)
+    return fixed.rename(columns={"f1": "best fixed window", "window": "which"})
+
+
 def main(
     people: Annotated[int, typer.Option(help="People per cohort.")] = 1000,
     seed: Annotated[int, typer.Option(help="Seed of the people that are reported.")] = 90_000,
 ) -> None:
     """Print mean F1 of both, by cohort, over 500 ms after the valve command."""
-    table = fixed_windows(list(COHORTS), people, seed, VALVE_SPACE)
-    before = [before_any_trial(cohort, people, seed, VALVE_SPACE) for cohort in COHORTS]
-    table.insert(1, "default before any trial", before)
-    named = table.rename(columns={"f1": "best fixed window", "window": "which"})
+    table = without_any_trial(list(COHORTS), people, seed, VALVE_SPACE)
     print(f"- command: `{shlex.join(['python', *sys.argv])}`")
     print(f"- people: {people} per cohort; standard errors about .01 at most")
     print("- `kim11` has eleven people, so its fixed window was chosen on the same ones\n")
-    print(named.to_markdown(index=False, floatfmt=".2f"))
+    print(table.to_markdown(index=False, floatfmt=".2f"))
 
 
 if __name__ == "__main__":
