@@ -4,8 +4,10 @@
 
 Each session has a device that fails at random (`isiw.testing.FaultyDevice`), from a stage that hangs to an answer that
 comes too late. What ends a session is resumed until its stimuli are used up. Then what the device has really fired is
-compared with the log, pair by pair, and what was asked with what the strategy asks again when it is told the log. The
-strategy is one that depends on all it was told and costs nothing, so that it is the loop that is tried.
+compared with the log, pair by pair, and what was asked with what the strategy asks again when it is told the log.
+
+It is the loop that is tried, so most sessions have a strategy that depends on all it was told and costs almost nothing.
+One in ten has a named one, which is made again from the log: `default`, `random`, `even` and `nr` in turn.
 """
 
 from __future__ import annotations
@@ -32,6 +34,10 @@ from benchmarks.remembering import SPACE, answer, strategy
 from isiw.testing import Fault, FaultyDevice, check_ledger
 
 STUCK_S = 600.0
+MOST_RUNS = 100
+
+NAMED = {0: "default", 10: "random", 20: "even", 30: "nr"}
+"""The named strategies, by the remainder of the seed and 40."""
 
 
 class Soaked:
@@ -57,6 +63,7 @@ class Soaked:
             isiw.CallbackDevice(answer, info), seed, self.clock, rate=rate, late_s=0.3, on_fire=self.check_intent
         )
         self.runs = 0
+        self.name = NAMED.get(seed % 40, "")
 
     def check_intent(self, stimulus: isiw.Stimulus) -> None:
         """What is about to be fired is on disk already; looked at in every tenth session, as it means reading it."""
@@ -68,6 +75,8 @@ class Soaked:
         """Run and resume until the strategy stops; the log at the end."""
         while not self.ended():
             self.runs += 1
+            if self.runs > MOST_RUNS:
+                sys.exit(f"session {self.seed} does not end")
             try:
                 self.session().run()
             except (isiw.errors.IsiwError, TypeError, ValueError):
@@ -82,13 +91,31 @@ class Soaked:
         """Whether all stimuli are used up."""
         return self.log.exists() and len(isiw.read_session(self.log).table) >= self.trials
 
+    def strategy(self) -> isiw.Strategy:
+        """Its strategy, before the first trial."""
+        if not self.name:
+            return strategy(self.trials, self.seed)
+        return isiw.make_strategy(self.name, SPACE, self.seed, **_to_the_end(self.name, self.trials))
+
+    def logged_strategy(self) -> isiw.Strategy | None:
+        """What is handed over to go on: none where the log holds it."""
+        return None if self.name else self.strategy()
+
     def session(self) -> isiw.Session:
         """The session, new or resumed."""
-        own = strategy(self.trials, self.seed)
         times = {"clock": self.clock, "timeout_s": 0.2, "safeguards": self.guards, "limits": self.limits}
         if self.log.exists():
-            return isiw.resume(self.log, self.device, own, **times)
-        return isiw.Session(self.device, own, log=self.log, **times)
+            return isiw.resume(self.log, self.device, self.logged_strategy(), **times)
+        return isiw.Session(self.device, self.strategy(), log=self.log, **times)
+
+
+def _to_the_end(name: str, trials: int) -> dict[str, float]:
+    """Settings with which a named strategy does not stop before all stimuli are used up."""
+    if name == "nr":
+        return {"max_iterations": trials, "stop_last": 1000}  # the limit on pulses ends it
+    small = {} if name == "default" else {"particles": 100}
+    never = {"stop_width_ms": 1e-6, "stop_expected_f1": 1, "stop_gain": 0, "stop_no_window": 1}
+    return {"max_trials": trials, **never, **small}
 
 
 def check(soaked: Soaked, record: isiw.log.SessionRecord) -> None:
@@ -96,7 +123,7 @@ def check(soaked: Soaked, record: isiw.log.SessionRecord) -> None:
     if record.losses or not record.finished:
         sys.exit(f"the log of session {soaked.seed} is damaged: {record.losses}")
     check_ledger(soaked.device.ledger, record, soaked.limits)
-    isiw.resume(soaked.log, soaked.device, strategy(soaked.trials, soaked.seed))  # raises where it asks differently
+    isiw.resume(soaked.log, soaked.device, soaked.logged_strategy())  # raises where it asks differently
 
 
 def main() -> None:
@@ -125,6 +152,7 @@ def main() -> None:
             happened += soaked.device.happened
             counts += Counter(
                 sessions=1,
+                named=bool(soaked.name),
                 runs=soaked.runs,
                 trials=len(record.table),
                 fired=len(soaked.device.ledger),
@@ -139,7 +167,8 @@ def main() -> None:
     print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.soak', *sys.argv[1:]])}`")
     print(f"- python {platform.python_version()}, {', '.join(f'{name} {v}' for name, v in versions.items())}\n")
     print(
-        f"{counts['sessions']:,} sessions of {arguments.trials} trials, run {counts['runs']:,} times in all: "
+        f"{counts['sessions']:,} sessions of {arguments.trials} trials (seeds {arguments.seed} to {seed}, "
+        f"{counts['named']:,} with a named strategy), run {counts['runs']:,} times in all: "
         f"{counts['fired']:,} pairs fired, {counts['trials']:,} trials logged, {counts['told']:,} of them told, "
         f"{counts['refused']:,} refusals, {counts['late']:,} late answers. No pair without an intent before it, none "
         "twice, no limit passed, none missing in a log, no log damaged, no session left armed, every ask the same "
