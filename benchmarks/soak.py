@@ -71,7 +71,7 @@ class Soaked:
             last = isiw.read_session(self.log).intents[-1]
             assert (last.trial, last.isi_ms) == (stimulus.trial, stimulus.isi_ms)  # noqa: S101 - what is tried here
 
-    def run(self) -> isiw.log.SessionRecord:
+    def run(self) -> isiw.SessionRecord:
         """Run and resume until the strategy stops; the log at the end."""
         while not self.ended():
             self.runs += 1
@@ -118,7 +118,7 @@ def _to_the_end(name: str, trials: int) -> dict[str, float]:
     return {"max_trials": trials, **never, **small}
 
 
-def check(soaked: Soaked, record: isiw.log.SessionRecord) -> None:
+def check(soaked: Soaked, record: isiw.SessionRecord) -> None:
     """End the program where anything is lost, given twice, or asked differently."""
     if record.losses or not record.finished:
         sys.exit(f"the log of session {soaked.seed} is damaged: {record.losses}")
