@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 import zstandard
@@ -30,6 +31,9 @@ _MARK = b"\x04\x00\x00\x00zstd"
 _MARK_AT = 8 + 8 + 8 + 4  # behind a block's two times, size and checksum
 _HEAD: Final = struct.Struct("<QQQI4x4xQ")
 """A block's two times, size and checksum, then the mark, and the length of its data."""
+
+_RECORD_HEAD: Final = struct.Struct("<BQ")
+"""What a record is, and its length."""
 
 
 class LostBlockError(Exception):
@@ -77,16 +81,38 @@ class Unpacking:
         """
         try:
             size = _honest_size(block)
-            if size > self._bytes_left or not self._records_left:
-                raise LostBlockError(f"The block at byte {offset} makes the log too large to be one, and is left out.")
-            contents = breakup_chunk(block, validate_crc=True)
+            _require_room(offset, self._bytes_left, size)
+            self._bytes_left -= size  # whatever becomes of it, as unpacking it takes time
+            unpacked = _unpacked(block)
+            number, left = _count(unpacked.data, self._records_left + 1), self._records_left
+            self._records_left = max(0, left - number)
+            _require_room(offset, left, number)
+            return breakup_chunk(unpacked, validate_crc=True)
         except UNREADABLE as error:
             raise LostBlockError(
                 f"A block of {len(block.data)} bytes at byte {offset} fails its checksum and is lost."
             ) from error
-        self._bytes_left -= size
-        self._records_left = max(0, self._records_left - len(contents))
-        return contents
+
+
+def _require_room(offset: int, left: int, needed: int) -> None:
+    if needed > left:
+        raise LostBlockError(f"The block at byte {offset} makes the log too large to be one, and is left out.")
+
+
+def _unpacked(block: mcap.Chunk) -> mcap.Chunk:
+    """The same block without compression."""
+    if not block.compression:
+        return block
+    return replace(block, compression="", data=zstandard.decompress(block.data, block.uncompressed_size))
+
+
+def _count(data: bytes, most: int) -> int:
+    """How many records an unpacked block holds; counting ends at the most, whatever follows."""
+    at = number = 0
+    while at < len(data) and number < most:
+        at += _RECORD_HEAD.size + _RECORD_HEAD.unpack_from(data, at)[1]
+        number += 1
+    return number
 
 
 def _most_unpacked(size: int) -> int:
