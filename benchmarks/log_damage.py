@@ -1,7 +1,7 @@
 """What reading makes of a damaged log: cut at every byte, and with one random bit of every byte flipped.
 
-    python -m benchmarks.log_damage                  every byte, both ways
-    python -m benchmarks.log_damage --cases 2000     so many of these cases, evenly drawn
+    python -m benchmarks.log_damage > benchmarks/results/log_damage.md     every byte, both ways
+    python -m benchmarks.log_damage --cases 2000                           so many of these cases, evenly drawn
 
 A case fails where reading raises anything but a `LogError`, takes longer than two seconds, has a trial that was never
 given or one with other values, or has lost something without saying so.
@@ -11,9 +11,14 @@ from __future__ import annotations
 
 import argparse
 import collections
+import importlib.metadata
+import platform
+import shlex
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,6 +28,23 @@ import isiw
 
 TRIALS = 20
 ALLOWED_S = 2.0
+
+
+class Wrong(StrEnum):
+    """What reading can do wrong."""
+
+    HANGS = "takes longer than two seconds"
+    RAISES = "raises another error than a LogError"
+    INVENTS = "has a trial that was never given"
+    HIDES = "lost something without saying so"
+
+
+class Fault(NamedTuple):
+    """What reading did wrong in one case."""
+
+    case: Case
+    wrong: Wrong
+    detail: str = ""
 
 
 class Case(NamedTuple):
@@ -61,7 +83,7 @@ def drawn_cases(size: int, cases: int) -> list[Case]:
     return [every[index] for index in sorted(chosen.tolist())]
 
 
-def faults(path: Path, content: bytes, cases: list[Case]) -> Iterator[tuple[Case, str]]:
+def faults(path: Path, content: bytes, cases: list[Case]) -> Iterator[Fault]:
     """What went wrong in which case.
 
     Args:
@@ -73,28 +95,27 @@ def faults(path: Path, content: bytes, cases: list[Case]) -> Iterator[tuple[Case
     original = isiw.read_session(path)
     for case in cases:
         path.write_bytes(case.applied(content))
-        begin = time.process_time()
-        fault = _fault(path, original)
-        if time.process_time() - begin > ALLOWED_S:
-            fault = f"took {time.process_time() - begin:.1f} s"
-        if fault:
-            yield case, fault
+        begin_s = time.process_time()
+        yield from _faults(case, path, original)
+        spent_s = time.process_time() - begin_s
+        if spent_s > ALLOWED_S:
+            yield Fault(case, Wrong.HANGS, f"{spent_s:.1f} s")
     path.write_bytes(content)
 
 
-def _fault(path: Path, original: isiw.SessionRecord) -> str:
+def _faults(case: Case, path: Path, original: isiw.SessionRecord) -> Iterator[Fault]:
     try:
         record = isiw.read_session(path)
         trials, unknown = list(record.table), record.unknown
     except isiw.errors.LogError:
-        return ""
+        return
     except Exception as error:  # noqa: BLE001 - which is what is looked for
-        return f"raised {type(error).__name__}: {error}"
+        yield Fault(case, Wrong.RAISES, f"{type(error).__name__}: {error}")
+        return
     if not set(trials) <= set(original.table) or not {u.trial for u in unknown} <= {t.index for t in original.table}:
-        return "has a trial that was never given"
+        yield Fault(case, Wrong.INVENTS)
     if not record.losses and (record.history, record.header) != (original.history, original.header):
-        return "lost something without saying so"
-    return ""
+        yield Fault(case, Wrong.HIDES)
 
 
 def main() -> None:
@@ -108,9 +129,18 @@ def main() -> None:
         cases = all_cases(len(content)) if chosen.cases is None else drawn_cases(len(content), chosen.cases)
         found = list(faults(path, content, cases))
     ways = collections.Counter("cut" if case.bit is None else "flipped" for case in cases)
-    print(f"log of {len(content)} bytes: {ways['cut']} cuts, {ways['flipped']} flipped bits, {len(found)} faults")
-    for case, fault in found[:20]:
-        print(f"  {case}: {fault}")
+    wrong = collections.Counter(fault.wrong for fault in found)
+    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.log_damage', *sys.argv[1:]])}`")
+    print(f"- python {platform.python_version()}, mcap {importlib.metadata.version('mcap')}, seeds 0 (bits) and 7\n")
+    print(
+        f"A log of {TRIALS} trials without waveforms, {len(content):,} bytes: cut at {ways['cut']:,} of them, and with "
+        f"one random bit flipped in {ways['flipped']:,}.\n"
+    )
+    print("| reading | cases |\n|---|---|")
+    for each in Wrong:
+        print(f"| {each} | {wrong[each]:,} |")
+    for fault in found[:20]:
+        print(f"\n{fault}")
 
 
 if __name__ == "__main__":

@@ -1,11 +1,13 @@
 """Sessions with a device that fails in every way, run and resumed to their ends: is anything lost, or given twice?
 
-    python -m benchmarks.soak --sessions 2000 > benchmarks/results/soak.md
+    python -m benchmarks.soak --sessions 2000 --keep soak.json > benchmarks/results/soak.md
 
 Each session has a device that fails at random (`isiw.testing.FaultyDevice`), from a stage that hangs to an answer that
 comes too late. What ends a session is resumed until its stimuli are used up. Then what the device has really fired is
-compared with the log, pair by pair, and what was asked with what the strategy asks again when it is told the log. The
-strategy is one that depends on all it was told and costs nothing, so that it is the loop that is tried.
+compared with the log, pair by pair, and what was asked with what the strategy asks again when it is told the log.
+
+It is the loop that is tried, so most sessions have a strategy that depends on all it was told and costs almost nothing.
+One in ten has a named one, which is made again from the log: `default`, `random`, `even` and `nr` in turn.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from __future__ import annotations
 import argparse
 import faulthandler
 import importlib.metadata
+import json
 import math
 import platform
 import shlex
@@ -31,7 +34,11 @@ import isiw
 from benchmarks.remembering import SPACE, answer, strategy
 from isiw.testing import Fault, FaultyDevice, check_ledger
 
-STUCK_S = 600.0
+STUCK_S = 3600.0  # by the clock, so long that a busy machine does not reach it
+MOST_RUNS = 100
+
+NAMED = {0: "default", 10: "random", 20: "even", 30: "nr"}
+"""The named strategies, by the remainder of the seed and 40."""
 
 
 class Soaked:
@@ -57,6 +64,7 @@ class Soaked:
             isiw.CallbackDevice(answer, info), seed, self.clock, rate=rate, late_s=0.3, on_fire=self.check_intent
         )
         self.runs = 0
+        self.name = NAMED.get(seed % 40, "")
 
     def check_intent(self, stimulus: isiw.Stimulus) -> None:
         """What is about to be fired is on disk already; looked at in every tenth session, as it means reading it."""
@@ -64,10 +72,12 @@ class Soaked:
             last = isiw.read_session(self.log).intents[-1]
             assert (last.trial, last.isi_ms) == (stimulus.trial, stimulus.isi_ms)  # noqa: S101 - what is tried here
 
-    def run(self) -> isiw.log.SessionRecord:
+    def run(self) -> isiw.SessionRecord:
         """Run and resume until the strategy stops; the log at the end."""
         while not self.ended():
             self.runs += 1
+            if self.runs > MOST_RUNS:
+                sys.exit(f"session {self.seed} does not end")
             try:
                 self.session().run()
             except (isiw.errors.IsiwError, TypeError, ValueError):
@@ -82,21 +92,94 @@ class Soaked:
         """Whether all stimuli are used up."""
         return self.log.exists() and len(isiw.read_session(self.log).table) >= self.trials
 
+    def strategy(self) -> isiw.Strategy:
+        """Its strategy, before the first trial."""
+        if not self.name:
+            return strategy(self.trials, self.seed)
+        return isiw.make_strategy(self.name, SPACE, self.seed, **_to_the_end(self.name, self.trials))
+
+    def logged_strategy(self) -> isiw.Strategy | None:
+        """What is handed over to go on: none where the log holds it."""
+        return None if self.name else self.strategy()
+
     def session(self) -> isiw.Session:
         """The session, new or resumed."""
-        own = strategy(self.trials, self.seed)
         times = {"clock": self.clock, "timeout_s": 0.2, "safeguards": self.guards, "limits": self.limits}
         if self.log.exists():
-            return isiw.resume(self.log, self.device, own, **times)
-        return isiw.Session(self.device, own, log=self.log, **times)
+            return isiw.resume(self.log, self.device, self.logged_strategy(), **times)
+        return isiw.Session(self.device, self.strategy(), log=self.log, **times)
 
 
-def check(soaked: Soaked, record: isiw.log.SessionRecord) -> None:
+def _to_the_end(name: str, trials: int) -> dict[str, float]:
+    """Settings with which a named strategy does not stop before all stimuli are used up."""
+    if name == "nr":
+        return {"max_iterations": trials, "stop_last": 1000}  # the limit on pulses ends it
+    small = {} if name == "default" else {"particles": 100}
+    never = {"stop_width_ms": 1e-6, "stop_expected_f1": 1, "stop_gain": 0, "stop_no_window": 1}
+    return {"max_trials": trials, **never, **small}
+
+
+def check(soaked: Soaked, record: isiw.SessionRecord) -> None:
     """End the program where anything is lost, given twice, or asked differently."""
     if record.losses or not record.finished:
         sys.exit(f"the log of session {soaked.seed} is damaged: {record.losses}")
     check_ledger(soaked.device.ledger, record, soaked.limits)
-    isiw.resume(soaked.log, soaked.device, strategy(soaked.trials, soaked.seed))  # raises where it asks differently
+    isiw.resume(soaked.log, soaked.device, soaked.logged_strategy())  # raises where it asks differently
+
+
+class Tally:
+    """What happened so far, kept in a file so that a long run can be interrupted and gone on with.
+
+    Args:
+        first: the first seed.
+        path: the file; None where nothing is kept.
+    """
+
+    def __init__(self, first: int, path: Path | None) -> None:
+        self.path = path
+        kept = json.loads(path.read_text()) if path is not None and path.exists() else {"first": first}
+        if kept["first"] != first:
+            sys.exit(f"{path} is of a run from seed {kept['first']}")
+        self.first, self.counts, self.faults = first, Counter(kept.get("counts")), Counter(kept.get("faults"))
+
+    @property
+    def next_seed(self) -> int:
+        """The seed to go on with."""
+        return self.first + self.counts["sessions"]
+
+    def add(self, soaked: Soaked, record: isiw.SessionRecord) -> None:
+        """Count one more session."""
+        self.faults += soaked.device.happened
+        self.counts += Counter(
+            sessions=1,
+            named=bool(soaked.name),
+            runs=soaked.runs,
+            trials=len(record.table),
+            fired=len(soaked.device.ledger),
+            told=len(record.table.told),
+            refused=sum(event.kind == "refused" for event in record.events),
+            late=sum(event.kind == "late" for event in record.events),
+        )
+        if self.path is not None:
+            self.path.write_text(json.dumps({"first": self.first, "counts": self.counts, "faults": self.faults}))
+
+    def report(self, trials: int) -> None:
+        """Print the counts."""
+        counts = self.counts
+        versions = {name: importlib.metadata.version(name) for name in ("mcap", "numpy", "torch")}
+        print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.soak', *sys.argv[1:]])}`")
+        print(f"- python {platform.python_version()}, {', '.join(f'{name} {v}' for name, v in versions.items())}\n")
+        print(
+            f"{counts['sessions']:,} sessions of {trials} trials (seeds {self.first} to {self.next_seed - 1}, "
+            f"{counts['named']:,} with a named strategy), run {counts['runs']:,} times in all: "
+            f"{counts['fired']:,} pairs fired, {counts['trials']:,} trials logged, {counts['told']:,} of them told, "
+            f"{counts['refused']:,} refusals, {counts['late']:,} late answers. No pair without an intent before it, "
+            "none twice, no limit passed, none missing in a log, no log damaged, no session left armed, every ask the "
+            "same again.\n"
+        )
+        print("| fault | times |\n|---|---|")
+        for fault in Fault:
+            print(f"| {fault} | {self.faults[fault]:,} |")
 
 
 def main() -> None:
@@ -105,49 +188,27 @@ def main() -> None:
     parser.add_argument("--sessions", type=int, default=2000)
     parser.add_argument("--trials", type=int, default=30)
     parser.add_argument("--rate", type=float, default=0.08, help="share of calls that fail")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0, help="the first session's")
     parser.add_argument(
         "--minutes", type=float, default=math.inf, help="stop after so long, and say how many there were"
     )
+    parser.add_argument("--keep", type=Path, help="keep the counts in this file, and go on from it where it is there")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
-    began_s, happened = time.monotonic(), Counter[Fault]()
-    counts = Counter[str]()
+    began_s, tally = time.monotonic(), Tally(arguments.seed, arguments.keep)
+    seeds = range(tally.next_seed, arguments.seed + arguments.sessions)
     with tempfile.TemporaryDirectory() as folder:
-        for seed in track(
-            range(arguments.seed, arguments.seed + arguments.sessions), "soaking", console=Console(stderr=True)
-        ):
+        for seed in track(seeds, "soaking", console=Console(stderr=True)):
+            if time.monotonic() - began_s > 60 * arguments.minutes:
+                break
             faulthandler.dump_traceback_later(STUCK_S, exit=True)
             soaked = Soaked(Path(folder), seed, arguments.trials, arguments.rate)
             record = soaked.run()
             check(soaked, record)
             soaked.log.unlink()
-            happened += soaked.device.happened
-            counts += Counter(
-                sessions=1,
-                runs=soaked.runs,
-                trials=len(record.table),
-                fired=len(soaked.device.ledger),
-                told=len(record.table.told),
-                refused=sum(event.kind == "refused" for event in record.events),
-                late=sum(event.kind == "late" for event in record.events),
-            )
-            if time.monotonic() - began_s > 60 * arguments.minutes:
-                break
+            tally.add(soaked, record)
     faulthandler.cancel_dump_traceback_later()
-    versions = {name: importlib.metadata.version(name) for name in ("mcap", "numpy", "torch")}
-    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.soak', *sys.argv[1:]])}`")
-    print(f"- python {platform.python_version()}, {', '.join(f'{name} {v}' for name, v in versions.items())}\n")
-    print(
-        f"{counts['sessions']:,} sessions of {arguments.trials} trials, run {counts['runs']:,} times in all: "
-        f"{counts['fired']:,} pairs fired, {counts['trials']:,} trials logged, {counts['told']:,} of them told, "
-        f"{counts['refused']:,} refusals, {counts['late']:,} late answers. No pair without an intent before it, none "
-        "twice, no limit passed, none missing in a log, no log damaged, no session left armed, every ask the same "
-        "again.\n"
-    )
-    print("| fault | times |\n|---|---|")
-    for fault in Fault:
-        print(f"| {fault} | {happened[fault]:,} |")
+    tally.report(arguments.trials)
 
 
 if __name__ == "__main__":

@@ -89,6 +89,20 @@ def test_a_block_that_unpacks_to_something_else_than_it_says_is_never_unpacked(
     assert len(unpacked) == 1  # the header
 
 
+def test_blocks_of_empty_records_without_end_are_left_out_in_time(foreign: Any) -> None:
+    path = foreign()
+    whole, zeros = path.read_bytes(), zstandard.compress(bytes(60 * 2**20))
+    content = (0).to_bytes(16, "little") + (60 * 2**20).to_bytes(8, "little") + bytes(4) + b"\x04\x00\x00\x00zstd"
+    content += len(zeros).to_bytes(8, "little") + zeros
+    block = b"\x06" + len(content).to_bytes(8, "little") + content
+    at = whole.index(b"\x04\x00\x00\x00zstd") - 28
+    behind_header = at + int.from_bytes(whole[at - 8 : at], "little")
+    path.write_bytes(whole[:behind_header] + block * 50 + whole[behind_header:])
+    assert path.stat().st_size < 200_000
+    record, _ = read_in_time(path)
+    assert any("too large to be one" in loss for loss in record.losses)
+
+
 def test_marks_of_blocks_without_end_are_searched_in_time(foreign: Any) -> None:
     path = foreign()
     head = bytes(20) + b"\xff\xff\xff\x7f" + bytes(4) + b"\x04\x00\x00\x00zstd"

@@ -63,6 +63,20 @@ def test_each_of_two_sessions_files_is_read_by_its_name(broken_log: Any, another
     assert read_session(broken_log.with_suffix("")).header.subject == "P02"
 
 
+@pytest.mark.parametrize("name", ["s.mcap", "s.mcap.part"])
+def test_where_only_one_of_the_two_files_can_be_read_it_is(finished_log: Path, broken_log: Any, name: str) -> None:
+    (finished_log.parent / name).write_bytes(b"no log")
+    other = broken_log if name == "s.mcap" else finished_log
+    assert salvage(finished_log).path == other
+
+
+def test_where_neither_of_the_two_files_can_be_read_that_is_an_error(tmp_path: Path) -> None:
+    for name in ("s.mcap", "s.mcap.part"):
+        (tmp_path / name).write_bytes(b"no log")
+    with pytest.raises(LogError, match="nothing can be read"):
+        salvage(tmp_path / "s.mcap")
+
+
 def test_what_takes_the_logs_place_while_it_goes_on_is_not_replaced(finished_log: Path, another: Any) -> None:
     log = go_on(finished_log)
     finished_log.unlink()

@@ -11,9 +11,10 @@ import pytest
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.pulses import earlier_pulses_s, pulses_s
-from isiw.log.salvage import salvage
+from isiw.log.salvage import Message, salvage
 from isiw.log.schema import Event, Header, Intent
 from isiw.log.writer import LogWriter
+from isiw.trials import Status, Trial
 
 HOUR_S = 3600.0
 
@@ -36,6 +37,32 @@ def test_every_intent_counts_by_its_time_unless_it_was_refused(tmp_path: Path, h
     times_ns = [message.log_time_ns for message in found.messages if message.topic == "/intent"]
     now_ns = times_ns[-1] + 10_000_000_000
     assert pulses_s(found, now_ns) == [(now_ns - times_ns[0]) / 1e9, 10.0]
+
+
+def test_a_stimulus_whose_intent_is_lost_counts_by_the_record_of_its_trial(tmp_path: Path, header: Header) -> None:
+    with LogWriter.create(tmp_path / "a.mcap", header) as log:
+        log.append(Intent(trial=0, isi_ms=50.0))
+        for trial in range(2):
+            log.append(Trial(trial, Status.ACCEPTED, 50.0, isi_ms=50.0, mep_mv=0.1))
+    assert len(pulses_s(salvage(tmp_path / "a.mcap"))) == 2
+
+
+def test_a_record_that_makes_no_sense_is_no_stimulus(tmp_path: Path, header: Header) -> None:
+    found = salvage(make_log(tmp_path / "a.mcap", header, intents=2))
+    found.messages.append(Message("/intent", b'{"trial": "none"}', 0))
+    assert len(pulses_s(found)) == 2
+
+
+def test_a_stimulus_is_never_in_the_future(tmp_path: Path, header: Header) -> None:
+    assert pulses_s(salvage(make_log(tmp_path / "a.mcap", header, intents=1)), now_ns=0) == [0.0]
+
+
+def test_an_earlier_log_without_its_end_is_an_error_with_the_way_out(tmp_path: Path, header: Header) -> None:
+    log = make_log(tmp_path / "a.mcap", header)
+    whole = log.read_bytes()
+    log.write_bytes(whole[: whole.rindex(b"\x04\x00\x00\x00zstd", 0, whole.rindex(b"/trial")) - 37])
+    with pytest.raises(DamagedLogError, match=r"end of an earlier log.*Resume that session"):
+        earlier(tmp_path)
 
 
 def test_the_subjects_logs_of_a_folder_count_and_no_others(tmp_path: Path, header: Header) -> None:

@@ -18,7 +18,7 @@ from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, LogError, StrategyError
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Intent, decode
+from isiw.log.schema import Event, Intent, StrategyRecipe, decode
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session, SessionUpdate
 from isiw.session.resume import exclude, resume
@@ -27,6 +27,7 @@ from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Measurement, MistrialReason, Stimulus
 from known import known
+from log.written import make_header
 from logs import cut_after
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 
@@ -210,6 +211,15 @@ def test_the_times_allowed_are_those_of_the_log_or_of_the_call(
 def test_a_strategy_of_own_objects_must_be_handed_over(interrupted: Path) -> None:
     with pytest.raises(StrategyError, match="own objects"):
         resume(interrupted, ScriptedDevice())
+
+
+@pytest.mark.parametrize("settings", [{"particles": 10**9}, {"initial_trials": 10**9}, {"moves": {"sweeps": 10**9}}])
+def test_a_log_that_asks_for_too_much_is_not_resumed(tmp_path: Path, settings: dict[str, Any]) -> None:
+    recipe = StrategyRecipe(name="random", seed=1, settings=settings)
+    with LogWriter.create(tmp_path / "s.mcap", make_header(strategy=recipe)):
+        pass
+    with pytest.raises(InvalidValueError, match="at most"):
+        resume(tmp_path / "s.mcap", ScriptedDevice(simulated=False))
 
 
 def test_an_exclusion_counts_from_where_it_stands(interrupted: Path, uninterrupted: list[float | None]) -> None:

@@ -13,6 +13,7 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import ConfigError, InvalidValueError, StrategyError
 from isiw.models.parametric import ParametricModel
 from isiw.models.particles import ParticleModel
+from isiw.models.particles.model import Moving
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import ResponseModel
 from isiw.models.shared.scales import Scale
@@ -237,3 +238,9 @@ def test_a_setting_that_would_fill_the_memory_is_refused_at_once(setting: str) -
     huge: dict[str, Any] = {setting: 10**9}
     with pytest.raises(InvalidValueError, match=rf"the setting {setting} of random must be .*at most"):
         make_strategy("random", **huge)
+
+
+@pytest.mark.parametrize("moves", [{"sweeps": 10**9}, Moving(sweeps=10**9)])
+def test_a_setting_deep_in_a_part_is_refused_as_well(moves: Any) -> None:
+    with pytest.raises(InvalidValueError, match=r"the setting moves of random: sweeps must be .*at most"):
+        make_strategy("random", moves=moves)

@@ -105,13 +105,33 @@ def test_a_rule_remembers_as_much_as_it_looks_back_on() -> None:
     remembered = []
     for _ in range(5):
         going = told(going)
-        remembered.append([len(past) for past in going.past])
-        assert all(past[-1] is going.estimate(i) for i, past in enumerate(going.past) if past)
-    assert remembered == [[0, 0], [1, 1], [2, 2], [2, 2], [2, 2]]
+        remembered.append(len(going.past))
+        assert all(going.past[-1].estimate(i) is going.estimate(i) for i in range(2) if going.past)
+    assert remembered == [0, 1, 2, 2, 2]
 
 
-def test_a_rule_that_does_not_look_back_costs_no_estimates() -> None:
-    assert told(course("nr", stopping=Budget(3))).past == ((), (), ())
+def test_a_rule_that_does_not_look_back_remembers_nothing() -> None:
+    assert told(course("nr", stopping=Budget(3))).past == ()
+
+
+def test_trials_that_nobody_decides_upon_are_told_without_an_estimate() -> None:
+    going = course("nr", people=2, stopping=EdgeVariance(last=2))
+    for _ in range(5):
+        going = told(going)
+    assert [belief.estimates for belief in going.past] == [{}, {}]
+    going.decision(0)
+    assert [list(belief.estimates) for belief in going.past] == [[0], [0]]
+
+
+def test_of_trials_that_were_decided_upon_only_the_estimates_are_kept() -> None:
+    going = course("nr", people=2, stopping=EdgeVariance(last=3))
+    looked_at = []
+    for _ in range(3):
+        going = told(going)
+        looked_at.append([going.estimate(i) for i in range(2)])
+    going = told(going)
+    assert [belief.posterior for belief in going.earlier] == [None, None, None]
+    assert [[belief.estimate(i) for i in range(2)] for belief in going.earlier] == looked_at
 
 
 def test_a_decision_counts_the_mistrials_of_its_person() -> None:

@@ -1,50 +1,27 @@
-"""Salvage: everything that can still be read from a log, be it finished, torn or damaged, and what cannot, in words.
-
-A log may come from anywhere, so what it unpacks to is limited by its own size, and so is the number of its records.
-"""
+"""Salvage: everything that can still be read from a log, be it finished, torn or damaged, and what cannot, in words."""
 
 from __future__ import annotations
 
-import io
 import itertools
 import os
-import re
-import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Final, cast
+from typing import IO, cast
 
-import zstandard
 from mcap import records as mcap
-from mcap.exceptions import EndOfFile, McapError
-from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+from mcap.exceptions import EndOfFile
+from mcap.stream_reader import CRCValidationError, StreamReader
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.log.blocks import UNREADABLE, LostBlockError, Unpacking, marked
 from isiw.log.durable import Fingerprint, disk_errors, log_of, part_of
+from isiw.log.index import RECORD_HEAD_BYTES, counted_records
 from isiw.log.schema import ANNOUNCEMENT, CHANNEL_IDS
 
 __all__ = ["Message", "Salvage", "current_file", "holds", "salvage", "salvage_file"]
-
-_UNREADABLE = (McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, MemoryError, OverflowError)
-"""What the MCAP reader raises on damaged bytes; a failed checksum is a ValueError."""
-
-_CHUNK_MARK = b"\x04\x00\x00\x00zstd"
-_CHUNK_MARK_AT = 8 + 8 + 8 + 4  # behind a chunk's two times, size and checksum
-_CHUNK_HEAD: Final = struct.Struct("<QQQI4x4xQ")
-"""A chunk's two times, size and checksum, then the mark, and the length of its data."""
-
-_RECORD_HEAD_BYTES = 1 + 8  # what it is, and its length
-_FOOTER_BYTES = 1 + 8 + 8 + 8 + 4
-_MAGIC = b"\x89MCAP0\r\n"
-
-MOST_UNPACKED: Final = (64 * 2**20, 100)
-"""What a log may unpack to [bytes], and how many times its own size besides; one of constant waveforms comes to 50."""
-
-MOST_RECORDS: Final = 500_000
-"""What a log may hold; two thousand trials of ten channels come to 30,000."""
 
 
 @dataclass(frozen=True)
@@ -178,12 +155,11 @@ def salvage_file(path: Path) -> Salvage:
 
 
 def _read_file(file: IO[bytes], found: Salvage) -> None:
-    if not file.read(len(_MAGIC)):
+    if not found.size:
         raise DamagedLogError("the log is empty", got=str(found.path), remedy="Nothing was recorded in it; delete it.")
-    file.seek(0)
     reading = _Reading(file, found)
     reading.read()
-    counted = _counted(file)
+    counted = counted_records(file)
     if counted is None and found.finished and not found.losses:
         found.losses.append("The index at the end of the file fails its checksum. No record is affected.")
     _put_in_order(found)
@@ -203,7 +179,7 @@ class _Reading:
         self.whole = False
         """Whether everything up to there agrees with its checksum."""
         self._readable_to = self._chunks = 0
-        self._unpacking = _Unpacking(found.size)
+        self._unpacking = Unpacking(found.size)
 
     def read(self) -> None:
         """Read to the end, or to where records can no longer be followed, and search for the rest."""
@@ -216,7 +192,7 @@ class _Reading:
             self._search_swallowed()
             if not found.losses:
                 found.losses.append("The checksum of the whole file fails, though every record's own is good.")
-        except _UNREADABLE as error:
+        except UNREADABLE as error:
             self.whole = self.sealed
             if not self.sealed:
                 self._read_torn(at_a_records_end=isinstance(error, EndOfFile) and self.file.tell() == self._readable_to)
@@ -237,7 +213,7 @@ class _Reading:
         found = self.found
         if isinstance(record, mcap.Chunk):
             self._chunks += 1
-            self._unpacking.read(record, self._readable_to, found)
+            self._unpack(record, self._readable_to)
         elif isinstance(record, mcap.Attachment):
             _keep_attachment(record, self.file, self._readable_to, found)
         elif isinstance(record, mcap.Metadata) and record.name.startswith(ANNOUNCEMENT):
@@ -267,32 +243,38 @@ class _Reading:
         """Read all chunks of a file in which the records' lengths can no longer be followed from one to the next."""
         self.found.messages.clear()
         self.found.losses.clear()
-        self._unpacking = _Unpacking(self.found.size)
+        self._unpacking = Unpacking(self.found.size)
         for start, chunk in self._marked(size):
-            self._unpacking.read(chunk, start, self.found)
+            self._unpack(chunk, start)
 
     def _marked(self, size: int = -1) -> Iterator[tuple[int, mcap.Chunk]]:
-        """All chunks that are there as a whole, and where; a torn one shows in the numbers of its records.
+        """All chunks that are there as a whole, and where.
 
         Behind the first `size` bytes nothing is searched: the index at the end of a file looks like chunks.
         """
         self.file.seek(0)
-        data, copied = self.file.read(size), 0
-        for match in re.finditer(re.escape(_CHUNK_MARK), data):
-            start = match.start() - _CHUNK_MARK_AT
-            begin = start + _CHUNK_HEAD.size
-            if start < 0 or begin > len(data):
-                continue
-            first, last, unpacked, checksum, length = _CHUNK_HEAD.unpack_from(data, start)
-            if begin + length > len(data) or (copied := copied + length) > _most_unpacked(self.found.size):
-                continue
-            yield start, mcap.Chunk("zstd", data[begin : begin + length], last, first, checksum, unpacked)
+        return marked(self.file.read(size), self.found.size)
+
+    def _unpack(self, chunk: mcap.Chunk, offset: int) -> None:
+        """Keep what a chunk holds, or say why not."""
+        found = self.found
+        try:
+            contents = self._unpacking.records(chunk, offset)
+        except LostBlockError as error:
+            found.losses.append(str(error))
+            return
+        for record in contents:
+            if isinstance(record, mcap.Channel):
+                found.topics[record.id] = record.topic
+            elif isinstance(record, mcap.Message) and record.channel_id in found.topics:
+                topic = found.topics[record.channel_id]
+                found.messages.append(Message(topic, record.data, record.log_time, record.sequence))
 
 
 def _keep_attachment(attachment: mcap.Attachment, file: IO[bytes], start: int, found: Salvage) -> None:
     """Keep an attachment that has just been read, if it agrees with its checksum; the library leaves that unchecked."""
     end = file.tell()
-    file.seek(start + _RECORD_HEAD_BYTES)
+    file.seek(start + RECORD_HEAD_BYTES)
     content = file.read(end - file.tell())
     if zlib.crc32(content[:-4]) == int.from_bytes(content[-4:], "little"):
         found.attachments[attachment.name] = attachment.data
@@ -311,70 +293,6 @@ class _Exact:
         if len(data) < size:
             raise EndOfFile
         return data
-
-
-def _most_unpacked(size: int) -> int:
-    """How much a log of a size may unpack to [bytes]."""
-    least, times = MOST_UNPACKED
-    return least + times * size
-
-
-class _Unpacking:
-    """Unpacks chunk after chunk of a file, as far as a file of its size may go."""
-
-    def __init__(self, size: int) -> None:
-        self._bytes_left, self._records_left = _most_unpacked(size), MOST_RECORDS
-
-    def read(self, chunk: mcap.Chunk, offset: int, found: Salvage) -> None:
-        """Keep the records of a chunk, or say why not."""
-        try:
-            size = _honest_size(chunk)
-            if size > self._bytes_left or not self._records_left:
-                found.losses.append(f"The block at byte {offset} makes the log too large to be one, and is left out.")
-                return
-            contents = breakup_chunk(chunk, validate_crc=True)
-        except _UNREADABLE:
-            found.losses.append(f"A block of {len(chunk.data)} bytes at byte {offset} fails its checksum and is lost.")
-            return
-        self._bytes_left -= size
-        self._records_left = max(0, self._records_left - len(contents))
-        for record in contents:
-            if isinstance(record, mcap.Channel):
-                found.topics[record.id] = record.topic
-            elif isinstance(record, mcap.Message) and record.channel_id in found.topics:
-                found.messages.append(
-                    Message(found.topics[record.channel_id], record.data, record.log_time, record.sequence)
-                )
-
-
-def _honest_size(chunk: mcap.Chunk) -> int:
-    """What a chunk unpacks to [bytes].
-
-    Raises:
-        McapError: it is packed in another way than isiw's, or unpacks to something else than it says.
-    """
-    packed = {"": len, "zstd": zstandard.frame_content_size}
-    if chunk.compression not in packed or packed[chunk.compression](chunk.data) != chunk.uncompressed_size:
-        raise McapError(chunk.compression)
-    return chunk.uncompressed_size
-
-
-def _counted(file: IO[bytes]) -> mcap.Statistics | None:
-    """What the index at the end of a log counts, if it agrees with its checksum, which the library leaves unchecked."""
-    file.seek(0)
-    data = file.read()
-    footer_at = len(data) - len(_MAGIC) - _FOOTER_BYTES
-    if footer_at < 0 or not data.endswith(_MAGIC):
-        return None
-    index_at, _, checksum = struct.unpack_from("<QQI", data, footer_at + _RECORD_HEAD_BYTES)
-    index = data[index_at : len(data) - len(_MAGIC)]
-    if zlib.crc32(index[:-4]) != checksum:
-        return None
-    try:
-        records = list(StreamReader(io.BytesIO(index + _MAGIC), skip_magic=True).records)
-    except _UNREADABLE:
-        return None
-    return next((record for record in records if isinstance(record, mcap.Statistics)), None)
 
 
 def _put_in_order(found: Salvage) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import torch
@@ -20,7 +20,7 @@ from isiw.models.protocol import Observation, Posterior, ProposesIsi, ResponseMo
 from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
 from isiw.window import WindowEstimate
 
-__all__ = ["Choice", "Cost", "Course", "Method", "best_choices", "candidate_isis", "evenly_spaced"]
+__all__ = ["Belief", "Choice", "Cost", "Course", "Method", "best_choices", "candidate_isis", "evenly_spaced"]
 
 MAX_CANDIDATES = 101
 
@@ -68,7 +68,32 @@ class Method:
             seed: seed of the model's draws.
             people: how many people are examined side by side.
         """
-        return Course(self, self.model.begin(self.space, seed, people), people, earlier=((),) * people)
+        return Course(self, self.model.begin(self.space, seed, people), people)
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """What is believed of b people after some trials; a window is estimated once, and only where somebody asks.
+
+    Args:
+        posterior: what is believed; None where all estimates are made.
+        pairs: how many pairs of stimuli each person was told of.
+        estimates: those made so far, by person.
+    """
+
+    posterior: Posterior | None
+    pairs: int
+    estimates: dict[int, WindowEstimate] = field(default_factory=dict)
+
+    def estimate(self, person: int) -> WindowEstimate:
+        """What is believed about the window of one person."""
+        if person not in self.estimates and self.posterior is not None:
+            self.estimates[person] = replace(self.posterior.estimate(person), pairs=self.pairs)
+        return self.estimates[person]
+
+    def looked_back_on(self, people: int) -> Belief:
+        """The same, without a posterior where the estimates of all people are made."""
+        return replace(self, posterior=None) if len(self.estimates) == people else self
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +106,7 @@ class Course:
         people: how many there are.
         told: trials told of each.
         alone: how many of those were TMS alone.
-        earlier: of each person, the estimates before the last trial that the stopping rule looks back on.
+        earlier: what was believed before the last trial, as far as the stopping rule looks back on it.
         paired: whether the last trial was a pair of stimuli.
     """
 
@@ -90,7 +115,7 @@ class Course:
     people: int
     told: int = 0
     alone: int = 0
-    earlier: tuple[tuple[WindowEstimate, ...], ...] = ()
+    earlier: tuple[Belief, ...] = ()
     paired: bool = False
 
     def after(self, observation: Observation) -> Course:
@@ -101,17 +126,22 @@ class Course:
             posterior=self.method.model.update(self.posterior, observation),
             told=self.told + 1,
             alone=self.alone + alone,
-            earlier=self.past,
+            earlier=tuple(belief.looked_back_on(self.people) for belief in self.past),
             paired=not alone,
         )
 
     @cached_property
-    def past(self) -> tuple[tuple[WindowEstimate, ...], ...]:
-        """Of each person, the estimates that the stopping rule looks back on, the first after the last initial ISI."""
+    def belief(self) -> Belief:
+        """What is believed now."""
+        return Belief(self.posterior, self.told - self.alone)
+
+    @cached_property
+    def past(self) -> tuple[Belief, ...]:
+        """What the stopping rule looks back on, the first after the last initial ISI."""
         kept = looks_back(self.method.stopping)
         if not kept or not self.paired or self.told - self.alone < len(self.method.initial_ms):
             return self.earlier
-        return tuple((*past, self.estimate(i))[-kept:] for i, past in enumerate(self.earlier))
+        return (*self.earlier, self.belief)[-kept:]
 
     @property
     def initial_left(self) -> tuple[float, ...]:
@@ -153,15 +183,9 @@ class Course:
             posterior, acquisition, self.method.space, told=self.told, people=self.people, cost=self.method.cost
         )
 
-    @cached_property
-    def _estimates(self) -> dict[int, WindowEstimate]:
-        return {}
-
     def estimate(self, person: int = 0) -> WindowEstimate:
         """What is believed about the window of one person."""
-        if person not in self._estimates:
-            self._estimates[person] = replace(self.posterior.estimate(person), pairs=self.told - self.alone)
-        return self._estimates[person]
+        return self.belief.estimate(person)
 
     def decision(self, person: int = 0, mistrials: int = 0) -> StopDecision:
         """Whether to stop with one person, and why.
@@ -170,7 +194,8 @@ class Course:
             person: which.
             mistrials: stimuli that were delivered to the person and not told.
         """
-        progress = Progress(self.told + mistrials, self.told, self.estimate(person), past=self.past[person])
+        past = tuple(belief.estimate(person) for belief in self.past)
+        progress = Progress(self.told + mistrials, self.told, self.estimate(person), past=past)
         return self.method.stopping(progress)
 
 

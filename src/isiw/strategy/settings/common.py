@@ -234,6 +234,8 @@ def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
 
 def _require_modest(value: Any, source: str) -> None:
     """Raise where a number of trials, particles or the like would fill the memory before anything else could."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = {f.name: getattr(value, f.name) for f in fields(value)}
     if isinstance(value, Mapping):
         for key, inner in value.items():
             _require_modest(inner, f"{source}: {key}")

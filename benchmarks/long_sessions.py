@@ -1,0 +1,107 @@
+"""Long sessions: what their late trials cost, how long resuming them takes, and whether they go on identically.
+
+    python -m benchmarks.long_sessions > benchmarks/results/long_sessions.md
+
+A trial's cost is everything between two trials: model, acquisition function, stopping rule, log, and safeguards. All
+times are the processor's, since other programs share the machine. A session is interrupted behind its last trial and
+resumed; it goes on identically where it asks what the log says it would ask next, and believes what it believed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import shlex
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+
+import isiw
+
+SPACE = isiw.DesignSpace(0, 200, reference="valve")
+AT = (50, 200, 500, 1000, 2000)
+RESUMED_AT = (200, 2000)
+NEAR = 21
+"""Of how many trials, each with the trial behind it, the median is taken."""
+
+
+class Interrupted(Exception):  # noqa: N818 - no error
+    """The session has come far enough."""
+
+
+def run(name: str, trials: int, log: Path) -> np.ndarray:
+    """Run a session of so many trials, which is interrupted then; how long each took [ms], but the first.
+
+    Args:
+        name: the strategy.
+        trials: how many.
+        log: where it is logged.
+    """
+    ended_s: list[float] = []
+
+    def on_trial(update: isiw.SessionUpdate) -> None:
+        ended_s.append(time.process_time())
+        if update.trial.index == trials - 1:
+            raise Interrupted
+
+    never = {"stop_width_ms": 1e-6, "stop_expected_f1": 1, "stop_gain": 0, "stop_no_window": 1}
+    strategy = isiw.make_strategy(name, SPACE, seed=3, max_trials=trials + 1, **never)
+    limits = isiw.Limits.of_space(SPACE, max_pulses=trials + 1)
+    try:
+        isiw.Session(device(), strategy, log=log, limits=limits, on_trial=on_trial).run()
+    except Interrupted:
+        return 1e3 * np.diff(ended_s)
+    raise RuntimeError("the session has ended before its time")
+
+
+def device() -> isiw.SimulatedDevice:
+    """A simulated person's device."""
+    person = isiw.subjects.cohort("recruitment", 1, 7)[0].begin(7)
+    return isiw.SimulatedDevice(isiw.SimulatedPerson(lambda isi_ms: person.respond(isi_ms, "valve"), "valve"))
+
+
+def resuming_s(log: Path) -> tuple[float, bool]:
+    """How long resuming a session takes [s], and whether it is identical to the one that was interrupted."""
+    last = isiw.read_session(log).estimates[-1]
+    begin_s = time.process_time()
+    strategy = isiw.resume(log, device()).strategy
+    spent_s = time.process_time() - begin_s
+    now = strategy.estimate()
+    again = now.probability, now.start_ms, now.end_ms, now.expected_f1, strategy.ask()
+    return spent_s, again == (last.probability, last.start_ms, last.end_ms, last.expected_f1, last.next_isi_ms)
+
+
+def main() -> None:
+    """Measure and print two tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--strategies", nargs="+", default=["random", "default"])
+    parser.add_argument("--most", type=int, default=max(AT), help="trials of the longest session")
+    arguments = parser.parse_args()
+    torch.set_num_threads(1)
+    costs, resumptions = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for name in arguments.strategies:
+            for trials in sorted({min(each, arguments.most) for each in RESUMED_AT}):
+                log = Path(folder) / f"{name}-{trials}.mcap"
+                cost_ms = run(name, trials, log)
+                spent_s, identical = resuming_s(log)
+                resumptions.append(f"| {name} | {trials:,} | {spent_s:.1f} | {'yes' if identical else 'NO'} |")
+            near = [cost_ms[max(0, at - NEAR) : at] for at in AT if at <= arguments.most]
+            costs.append(f"| {name} | {' | '.join(f'{np.median(part):.0f} ({part.mean():.0f})' for part in near)} |")
+    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.long_sessions', *sys.argv[1:]])}`")
+    print(f"- isiw {isiw.__version__}, python {platform.python_version()}, torch {torch.__version__}, one thread")
+    print("- seeds: 3 (strategy), 7 (person)\n")
+    reached = [at for at in AT if at <= arguments.most]
+    print(f"What a trial costs at trial … [ms of the processor]: median (mean) of the last {NEAR}\n")
+    print(f"| strategy | {' | '.join(f'{at:,}' for at in reached)} |\n|{'---|' * (len(reached) + 1)}")
+    print("\n".join(costs))
+    print("\nResuming\n\n| strategy | trials | takes [s of the processor] | identical |\n|---|---|---|---|")
+    print("\n".join(resumptions))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,133 @@
+"""The blocks of records in a log's file: found by their marks where nothing else leads to them, unpacked within limits.
+
+A log may come from anywhere, so what it unpacks to is limited by its own size, and so is the number of its records.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final
+
+import zstandard
+from mcap import records as mcap
+from mcap.exceptions import McapError
+from mcap.stream_reader import breakup_chunk
+
+__all__ = ["UNREADABLE", "LostBlockError", "Unpacking", "marked"]
+
+UNREADABLE: Final = (McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, MemoryError, OverflowError)
+"""What the MCAP reader raises on damaged bytes; a failed checksum is a ValueError."""
+
+MOST_UNPACKED: Final = (64 * 2**20, 100)
+"""What a log may unpack to [bytes], and how many times its own size besides; one of constant waveforms comes to 50."""
+
+MOST_RECORDS: Final = 500_000
+"""What a log may hold; two thousand trials of ten channels come to 30,000."""
+
+_MARK = b"\x04\x00\x00\x00zstd"
+_MARK_AT = 8 + 8 + 8 + 4  # behind a block's two times, size and checksum
+_HEAD: Final = struct.Struct("<QQQI4x4xQ")
+"""A block's two times, size and checksum, then the mark, and the length of its data."""
+
+_RECORD_HEAD: Final = struct.Struct("<BQ")
+"""What a record is, and its length."""
+
+
+class LostBlockError(Exception):
+    """A block that cannot be read; its text is a sentence for the reader of the log."""
+
+
+def marked(data: bytes, size: int) -> Iterator[tuple[int, mcap.Chunk]]:
+    """All blocks that are there as a whole, and where; a torn one shows in the numbers of its records.
+
+    Args:
+        data: what to search.
+        size: of the whole file [bytes].
+    """
+    copied = 0
+    for match in re.finditer(re.escape(_MARK), data):
+        start = match.start() - _MARK_AT
+        begin = start + _HEAD.size
+        if start < 0 or begin > len(data):
+            continue
+        first, last, unpacked, checksum, length = _HEAD.unpack_from(data, start)
+        if begin + length > len(data) or (copied := copied + length) > _most_unpacked(size):
+            continue
+        yield start, mcap.Chunk("zstd", data[begin : begin + length], last, first, checksum, unpacked)
+
+
+class Unpacking:
+    """Unpacks block after block of a file, as far as a file of its size may go.
+
+    Args:
+        size: of the file [bytes].
+    """
+
+    def __init__(self, size: int) -> None:
+        self._bytes_left, self._records_left = _most_unpacked(size), MOST_RECORDS
+
+    def records(self, block: mcap.Chunk, offset: int) -> Sequence[mcap.McapRecord]:
+        """What a block holds.
+
+        Args:
+            block: the block.
+            offset: where it is in the file, for the message.
+
+        Raises:
+            LostBlockError: it fails its checksum, or makes the log too large to be one.
+        """
+        try:
+            size = _honest_size(block)
+            _require_room(offset, self._bytes_left, size)
+            self._bytes_left -= size  # whatever becomes of it, as unpacking it takes time
+            unpacked = _unpacked(block)
+            number, left = _count(unpacked.data, self._records_left + 1), self._records_left
+            self._records_left = max(0, left - number)
+            _require_room(offset, left, number)
+            return breakup_chunk(unpacked, validate_crc=True)
+        except UNREADABLE as error:
+            raise LostBlockError(
+                f"A block of {len(block.data)} bytes at byte {offset} fails its checksum and is lost."
+            ) from error
+
+
+def _require_room(offset: int, left: int, needed: int) -> None:
+    if needed > left:
+        raise LostBlockError(f"The block at byte {offset} makes the log too large to be one, and is left out.")
+
+
+def _unpacked(block: mcap.Chunk) -> mcap.Chunk:
+    """The same block without compression."""
+    if not block.compression:
+        return block
+    return replace(block, compression="", data=zstandard.decompress(block.data, block.uncompressed_size))
+
+
+def _count(data: bytes, most: int) -> int:
+    """How many records an unpacked block holds; counting ends at the most, whatever follows."""
+    at = number = 0
+    while at < len(data) and number < most:
+        at += _RECORD_HEAD.size + _RECORD_HEAD.unpack_from(data, at)[1]
+        number += 1
+    return number
+
+
+def _most_unpacked(size: int) -> int:
+    """How much a log of a size may unpack to [bytes]."""
+    least, times = MOST_UNPACKED
+    return least + times * size
+
+
+def _honest_size(block: mcap.Chunk) -> int:
+    """What a block unpacks to [bytes].
+
+    Raises:
+        McapError: it is packed in another way than isiw's, or unpacks to something else than it says.
+    """
+    packed = {"": len, "zstd": zstandard.frame_content_size}
+    if block.compression not in packed or packed[block.compression](block.data) != block.uncompressed_size:
+        raise McapError(block.compression)
+    return block.uncompressed_size
