@@ -14,8 +14,8 @@ import isiw
 from isiw.errors import OtherVersionsWarning
 from isiw.plots import save_session_plot
 from isiw.report import final_statement
-from isiw.session.loop import SessionUpdate
-from isiw.session.resume import strategy_of
+from isiw.session.replay import strategy_of
+from isiw.session.updates import SessionUpdate
 from isiw.trials import MistrialReason
 
 FOLDER = Path(__file__).parents[1] / "data" / "logs"

@@ -19,8 +19,9 @@ from isiw.report.words import (
     trial_rows,
     truth_sentence,
 )
-from isiw.session.loop import Session, SessionUpdate
+from isiw.session.loop import Session
 from isiw.session.resume import exclude
+from isiw.session.updates import SessionUpdate
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Measurement, MistrialReason, Status, Trial
 from isiw.window import Window, WindowEstimate

@@ -17,7 +17,8 @@ from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate, Intent
-from isiw.session.loop import Session, SessionUpdate
+from isiw.session.loop import Session
+from isiw.session.updates import SessionUpdate
 from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Recipe, Strategy

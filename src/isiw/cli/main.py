@@ -15,7 +15,8 @@ from isiw.cli import prior, study
 from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show, show_entry
 
 if TYPE_CHECKING:
-    from isiw.session.loop import Session, SessionUpdate
+    from isiw.session.loop import Session
+    from isiw.session.updates import SessionUpdate
     from isiw.strategy.settings.described import DescribedSetting
 
 __all__ = ["app"]

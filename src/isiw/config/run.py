@@ -32,7 +32,8 @@ from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.priors import after, load
-from isiw.session.loop import Session, SessionUpdate
+from isiw.session.loop import Session
+from isiw.session.updates import SessionUpdate
 from isiw.signals.judgement import SignalLimits
 from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
 from isiw.subjects.cohorts import COHORTS, cohort

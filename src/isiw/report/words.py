@@ -10,7 +10,7 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate, Event
 from isiw.metrics import f1
 from isiw.report.evidence import contradiction, nothing_measured
-from isiw.session.loop import SessionUpdate
+from isiw.session.updates import SessionUpdate
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.trials import Trial
 from isiw.window import Interval, Window, WindowEstimate

@@ -10,9 +10,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType, TracebackType
-from typing import Any, Self
+from typing import Any, ParamSpec, Self, TypeVar
 
 __all__ = ["Interrupts"]
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 _PAUSING = ("SIGINT", "SIGTSTP")  # Ctrl-C and Ctrl-Z; Windows has no Ctrl-Z
 _ENDING = ("SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK")  # the last three are not on every system
@@ -112,6 +115,17 @@ class Interrupts:
             yield
         finally:
             self._allowed = before
+
+    def freely(self, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Call what may be interrupted at any time, as no stimulus is in flight and no record half written.
+
+        Args:
+            call: what to call.
+            *args: with which arguments.
+            **kwargs: and which keywords.
+        """
+        with self.allowed():
+            return call(*args, **kwargs)
 
     def _receive(self, number: int, frame: FrameType | None) -> None:
         del frame

@@ -5,118 +5,36 @@ What is on disk is always ahead of what happens next: the intent before its stim
 
 from __future__ import annotations
 
-import datetime as dt
-import importlib.metadata
-import platform
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
-import isiw
 from isiw.checks import deadline, number
 from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device
-from isiw.errors import (
-    DeviceError,
-    DeviceTimeoutError,
-    InvalidValueError,
-    LimitExceededError,
-    LogError,
-    NotDelivered,
-    StrategyError,
-    told,
-)
+from isiw.devices.protocol import Device
+from isiw.errors import InvalidValueError, NotDelivered, StrategyError
 from isiw.log.durable import log_of
 from isiw.log.pulses import earlier_pulses_s
-from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, Record, StrategyRecipe, Waveform
+from isiw.log.schema import Estimate, Event, Header, Record
 from isiw.log.writer import LogWriter
-from isiw.session.operator import goes_on
+from isiw.session.delivery import Delivery
+from isiw.session.header import header_of
+from isiw.session.journal import Journal, learn
+from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig, require_matching
 from isiw.session.safeguards import Safeguards
+from isiw.session.updates import SessionResult, SessionUpdate
 from isiw.session.watch import Watch
-from isiw.signals.judgement import SignalLimits, judge, judge_measurement
+from isiw.signals.judgement import SignalLimits
 from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Measurement, Stimulus, Sweep, Trial, TrialTable
-from isiw.window import WindowEstimate
+from isiw.trials import Stimulus, Trial, TrialTable
 
-__all__ = ["Session", "SessionResult", "SessionUpdate", "learn"]
-
-P = ParamSpec("P")
-T = TypeVar("T")
-
-_PACKAGES = ("numpy", "torch", "botorch", "gpytorch")
-
-_NOTHING_GIVEN = (NotDelivered, LimitExceededError, LogError)
-"""What is raised only before a stimulus is delivered."""
+__all__ = ["Session"]
 
 _NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
-
-
-@dataclass(frozen=True)
-class SessionUpdate:
-    """What is known after one trial.
-
-    Args:
-        trial: the trial.
-        estimate: what is believed about the window.
-        decision: whether the session stops here, and why.
-        next_isi_ms: what is asked next [ms]; None where the session stops.
-        stimuli_left: how many stimuli the budget and the limits still allow.
-    """
-
-    trial: Trial
-    estimate: WindowEstimate
-    decision: StopDecision
-    next_isi_ms: float | None
-    stimuli_left: int
-
-
-@dataclass(frozen=True)
-class SessionResult:
-    """How a session ended.
-
-    Args:
-        estimate: what is believed about the window.
-        decision: why it ended.
-        trials: all its trials.
-        log: its log.
-    """
-
-    estimate: WindowEstimate
-    decision: StopDecision
-    trials: TrialTable
-    log: Path
-
-    def __str__(self) -> str:
-        return f"{self.estimate}\nTrials: {self.trials}\nEnded: {self.decision.reason}\nLog: {self.log}"
-
-
-def versions() -> dict[str, str]:
-    """The versions that what a strategy asks depends on, by package."""
-    installed = {package: importlib.metadata.version(package) for package in _PACKAGES}
-    return {"isiw": isiw.__version__, "python": platform.python_version()} | installed
-
-
-def learn(strategy: Strategy, trial: Trial) -> None:
-    """Tell a strategy one trial, or count it where there is nothing to tell.
-
-    Args:
-        strategy: the strategy.
-        trial: the trial.
-    """
-    if trial.told:
-        strategy.learn(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
-    else:
-        strategy.count_mistrial()
-
-
-def _late_text(answer: Answer) -> str:
-    what = f"{answer.mep_mv:g} mV" if isinstance(answer, Measurement) else "a sweep"
-    return f"An answer came after the deadline: {what}. It is not told."
 
 
 class Session:
@@ -159,33 +77,21 @@ class Session:
         ask_deadline_s: float | None = None,
         safeguards: Safeguards | None = None,
     ) -> None:
-        space = strategy.space
-        self._limits = limits or Limits.of_space(space)
+        self._limits = limits or Limits.of_space(strategy.space)
         self._safeguards = safeguards or Safeguards()
         self._rig = Rig(device, self._limits, clock, self._safeguards)
-        self._clock, self._interrupts, info = self._rig.clock, self._rig.interrupts, self._rig.info
-        require_matching(info, strategy)
-        timeout_s = number("timeout_s", timeout_s, above=0)
-        ask_deadline_s = deadline("ask_deadline_s", ask_deadline_s)
-        self.strategy = strategy
-        self.trials = TrialTable()
-        self.log_path = log_of(Path(log))
-        self._signals = signals or SignalLimits()
-        self._on_trial, self._timeout_s, self._ask_deadline_s = on_trial, timeout_s, ask_deadline_s
-        recipe = strategy.recipe
-        self._header = Header(
-            isiw_version=isiw.__version__,
-            created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+        self._freely = self._rig.interrupts.freely
+        require_matching(self._rig.info, strategy)
+        self.strategy, self.log_path = strategy, log_of(Path(log))
+        self._on_trial, self._ask_deadline_s = on_trial, deadline("ask_deadline_s", ask_deadline_s)
+        self._header = header_of(
+            strategy,
             subject=subject,
-            seed=recipe.seed,
-            strategy=StrategyRecipe(name=recipe.name, seed=recipe.seed, settings=dict(recipe.settings)),
-            space=space,
             limits=self._limits,
-            device=info,
-            signals=self._signals,
-            timeout_s=timeout_s,
-            ask_deadline_s=ask_deadline_s,
-            versions={name: version for name, version in versions().items() if name != "isiw"},
+            device=self._rig.info,
+            signals=signals or SignalLimits(),
+            timeout_s=number("timeout_s", timeout_s, above=0),
+            ask_deadline_s=self._ask_deadline_s,
             config=dict(config or {}),
         )
         if self._safeguards.earlier_logs is not None and not subject:
@@ -195,10 +101,19 @@ class Session:
         self._open_log: Callable[[Header], LogWriter] = partial(LogWriter.create, log)
         self._first_records: Sequence[Record] = ()
         self._own_earlier_s: Callable[[], Sequence[float]] = tuple
-        self._unconcluded: Trial | None = None
-        self._pause_reason: str | None = None
         self._resumed = False
-        self._watch = Watch(space, self._signals, self._limits.max_consecutive_mistrials)
+        self._journal = Journal()
+        self._pausing = Pausing(self._rig, self._journal, self._safeguards)
+        self._delivery = self._delivery_of(self._header)
+
+    def _delivery_of(self, header: Header) -> Delivery:
+        watch = Watch(header.space, header.signals, header.limits.max_consecutive_mistrials)
+        return Delivery(self._rig, self._journal, self._pausing, watch, header.space, header.signals, header.timeout_s)
+
+    @property
+    def trials(self) -> TrialTable:
+        """All trials so far."""
+        return self._journal.trials
 
     def continue_from(
         self,
@@ -215,9 +130,9 @@ class Session:
             first_records: what it holds next.
             earlier_s: says how long ago each stimulus before was [s].
         """
-        self.trials, self._open_log, self._first_records = trials, open_log, first_records
+        self._journal.trials, self._open_log, self._first_records = trials, open_log, first_records
         self._own_earlier_s, self._resumed = earlier_s, True
-        self._watch = self._watch.resumed(trials)
+        self._delivery.watch = self._delivery.watch.resumed(trials)
 
     def run(self) -> SessionResult:
         """Run to the end, and close the log whatever happens.
@@ -232,28 +147,22 @@ class Session:
             LogError: the log cannot be written, or is no longer at its path; nothing is delivered without a log.
             StrategyError: the strategy knows of trials that are not this session's; nothing was delivered.
         """
-        if self.strategy.delivered > len(self.trials):
-            raise StrategyError(
-                "the strategy knows of trials that are not this session's",
-                got=f"{self.strategy.delivered} trials",
-                expected=f"{len(self.trials)} trials",
-                remedy="Make a new one, or give the session strategy.restarted().",
-            )
+        self._require_own_strategy()
         earlier_s = self._earlier_s()
-        with self._rig.driven(), self._open_log(self._header) as self._log:
-            self._rig.log = self._log
+        with self._rig.driven(), self._open_log(self._header) as log:
+            self._rig.log = self._journal.log = log
             try:
                 self._log_beginning()
                 with self._rig.armed(len(self.trials), earlier_s):
                     decision = self._loop()
-                self._log_faults()
+                self._journal.faults(self._rig.faults)
             except BaseException as error:
-                self._log_faults()
-                self._log_failure(error)
+                self._journal.faults(self._rig.faults)
+                self._journal.failure(error)
                 if not (self._rig.staged_once or self._resumed):
-                    self._log.discard()
+                    log.discard()
                 raise
-        return SessionResult(self.strategy.estimate(), decision, self.trials, self._log.path)
+        return SessionResult(self.strategy.estimate(), decision, self.trials, log.path)
 
     def pause(self, reason: str) -> None:
         """Disarm now, and pause before the next stimulus; from any thread, also from `on_trial`.
@@ -264,8 +173,16 @@ class Session:
         Args:
             reason: why, for the operator and the log.
         """
-        self._pause_reason = reason
-        self._rig.disarm()
+        self._pausing.now(reason)
+
+    def _require_own_strategy(self) -> None:
+        if self.strategy.delivered > len(self.trials):
+            raise StrategyError(
+                "the strategy knows of trials that are not this session's",
+                got=f"{self.strategy.delivered} trials",
+                expected=f"{len(self.trials)} trials",
+                remedy="Make a new one, or give the session strategy.restarted().",
+            )
 
     def _earlier_s(self) -> list[float]:
         """How long ago each earlier stimulus was to the same person, as far as the logs to look at know [s]."""
@@ -278,50 +195,34 @@ class Session:
             earlier_s += earlier_pulses_s(folder, self._header.subject, period_s, but=self.log_path)
         return earlier_s
 
-    def _freely(self, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call what may be interrupted at any time, as no stimulus is in flight and no record half written."""
-        with self._interrupts.allowed():
-            return call(*args, **kwargs)
-
     def _log_beginning(self) -> None:
         for record in self._first_records:
-            self._log.append(record)
+            self._journal.log.append(record)
         if self.trials:
             self._log_estimate(len(self.trials) - 1)
-
-    def _log_failure(self, error: BaseException) -> None:
-        kind: EventKind = "limit" if isinstance(error, LimitExceededError) else "fault"
-        self._log_event(kind, "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else told(error))
-
-    def _log_event(self, kind: EventKind, text: str) -> None:
-        self._log.append(Event(kind=kind, trial=len(self.trials) - 1 if self.trials else None, text=text))
-
-    def _log_faults(self) -> None:
-        """Log what went wrong and was overcome, in whichever thread."""
-        while self._rig.faults:
-            self._log_event("fault", self._rig.faults.popleft())
 
     def _loop(self) -> StopDecision:
         decision = None
         while decision is None or not decision.stop:
-            if self._pausing:
-                if (paused := self._pause(self._pause_reason or "Interrupted by the operator.")) is not None:
-                    return paused
+            if self._pausing.due:
+                if (paused := self._pausing.until_decided()) is not None:
+                    return _paused(paused)
+                self._delivery.watch = self._delivery.watch.seen()
                 continue
             try:
                 decision = self._next_step()
             except KeyboardInterrupt:
-                if not self._interrupts.heard:
+                if not self._rig.interrupts.heard:
                     raise
             except NotDelivered:
-                if not self._pausing:
+                if not self._pausing.due:
                     raise
         return decision
 
     def _next_step(self) -> StopDecision | None:
         """Conclude the trial that was delivered, or deliver the next; the decision to stop, where there is one."""
-        if self._unconcluded is not None:
-            return self._concluded(self._unconcluded)
+        if self._journal.unconcluded is not None:
+            return self._concluded(self._journal.unconcluded)
         if (decision := self._freely(self.strategy.decision)).stop:
             return decision
         if not self._rig.pulses_left:
@@ -329,60 +230,47 @@ class Session:
         self._one_trial()
         return None
 
-    @property
-    def _pausing(self) -> bool:
-        return self._pause_reason is not None or self._interrupts.heard
-
-    def _pause(self, reason: str) -> StopDecision | None:
-        """Disarm, and arm again only where somebody says so; where nobody does, what the session ends with."""
-        self._rig.disarm()
-        self._log_faults()
-        if self._interrupts.ending:
-            raise KeyboardInterrupt
-        self._interrupts.acknowledge()
-        self._log_event("pause", reason)
-        self._log.sync()
-        if not self._freely(self._safeguards.on_pause or goes_on, reason):
-            if self._interrupts.heard:
-                raise KeyboardInterrupt
-            return StopDecision(stop=False, reason=f"The session is paused: {reason}")
-        self._interrupts.settle()
-        self._pause_reason = None
-        self._watch = self._watch.seen()
-        self._log_event("pause", "The operator goes on.")
-        self._rig.stage()
-        return None
-
     def _stop_at_limit(self) -> StopDecision:
         decision = StopDecision(stop=True, reason=f"The limit of {self._limits.max_pulses} pulses is reached.")
-        self._log_event("limit", decision.reason)
+        self._journal.event("limit", decision.reason)
         estimate = self._freely(self.strategy.estimate)
-        self._log.append(Estimate.of(len(self.trials) - 1, estimate, decision, None))
+        self._journal.log.append(Estimate.of(len(self.trials) - 1, estimate, decision, None))
         return decision
 
     def _one_trial(self) -> None:
+        """Ask and deliver; what was refused before firing is tried again."""
         stimulus = Stimulus(len(self.trials), self._freely(self.strategy.ask, self._ask_deadline_s))
         if self.strategy.fallback_reason is not None:
-            self._log.append(Event(kind="fallback", trial=stimulus.trial, text=self.strategy.fallback_reason))
+            text = self.strategy.fallback_reason
+            self._journal.log.append(Event(kind="fallback", trial=stimulus.trial, text=text))
         for backoff_s in self._safeguards.backoffs_s:
             try:
                 return self._deliver(stimulus)
             except NotDelivered:
-                if self._pausing:
+                if self._pausing.due:
                     raise
-                self._freely(self._clock.sleep_s, backoff_s)
+                self._freely(self._rig.clock.sleep_s, backoff_s)
         return self._deliver(stimulus)
+
+    def _deliver(self, stimulus: Stimulus) -> None:
+        self._freely(self._wait)
+        self._delivery.deliver(stimulus)
+
+    def _wait(self) -> None:
+        """Sleep until the limits allow the next stimulus, or somebody wants to pause."""
+        while self._pausing.reason is None and (wait_s := self._rig.wait_s()) > 0:
+            self._rig.clock.sleep_s(min(wait_s, _NAP_S))
 
     def _concluded(self, trial: Trial) -> StopDecision:
         """Learn from a delivered trial and report; each step is taken once, also where the one after is interrupted."""
         if self.strategy.delivered < len(self.trials):
             self._freely(learn, self.strategy, trial)
         if trial.told and self.strategy.trouble is not None:
-            self._log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
+            self._journal.log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
         decision, next_isi_ms = self._log_estimate(trial.index)
-        self._unconcluded = None
-        if not decision.stop and self._watch.reason is not None:
-            self._pause_reason = self._watch.reason
+        self._journal.unconcluded = None
+        if not decision.stop and self._delivery.watch.reason is not None:
+            self._pausing.reason = self._delivery.watch.reason
         if self._on_trial is not None:
             estimate = self._freely(self.strategy.estimate)
             update = SessionUpdate(trial, estimate, decision, next_isi_ms, self._stimuli_left())
@@ -393,85 +281,19 @@ class Session:
         """Put what is believed after a trial on disk; the decision and the next ISI [ms]."""
         estimate, decision = self._freely(self.strategy.estimate), self._freely(self._decision)
         next_isi_ms = None if decision.stop else self._freely(self.strategy.ask, self._ask_deadline_s)
-        self._log.append(Estimate.of(trial, estimate, decision, next_isi_ms))
-        self._log.sync()
+        self._journal.log.append(Estimate.of(trial, estimate, decision, next_isi_ms))
+        self._journal.log.sync()
         return decision, next_isi_ms
 
     def _decision(self) -> StopDecision:
         """The strategy's decision; none is made on data that a person should look at first."""
-        if self._watch.reason is None or not self._stimuli_left():
-            return self.strategy.decision()
-        return StopDecision(stop=False, reason=f"The session is paused: {self._watch.reason}")
+        reason = self._delivery.watch.reason
+        return self.strategy.decision() if reason is None or not self._stimuli_left() else _paused(reason)
 
     def _stimuli_left(self) -> int:
         budget = stimuli_left(self.strategy.stopping, len(self.trials))
         return self._rig.pulses_left if budget is None else min(budget, self._rig.pulses_left)
 
-    def _wait(self) -> None:
-        """Sleep until the limits allow the next stimulus, or somebody wants to pause."""
-        while self._pause_reason is None and (wait_s := self._rig.wait_s()) > 0:
-            self._clock.sleep_s(min(wait_s, _NAP_S))
 
-    def _deliver(self, stimulus: Stimulus) -> None:
-        """Deliver, with the intent on disk before and the trial after, whatever the device does."""
-        self._freely(self._wait)
-        self._require_allowed(stimulus)
-        self._log.append(Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=self._clock.now_s()))
-        self._log.sync()
-        trial: Trial | None = Trial.unknown(stimulus)
-        try:
-            answer = self._answer(stimulus)
-            trial = self._judged(stimulus, answer)
-            self._watch = self._watch.after(trial, answer)
-        except _NOTHING_GIVEN as error:
-            trial = None
-            self._log.append(Event(kind="refused", trial=stimulus.trial, text=told(error)))
-            raise
-        except Exception as error:
-            if not self._pausing:
-                raise
-            self._rig.faults.append(f"While the device was being disarmed: {told(error)}")
-        finally:
-            if trial is not None:
-                self._log.append(trial)
-                self.trials = self.trials.appended(trial)
-                self._unconcluded = trial
-            self._log_faults()
-            self._log.sync()
-
-    def _require_allowed(self, stimulus: Stimulus) -> None:
-        """Raise where the limits or the device do not allow a stimulus, before anything is logged of it."""
-        try:
-            self._rig.check(stimulus)
-        except NotDelivered as error:
-            self._log_event("limit", told(error))
-            raise
-
-    def _answer(self, stimulus: Stimulus) -> Answer:
-        """What came of a stimulus; its waveforms are logged, also where it comes too late."""
-        self._log.require_in_place()
-        try:
-            answer = self._rig.deliver(stimulus, self._timeout_s)
-        except DeviceTimeoutError:
-            late = self._rig.late_answer()
-            if late is not None:
-                self._log_waveforms(stimulus, late)
-                self._log.append(Event(kind="late", trial=stimulus.trial, text=_late_text(late)))
-            raise
-        self._log_waveforms(stimulus, answer)
-        return answer
-
-    def _log_waveforms(self, stimulus: Stimulus, answer: Answer) -> None:
-        if isinstance(answer, Sweep):
-            for name, channel in answer.channels.items():
-                self._log.append(Waveform.of(stimulus.trial, channel), name)
-
-    def _judged(self, stimulus: Stimulus, answer: Answer) -> Trial:
-        space = self.strategy.space
-        if isinstance(answer, Sweep):
-            return judge(answer, stimulus, space, self._signals)
-        if isinstance(answer, Measurement):
-            return judge_measurement(answer, stimulus, space, self._signals)
-        raise DeviceError(
-            "the device answered with something else than its promise", got=answer, expected="a Sweep or a Measurement"
-        )
+def _paused(reason: str) -> StopDecision:
+    return StopDecision(stop=False, reason=f"The session is paused: {reason}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import itertools
 import warnings
 from collections.abc import Mapping, Sequence
@@ -10,19 +9,20 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import isiw
 from isiw.checks import number
 from isiw.devices.clock import Clock, MonotonicClock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo, Readiness
-from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, told
+from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.log.durable import log_of, part_of
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
-from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, StrategyRecipe
+from isiw.log.schema import Estimate, Event, EventKind, Intent
 from isiw.log.writer import LogWriter
-from isiw.session.loop import learn, versions
-from isiw.session.resume import ages_s, replay, resumption_text, warn_where_differing, with_lost_pulses
+from isiw.session.header import header_of
+from isiw.session.journal import Journal, learn
+from isiw.session.replay import replay, warn_where_differing
+from isiw.session.resume import ages_s, continued, resumption, with_lost_pulses
 from isiw.signals.faults import remedy_for
 from isiw.signals.judgement import SignalLimits
 from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
@@ -77,7 +77,14 @@ def open_session(
             remedy="Make it anew, or give the session strategy.restarted().",
         )
     limits = limits or Limits.of_space(strategy.space, min_iti_s=0.0)
-    header = _header(strategy, limits, subject, config or {})
+    header = header_of(
+        strategy,
+        subject=subject,
+        limits=limits,
+        device=DeviceInfo("a loop of the lab's own", strategy.space.reference),
+        signals=SignalLimits(),
+        config=dict(config or {}),
+    )
     clock = clock or MonotonicClock()
     if not (resume and (path.exists() or part_of(path).exists())):
         return Recorder(strategy, LogWriter.create(path, header), limits, clock)
@@ -85,35 +92,14 @@ def open_session(
     record = with_lost_pulses(read_salvaged(salvaged), lost_pulses)
     replayed = replay(record, strategy)
     warn_where_differing(replayed, record.header)
-    kept = {
-        "created": record.header.created,
-        "subject": header.subject or record.header.subject,
-        "asks_from": replayed.asks_from,
-    }
-    writer = LogWriter.continuing(path, salvaged, record.header, header.model_copy(update=kept))
+    header = header.model_copy(update={"subject": header.subject or record.header.subject})
+    writer = continued(path, salvaged, record.header, replayed, header)
     ages = ages_s(salvaged, len(replayed.trials))
-    recorder = Recorder(replayed.strategy, writer, limits, clock, replayed.trials, ages)
     for trial in replayed.unknown:
         writer.append(trial)
-    recorder.log_event("resume", resumption_text(record, replayed))
-    return recorder
-
-
-def _header(strategy: Strategy, limits: Limits, subject: str, config: Mapping[str, Any]) -> Header:
-    recipe = strategy.recipe
-    return Header(
-        isiw_version=isiw.__version__,
-        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
-        subject=subject,
-        seed=recipe.seed,
-        strategy=StrategyRecipe(name=recipe.name, seed=recipe.seed, settings=dict(recipe.settings)),
-        space=strategy.space,
-        limits=limits,
-        device=DeviceInfo("a loop of the lab's own", strategy.space.reference),
-        signals=SignalLimits(),
-        versions={name: version for name, version in versions().items() if name != "isiw"},
-        config=dict(config),
-    )
+    writer.append(resumption(record, replayed))
+    writer.sync()
+    return Recorder(replayed.strategy, writer, limits, clock, replayed.trials, ages)
 
 
 class Recorder:
@@ -137,13 +123,19 @@ class Recorder:
         trials: TrialTable | None = None,
         earlier_s: Sequence[float] = (),
     ) -> None:
-        self.strategy, self.trials = strategy, trials or TrialTable()
-        self._log, self._limits, self._clock = log, limits, clock
+        self.strategy, self._journal = strategy, Journal(trials)
+        self._log = self._journal.log = log
+        self._limits, self._clock = limits, clock
         self._asked: Stimulus | None = None
         now_s = clock.now_s()
         self._not_before_s = now_s + limits.min_iti_s
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
         self._doubted: set[DoubtKind] = set()
+
+    @property
+    def trials(self) -> TrialTable:
+        """All trials so far."""
+        return self._journal.trials
 
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], the same until its outcome; on disk as about to be delivered before this returns.
@@ -251,7 +243,7 @@ class Recorder:
         Args:
             text: anything.
         """
-        self.log_event("note", text)
+        self._event("note", text)
 
     def exclude(self, trial: int, reason: str = "") -> None:
         """Exclude a trial from here on: an event is appended, and the strategy learns anew without it.
@@ -271,7 +263,7 @@ class Recorder:
             )
         self._log.append(Event(kind="exclusion", trial=trial, text=reason))
         self._log.sync()
-        self.trials = self.trials.excluding([trial])
+        self._journal.trials = self.trials.excluding([trial])
         self.strategy = self.strategy.restarted()
         for earlier in self.trials:
             learn(self.strategy, earlier)
@@ -296,19 +288,13 @@ class Recorder:
     ) -> None:
         try:
             if error is not None:
-                interrupted = isinstance(error, KeyboardInterrupt)
-                self.log_event("fault", "Interrupted by the operator." if interrupted else told(error))
+                self._journal.failure(error)
+                self._log.sync()
         finally:
             self.close()
 
-    def log_event(self, kind: EventKind, text: str) -> None:
-        """Put on disk that something happened.
-
-        Args:
-            kind: what kind of thing.
-            text: what, in words.
-        """
-        self._log.append(Event(kind=kind, trial=len(self.trials) - 1 if self.trials else None, text=text))
+    def _event(self, kind: EventKind, text: str) -> None:
+        self._journal.event(kind, text)
         self._log.sync()
 
     def _require_asked(self) -> Stimulus:
@@ -320,9 +306,9 @@ class Recorder:
 
     def _conclude(self, trial: Trial) -> None:
         """Put a trial on disk, then learn it, then put on disk what is believed."""
-        self._log.append(trial)
+        self._journal.trial(trial)
         self._log.sync()
-        self.trials, self._asked = self.trials.appended(trial), None
+        self._asked = None
         self._times_s.append(self._clock.now_s())
         learn(self.strategy, trial)
         if trial.told and self.strategy.trouble is not None:
@@ -331,5 +317,5 @@ class Recorder:
         self._log.sync()
 
     def _warn(self, text: str) -> None:
-        self.log_event("doubt", text)
+        self._event("doubt", text)
         warnings.warn(text, ImplausibleDataWarning, stacklevel=3)
