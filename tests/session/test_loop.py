@@ -265,7 +265,7 @@ def test_an_active_muscle_is_a_mistrial(log: Path) -> None:
     device = ScriptedDevice(lambda stimulus: Measurement(0.1, stimulus.isi_ms, background_rms_uv=10.5))
     result = Session(device, scripted_strategy(3), log=log).run()
     assert {trial.reason for trial in result.trials} == {MistrialReason.BACKGROUND_ACTIVITY}
-    assert {trial.mep_mv for trial in result.trials} == {None}
+    assert {trial.told for trial in result.trials} == {False}
     assert result.decision.reason == "The budget of 3 stimuli is used up."
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer
 from isiw.errors import DeviceError, DeviceTimeoutError, LimitExceededError, LogError, NotDelivered, told
-from isiw.log.schema import Event, Intent
+from isiw.log.schema import Event
 from isiw.session.journal import Journal
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig
@@ -43,8 +43,12 @@ class Delivery:
     signals: SignalLimits
     timeout_s: float
 
-    def deliver(self, stimulus: Stimulus) -> None:
-        """Deliver one pair of stimuli.
+    def deliver(self, stimulus: Stimulus, fallback: str | None) -> None:
+        """Deliver a pair of stimuli or a control trial, unless a trial was judged anew since it was asked for.
+
+        Args:
+            stimulus: what to deliver.
+            fallback: why its ISI is not the acquisition function's choice; None where it is.
 
         Raises:
             NotDelivered: refused before firing.
@@ -53,8 +57,8 @@ class Delivery:
             DeviceError: the device failed; the trial is a mistrial "outcome unknown".
         """
         self._require_allowed(stimulus)
-        self.journal.log.append(Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=self.rig.clock.now_s()))
-        self.journal.log.sync()
+        if not self.journal.intent(stimulus, self.rig.clock.now_s(), fallback):
+            return
         trial: Trial | None = Trial.unknown(stimulus)
         try:
             answer = self._answer(stimulus)

@@ -8,7 +8,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from types import FrameType, TracebackType
 from typing import Any, ParamSpec, Self, TypeVar
 
@@ -36,6 +36,8 @@ class Interrupts:
     Ctrl-Z suspends the process when the device is disarmed. Outside the main thread, which is where Python delivers
     signals, nothing is heard; what the process ignores, as under nohup, it goes on ignoring.
 
+    `away` is entered while the process is suspended.
+
     Args:
         disarm: disarms; called in another thread, at every signal.
         stuck: called in another thread where the main one does not react to a second signal.
@@ -48,6 +50,7 @@ class Interrupts:
         self._settled = 0
         self._ending = False
         self._before: dict[signal.Signals, Any] = {}
+        self.away: Callable[[], AbstractContextManager[None]] = nullcontext
         self._watcher: threading.Thread | None = None
         self._over = False
 
@@ -141,7 +144,8 @@ class Interrupts:
     def _suspend(self) -> None:
         """Stop the process as Ctrl-Z does, but disarmed; it goes on here."""
         self._wait_until(self._is_disarmed, _DISARMING_S)
-        os.kill(os.getpid(), signal.SIGSTOP)
+        with self.away():
+            os.kill(os.getpid(), signal.SIGSTOP)
 
     def _watch(self) -> None:
         """Disarm at every signal, however busy the main thread is."""

@@ -5,36 +5,42 @@ What is on disk is always ahead of what happens next: the intent before its stim
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from isiw.checks import deadline, number
+from isiw.checks import deadline, number, text
 from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError, NotDelivered, StrategyError
 from isiw.log.durable import log_of
 from isiw.log.pulses import earlier_pulses_s
-from isiw.log.schema import Estimate, Event, Header, Record
+from isiw.log.schema import Header, Record
+from isiw.log.verdicts import LOOKED_AT, acceptance, exclusion, inclusion
 from isiw.log.writer import LogWriter
 from isiw.session.delivery import Delivery
+from isiw.session.desk import Desk
 from isiw.session.header import header_of
-from isiw.session.journal import Journal, learn
+from isiw.session.journal import Journal
 from isiw.session.pausing import Pausing
+from isiw.session.progress import PROGRESS_HEADINGS, progress_row, show_progress
 from isiw.session.rig import Rig, require_matching
 from isiw.session.safeguards import Safeguards
+from isiw.session.steps import Steps, paused
+from isiw.session.terminal import is_terminal, somebody_there
 from isiw.session.updates import SessionResult, SessionUpdate
 from isiw.session.watch import Watch
 from isiw.signals.judgement import SignalLimits
-from isiw.strategy.stopping import StopDecision, stimuli_left
+from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Stimulus, Trial, TrialTable
+from isiw.trials import TrialTable
+from isiw.visit import Visit, VisitProtocol
 
 __all__ = ["Session"]
-
-_NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
 
 
 class Session:
@@ -53,12 +59,15 @@ class Session:
         timeout_s: how long the device may take for one delivery [s]; past it, it is disarmed and the session ends.
         ask_deadline_s: how long the strategy may take for one ask [s]; past it, it falls back, and the log says so.
         safeguards: what is done about faults, pauses and earlier sessions.
+        visit: what is noted about the visit, for the log.
+        protocol: intervals, control trials, blocks and rests.
 
     Raises:
         DeviceError: the device counts its ISIs from another event than the space, or states another detection limit
-            than the strategy's, or is not simulated and has a virtual clock.
-        InvalidValueError: a time that is no positive number, a channel whose name or unit a session cannot use, or
-            earlier logs without a subject to find in them.
+            than the strategy's, or is not simulated and has a virtual clock, or delivers no tap alone where the
+            protocol has some.
+        InvalidValueError: a time that is no positive number, a subject that is no text, a channel whose name or unit a
+            session cannot use, or earlier logs without a subject to find in them.
     """
 
     def __init__(  # noqa: PLR0913 - the public surface of the design; all but two are keyword-only
@@ -76,22 +85,25 @@ class Session:
         timeout_s: float = 30.0,
         ask_deadline_s: float | None = None,
         safeguards: Safeguards | None = None,
+        visit: Visit | None = None,
+        protocol: VisitProtocol | None = None,
     ) -> None:
         self._limits = limits or Limits.of_space(strategy.space)
         self._safeguards = safeguards or Safeguards()
         self._rig = Rig(device, self._limits, clock, self._safeguards)
-        self._freely = self._rig.interrupts.freely
-        require_matching(self._rig.info, strategy)
-        self.strategy, self.log_path = strategy, log_of(Path(log))
-        self._on_trial, self._ask_deadline_s = on_trial, deadline("ask_deadline_s", ask_deadline_s)
+        protocol = protocol or VisitProtocol()
+        require_matching(self._rig.info, strategy, protocol)
+        self.log_path, self._on_trial = log_of(Path(log)), on_trial
         self._header = header_of(
             strategy,
-            subject=subject,
+            subject=text("subject", subject),
+            visit=visit or Visit(),
+            protocol=protocol,
             limits=self._limits,
             device=self._rig.info,
             signals=signals or SignalLimits(),
             timeout_s=number("timeout_s", timeout_s, above=0),
-            ask_deadline_s=self._ask_deadline_s,
+            ask_deadline_s=deadline("ask_deadline_s", ask_deadline_s),
             config=dict(config or {}),
         )
         if self._safeguards.earlier_logs is not None and not subject:
@@ -104,11 +116,18 @@ class Session:
         self._resumed = False
         self._journal = Journal()
         self._pausing = Pausing(self._rig, self._journal, self._safeguards)
-        self._delivery = self._delivery_of(self._header)
+        self._steps = self._steps_with(strategy)
 
-    def _delivery_of(self, header: Header) -> Delivery:
+    def _steps_with(self, strategy: Strategy) -> Steps:
+        header, rig, journal, pausing = self._header, self._rig, self._journal, self._pausing
         watch = Watch(header.space, header.signals, header.limits.max_consecutive_mistrials)
-        return Delivery(self._rig, self._journal, self._pausing, watch, header.space, header.signals, header.timeout_s)
+        delivery = Delivery(rig, journal, pausing, watch, header.space, header.signals, header.timeout_s)
+        return Steps(strategy, rig, journal, pausing, delivery, header, self._safeguards.backoffs_s)
+
+    @property
+    def strategy(self) -> Strategy:
+        """What proposes ISIs and learns; another object once a trial was judged anew."""
+        return self._steps.strategy
 
     @property
     def trials(self) -> TrialTable:
@@ -132,13 +151,19 @@ class Session:
         """
         self._journal.trials, self._open_log, self._first_records = trials, open_log, first_records
         self._own_earlier_s, self._resumed = earlier_s, True
-        self._delivery.watch = self._delivery.watch.resumed(trials)
+        self._steps.delivery.watch = self._steps.delivery.watch.resumed(trials)
 
-    def run(self) -> SessionResult:
+    def run(self, *, progress: bool | None = None, keys: bool = True) -> SessionResult:
         """Run to the end, and close the log whatever happens.
 
         Where trials are rejected again and again, or the data look like a slip of unit, it ends before its time with a
         decision that does not stop: its reason says what to do before the session is resumed.
+
+        In a terminal the operator's keys are heard, unless `Safeguards.on_pause` says who decides; ? lists them.
+
+        Args:
+            progress: whether to print a row after each trial; by default in a terminal, where there is no `on_trial`.
+            keys: whether keys may be heard.
 
         Raises:
             DeviceError: the device failed; it is stopped, and the trial is a mistrial "outcome unknown". Or another
@@ -149,11 +174,12 @@ class Session:
         """
         self._require_own_strategy()
         earlier_s = self._earlier_s()
-        with self._rig.driven(), self._open_log(self._header) as log:
-            self._rig.log = self._journal.log = log
+        self._steps.on_trial = self._reporting(progress=progress)
+        with self._rig.driven(), self._open_log(self._header) as log, self._journal.writing(log):
+            self._rig.log = log
             try:
                 self._log_beginning()
-                with self._rig.armed(len(self.trials), earlier_s):
+                with self._operated(keys=keys), self._rig.armed(len(self.trials), earlier_s):
                     decision = self._loop()
                 self._journal.faults(self._rig.faults)
             except BaseException as error:
@@ -163,6 +189,34 @@ class Session:
                     log.discard()
                 raise
         return SessionResult(self.strategy.estimate(), decision, self.trials, log.path)
+
+    def _reporting(self, *, progress: bool | None) -> Callable[[SessionUpdate], None] | None:
+        """What is called after every trial."""
+        shown = self._on_trial is None and is_terminal(sys.stdout) if progress is None else progress
+        if not shown:
+            return self._on_trial
+        show_progress(PROGRESS_HEADINGS)
+
+        def report(update: SessionUpdate) -> None:
+            show_progress(progress_row(update))
+            if self._on_trial is not None:
+                self._on_trial(update)
+
+        return report
+
+    @contextmanager
+    def _operated(self, *, keys: bool) -> Iterator[None]:
+        """Within, the operator's keys are heard, where there is an operator at a terminal."""
+        if not keys or self._safeguards.on_pause is not None or not somebody_there():
+            yield
+            return
+        desk = Desk(self)
+        with desk.staffed():
+            self._steps.desk, self._pausing.decide, self._rig.interrupts.away = desk, desk.goes_on, desk.away
+            try:
+                yield
+            finally:
+                self._rig.interrupts.away = nullcontext
 
     def pause(self, reason: str) -> None:
         """Disarm now, and pause before the next stimulus; from any thread, also from `on_trial`.
@@ -174,6 +228,63 @@ class Session:
             reason: why, for the operator and the log.
         """
         self._pausing.now(reason)
+
+    def note(self, text: str) -> None:
+        """Log a remark; from any thread while the session runs, as `exclude`, `include`, `accept` and `reject`.
+
+        Args:
+            text: anything.
+
+        Raises:
+            InvalidValueError: the session is not running.
+        """
+        self._journal.note(text)
+
+    def exclude(self, trial: int, reason: str = "") -> None:
+        """Let a trial not count: on disk when this returns, and learnt before the next stimulus is asked for.
+
+        Args:
+            trial: its number.
+            reason: why, for whoever reads the log.
+
+        Raises:
+            InvalidValueError: no trial that counts has this number, or the session is not running.
+        """
+        self._journal.judge(lambda trials: exclusion(trials, trial, reason))
+
+    def include(self, trial: int) -> None:
+        """Let a trial count again that was excluded.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no excluded trial has this number, or the session is not running.
+        """
+        self._journal.judge(lambda trials: inclusion(trials, trial))
+
+    def reject(self, trial: int) -> None:
+        """Let a trial not count whose MEP an operator has looked at; an exclusion with this reason.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no trial that counts has this number, or the session is not running.
+        """
+        self.exclude(trial, LOOKED_AT)
+
+    def accept(self, trial: int) -> None:
+        """Let a trial count all the same that was judged a mistrial or excluded, once an operator has looked at it.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no such trial, one that counts already or of which no MEP was measured, or the session is
+                not running.
+        """
+        self._journal.judge(lambda trials: acceptance(trials, trial, self.strategy.space))
 
     def _require_own_strategy(self) -> None:
         if self.strategy.delivered > len(self.trials):
@@ -187,7 +298,8 @@ class Session:
     def _earlier_s(self) -> list[float]:
         """How long ago each earlier stimulus was to the same person, as far as the logs to look at know [s]."""
         limits, folder = self._limits, self._safeguards.earlier_logs
-        if self._header.device.simulated or (limits.max_block_pulses is None and limits.max_period_pulses is None):
+        matter = (limits.max_block_pulses, limits.max_period_pulses, self._header.protocol.block_trials)
+        if self._header.device.simulated or not any(matter):
             return []
         earlier_s = list(self._own_earlier_s())
         if folder is not None:
@@ -199,18 +311,18 @@ class Session:
         for record in self._first_records:
             self._journal.log.append(record)
         if self.trials:
-            self._log_estimate(len(self.trials) - 1)
+            self._steps.log_estimate(len(self.trials) - 1)
 
     def _loop(self) -> StopDecision:
         decision = None
-        while decision is None or not decision.stop:
+        while decision is None or not decision.stop or self._journal.overruled:
             if self._pausing.due:
-                if (paused := self._pausing.until_decided()) is not None:
-                    return _paused(paused)
-                self._delivery.watch = self._delivery.watch.seen()
+                if (reason := self._pausing.until_decided()) is not None:
+                    return paused(reason)
+                self._steps.delivery.watch = self._steps.delivery.watch.seen()
                 continue
             try:
-                decision = self._next_step()
+                decision = self._steps.next()
             except KeyboardInterrupt:
                 if not self._rig.interrupts.heard:
                     raise
@@ -218,82 +330,3 @@ class Session:
                 if not self._pausing.due:
                     raise
         return decision
-
-    def _next_step(self) -> StopDecision | None:
-        """Conclude the trial that was delivered, or deliver the next; the decision to stop, where there is one."""
-        if self._journal.unconcluded is not None:
-            return self._concluded(self._journal.unconcluded)
-        if (decision := self._freely(self.strategy.decision)).stop:
-            return decision
-        if not self._rig.pulses_left:
-            return self._stop_at_limit()
-        self._one_trial()
-        return None
-
-    def _stop_at_limit(self) -> StopDecision:
-        decision = StopDecision(stop=True, reason=f"The limit of {self._limits.max_pulses} pulses is reached.")
-        self._journal.event("limit", decision.reason)
-        estimate = self._freely(self.strategy.estimate)
-        self._journal.log.append(Estimate.of(len(self.trials) - 1, estimate, decision, None))
-        return decision
-
-    def _one_trial(self) -> None:
-        """Ask and deliver; what was refused before firing is tried again."""
-        stimulus = Stimulus(len(self.trials), self._freely(self.strategy.ask, self._ask_deadline_s))
-        if self.strategy.fallback_reason is not None:
-            text = self.strategy.fallback_reason
-            self._journal.log.append(Event(kind="fallback", trial=stimulus.trial, text=text))
-        for backoff_s in self._safeguards.backoffs_s:
-            try:
-                return self._deliver(stimulus)
-            except NotDelivered:
-                if self._pausing.due:
-                    raise
-                self._freely(self._rig.clock.sleep_s, backoff_s)
-        return self._deliver(stimulus)
-
-    def _deliver(self, stimulus: Stimulus) -> None:
-        self._freely(self._wait)
-        self._delivery.deliver(stimulus)
-
-    def _wait(self) -> None:
-        """Sleep until the limits allow the next stimulus, or somebody wants to pause."""
-        while self._pausing.reason is None and (wait_s := self._rig.wait_s()) > 0:
-            self._rig.clock.sleep_s(min(wait_s, _NAP_S))
-
-    def _concluded(self, trial: Trial) -> StopDecision:
-        """Learn from a delivered trial and report; each step is taken once, also where the one after is interrupted."""
-        if self.strategy.delivered < len(self.trials):
-            self._freely(learn, self.strategy, trial)
-        if trial.told and self.strategy.trouble is not None:
-            self._journal.log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
-        decision, next_isi_ms = self._log_estimate(trial.index)
-        self._journal.unconcluded = None
-        if not decision.stop and self._delivery.watch.reason is not None:
-            self._pausing.reason = self._delivery.watch.reason
-        if self._on_trial is not None:
-            estimate = self._freely(self.strategy.estimate)
-            update = SessionUpdate(trial, estimate, decision, next_isi_ms, self._stimuli_left())
-            self._freely(self._on_trial, update)
-        return decision
-
-    def _log_estimate(self, trial: int) -> tuple[StopDecision, float | None]:
-        """Put what is believed after a trial on disk; the decision and the next ISI [ms]."""
-        estimate, decision = self._freely(self.strategy.estimate), self._freely(self._decision)
-        next_isi_ms = None if decision.stop else self._freely(self.strategy.ask, self._ask_deadline_s)
-        self._journal.log.append(Estimate.of(trial, estimate, decision, next_isi_ms))
-        self._journal.log.sync()
-        return decision, next_isi_ms
-
-    def _decision(self) -> StopDecision:
-        """The strategy's decision; none is made on data that a person should look at first."""
-        reason = self._delivery.watch.reason
-        return self.strategy.decision() if reason is None or not self._stimuli_left() else _paused(reason)
-
-    def _stimuli_left(self) -> int:
-        budget = stimuli_left(self.strategy.stopping, len(self.trials))
-        return self._rig.pulses_left if budget is None else min(budget, self._rig.pulses_left)
-
-
-def _paused(reason: str) -> StopDecision:
-    return StopDecision(stop=False, reason=f"The session is paused: {reason}")

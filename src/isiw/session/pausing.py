@@ -18,12 +18,12 @@ class Pausing:
     Args:
         rig: is disarmed, and armed again.
         journal: where pauses are written.
-        safeguards: says who decides how a session goes on.
+        safeguards: `on_pause` decides how a session goes on, or the operator in the terminal.
     """
 
     def __init__(self, rig: Rig, journal: Journal, safeguards: Safeguards) -> None:
         self._rig, self._journal = rig, journal
-        self._on_pause = safeguards.on_pause or goes_on
+        self.decide = safeguards.on_pause or goes_on
         self.reason: str | None = None
 
     @property
@@ -55,7 +55,7 @@ class Pausing:
         reason, self.reason = self.reason or _INTERRUPTED, None
         self._journal.event("pause", reason)
         self._journal.log.sync()
-        if not interrupts.freely(self._on_pause, reason):
+        if not interrupts.freely(self.decide, reason):
             if interrupts.heard:
                 raise KeyboardInterrupt
             return reason

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from isiw.checks import number
+from isiw.checks import number, text
 from isiw.devices.clock import Clock, MonotonicClock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo, Readiness
@@ -17,10 +18,11 @@ from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.log.durable import log_of, part_of
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
-from isiw.log.schema import Estimate, Event, EventKind, Intent
+from isiw.log.schema import Estimate, Event, EventKind, Header
+from isiw.log.verdicts import LOOKED_AT, acceptance, exclusion, inclusion
 from isiw.log.writer import LogWriter
 from isiw.session.header import header_of
-from isiw.session.journal import Journal, learn
+from isiw.session.journal import Journal, learn, relearned
 from isiw.session.replay import replay, warn_where_differing
 from isiw.session.resume import ages_s, continued, resumption, with_lost_pulses
 from isiw.signals.faults import remedy_for
@@ -29,12 +31,13 @@ from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
+from isiw.visit import Visit, VisitProtocol
 from isiw.window import WindowEstimate
 
 __all__ = ["Recorder", "open_session"]
 
 
-def open_session(
+def open_session(  # noqa: PLR0913 - all but two are keyword-only
     strategy: Strategy,
     log: str | Path,
     *,
@@ -42,6 +45,8 @@ def open_session(
     limits: Limits | None = None,
     clock: Clock | None = None,
     subject: str = "",
+    visit: Visit | None = None,
+    protocol: VisitProtocol | None = None,
     config: Mapping[str, Any] | None = None,
     lost_pulses: int | None = None,
 ) -> Recorder:
@@ -57,12 +62,16 @@ def open_session(
         clock: tells the time, and waits in `ask` until the interval, the rest and the period of the limits have passed,
             before the first stimulus, too, as nobody knows what came before.
         subject: the person's code, for the log.
+        visit: what is noted about the visit, for the log; of a session that goes on, the logged one by default.
+        protocol: intervals, blocks and rests, which `ask` waits for; of a session that goes on, the logged one by
+            default. Control trials are the loop's own: `tell(None, …)` is TMS alone.
         config: anything that should be kept in the log, as TOML values.
         lost_pulses: as for `isiw.resume`: needed where the end of the log is missing.
 
     Raises:
         DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
-        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there.
+        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; a subject that is no text;
+            a protocol with control trials.
         LogError: there is a log already, or it cannot be written or read.
         StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
 
@@ -79,7 +88,9 @@ def open_session(
     limits = limits or Limits.of_space(strategy.space, min_iti_s=0.0)
     header = header_of(
         strategy,
-        subject=subject,
+        subject=text("subject", subject),
+        visit=visit or Visit(),
+        protocol=_without_controls(protocol or VisitProtocol()),
         limits=limits,
         device=DeviceInfo("a loop of the lab's own", strategy.space.reference),
         signals=SignalLimits(),
@@ -87,19 +98,35 @@ def open_session(
     )
     clock = clock or MonotonicClock()
     if not (resume and (path.exists() or part_of(path).exists())):
-        return Recorder(strategy, LogWriter.create(path, header), limits, clock)
+        return Recorder(strategy, LogWriter.create(path, header), header, clock)
     salvaged = salvage(path)
     record = with_lost_pulses(read_salvaged(salvaged), lost_pulses)
     replayed = replay(record, strategy)
     warn_where_differing(replayed, record.header)
-    header = header.model_copy(update={"subject": header.subject or record.header.subject})
+    kept = {
+        "subject": header.subject or record.header.subject,
+        "visit": visit or record.header.visit,
+        "protocol": protocol or record.header.protocol,
+    }
+    header = header.model_copy(update=kept)
     writer = continued(path, salvaged, record.header, replayed, header)
     ages = ages_s(salvaged, len(replayed.trials))
     for trial in replayed.unknown:
         writer.append(trial)
     writer.append(resumption(record, replayed))
     writer.sync()
-    return Recorder(replayed.strategy, writer, limits, clock, replayed.trials, ages)
+    return Recorder(replayed.strategy, writer, header, clock, replayed.trials, ages)
+
+
+def _without_controls(protocol: VisitProtocol) -> VisitProtocol:
+    if protocol.tms_alone or protocol.tap_alone:
+        raise InvalidValueError(
+            "in a loop of one's own the protocol cannot have control trials, as ask() answers with an ISI",
+            got=protocol,
+            remedy="Give TMS alone whenever you like, and tell it with tell(None, mep_mv). isiw.Session interleaves "
+            "control trials itself.",
+        )
+    return protocol
 
 
 class Recorder:
@@ -108,7 +135,7 @@ class Recorder:
     Args:
         strategy: proposes ISIs and learns.
         log: the open log.
-        limits: what may be asked.
+        header: what the session is: its limits and its protocol.
         clock: tells the time, and waits.
         trials: what was delivered before; the strategy has learned it.
         earlier_s: how long ago each of these was [s].
@@ -118,17 +145,19 @@ class Recorder:
         self,
         strategy: Strategy,
         log: LogWriter,
-        limits: Limits,
+        header: Header,
         clock: Clock,
         trials: TrialTable | None = None,
         earlier_s: Sequence[float] = (),
     ) -> None:
         self.strategy, self._journal = strategy, Journal(trials)
-        self._log = self._journal.log = log
-        self._limits, self._clock = limits, clock
+        self._log, self._clock = log, clock
+        self._limits, self._protocol, self._seed = header.limits, header.protocol, header.seed
+        self._open = ExitStack()
+        self._open.enter_context(self._journal.writing(log))
         self._asked: Stimulus | None = None
         now_s = clock.now_s()
-        self._not_before_s = now_s + limits.min_iti_s
+        self._made_s = now_s
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
         self._doubted: set[DoubtKind] = set()
 
@@ -149,24 +178,29 @@ class Recorder:
         """
         if self._asked is None or self._asked.isi_ms is None:
             isi_ms = self.strategy.ask(deadline_s)
-            if self.strategy.fallback_reason is not None:
-                self._log.append(Event(kind="fallback", trial=len(self.trials), text=self.strategy.fallback_reason))
-            self._begin(isi_ms)
+            self._begin(isi_ms, self.strategy.fallback_reason)
             return isi_ms
         return self._asked.isi_ms
 
-    def _begin(self, isi_ms: float | None) -> None:
+    def _begin(self, isi_ms: float | None, fallback: str | None = None) -> None:
         """Put on disk what is about to be delivered, once the limits allow it."""
         stimulus = Stimulus(len(self.trials), isi_ms)
         self._limits.require_left(stimulus.trial)
         if isi_ms is not None:
             self._limits.require_isi(isi_ms)
         self._limits.require_state(Readiness())
-        earliest_s = max(self._not_before_s, self._limits.earliest_s(self._times_s))
-        self._clock.sleep_s(earliest_s - self._clock.now_s())
-        self._log.append(Intent(trial=stimulus.trial, isi_ms=isi_ms, t_s=self._clock.now_s()))
-        self._log.sync()
+        self._clock.sleep_s(self._earliest_s(stimulus.trial) - self._clock.now_s())
+        self._journal.intent(stimulus, self._clock.now_s(), fallback)
         self._asked = stimulus
+
+    def _earliest_s(self, trial: int) -> float:
+        """When limits and protocol allow a trial, by the clock [s]."""
+        last_s = self._times_s[-1] if self._times_s else self._made_s
+        return max(
+            self._made_s + self._limits.min_iti_s,
+            self._limits.earliest_s(self._times_s),
+            last_s + self._protocol.interval_s(trial, self._seed),
+        )
 
     def tell(
         self,
@@ -243,7 +277,7 @@ class Recorder:
         Args:
             text: anything.
         """
-        self._event("note", text)
+        self._journal.note(text)
 
     def exclude(self, trial: int, reason: str = "") -> None:
         """Exclude a trial from here on: an event is appended, and the strategy learns anew without it.
@@ -253,20 +287,47 @@ class Recorder:
             reason: why, for whoever reads the log.
 
         Raises:
-            InvalidValueError: no accepted trial has this number.
+            InvalidValueError: no trial that counts has this number.
         """
-        if trial not in {accepted.index for accepted in self.trials.told}:
-            raise InvalidValueError(
-                "there is no such trial to exclude",
-                got=trial,
-                expected=", ".join(str(accepted.index) for accepted in self.trials.told) or "one that was told",
-            )
-        self._log.append(Event(kind="exclusion", trial=trial, text=reason))
-        self._log.sync()
-        self._journal.trials = self.trials.excluding([trial])
-        self.strategy = self.strategy.restarted()
-        for earlier in self.trials:
-            learn(self.strategy, earlier)
+        self._judge(lambda trials: exclusion(trials, trial, reason))
+
+    def include(self, trial: int) -> None:
+        """Let a trial count again that was excluded, and learn anew with it.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no excluded trial has this number.
+        """
+        self._judge(lambda trials: inclusion(trials, trial))
+
+    def reject(self, trial: int) -> None:
+        """Let a trial not count whose MEP you have looked at; an exclusion with this reason.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no trial that counts has this number.
+        """
+        self.exclude(trial, LOOKED_AT)
+
+    def accept(self, trial: int) -> None:
+        """Let a trial count again that was rejected or excluded.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no such trial, one that counts already, or a mistrial, which has no amplitude here.
+        """
+        self._judge(lambda trials: acceptance(trials, trial, self.strategy.space))
+
+    def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
+        self._journal.judge(verdict)
+        self.strategy, self._journal.overruled = relearned(self.strategy, self.trials), False
+        self._log_estimate(len(self.trials) - 1)
 
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""
@@ -278,6 +339,7 @@ class Recorder:
 
     def close(self) -> None:
         """Close the log; calling it again is harmless."""
+        self._open.close()
         self._log.close()
 
     def __enter__(self) -> Self:
@@ -313,7 +375,10 @@ class Recorder:
         learn(self.strategy, trial)
         if trial.told and self.strategy.trouble is not None:
             self._log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
-        self._log.append(Estimate.of(trial.index, self.estimate(), self.decision(), None))
+        self._log_estimate(trial.index)
+
+    def _log_estimate(self, trial: int) -> None:
+        self._log.append(Estimate.of(trial, self.estimate(), self.decision(), None))
         self._log.sync()
 
     def _warn(self, text: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import warnings
 from dataclasses import dataclass
 from typing import Any, Final
@@ -10,6 +9,7 @@ from typing import Any, Final
 from isiw.errors import ConfigError, InvalidValueError, OtherVersionsWarning, StrategyError
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent, StrategyRecipe
+from isiw.log.verdicts import VERDICTS, under
 from isiw.session.header import versions
 from isiw.session.journal import learn
 from isiw.strategy.catalogue import make_strategy, settings_for
@@ -48,7 +48,7 @@ class Replayed:
 def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) -> Replayed:
     """Tell a strategy everything that a log holds, in the order in which it was told then.
 
-    A trial that was excluded counts from its exclusion on; asks before it are compared as they were made. Of a long
+    What an operator said about a trial holds from then on; asks before it are compared as they were made. Of a long
     session the first and the last asks are compared: the last ones depend on all that was told before.
 
     Args:
@@ -67,7 +67,12 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
     for entry in record.history:
         if isinstance(entry, Intent):
             # Behind a lost trial the strategy knew more than the log does.
-            comparable = entry.trial == len(told) and entry.trial >= first and entry.trial not in by_fallback
+            comparable = (
+                entry.isi_ms is not None
+                and entry.trial == len(told)
+                and entry.trial >= first
+                and entry.trial not in by_fallback
+            )
             near_an_end = min(entry.trial - first, last - entry.trial) < _COMPARED_AT_EACH_END
             if verify and comparable and near_an_end and (asked_ms := strategy.ask()) != entry.isi_ms:
                 _require_other_versions(entry, asked_ms, record.header)
@@ -75,13 +80,13 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
         elif isinstance(entry, Trial):
             learn(strategy, entry)
             told.append(entry)
-        elif isinstance(entry, Event) and entry.kind == "exclusion" and entry.trial is not None:
+        elif isinstance(entry, Event) and entry.kind in VERDICTS:
             # In the order of telling, in which a trial that was lost stands behind later ones.
-            told = [dataclasses.replace(t, excluded=True) if t.index == entry.trial else t for t in told]
+            told = [under(trial, entry) for trial in told]
             strategy = strategy.restarted()
             for trial in told:
                 learn(strategy, trial)
-    unknown = tuple(Trial.unknown(Stimulus(intent.trial, intent.isi_ms)) for intent in record.unknown)
+    unknown = tuple(Trial.unknown(Stimulus(i.trial, i.isi_ms, i.tap_alone)) for i in record.unknown)
     for trial in unknown:
         learn(strategy, trial)
     table = TrialTable(tuple(sorted((*told, *unknown), key=lambda trial: trial.index)))

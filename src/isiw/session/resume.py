@@ -16,15 +16,16 @@ from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import MOST_TRIALS, Event, Header
+from isiw.log.verdicts import exclusion, inclusion
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session
 from isiw.session.replay import Replayed, replay, resumption_text, strategy_of, warn_where_differing
 from isiw.session.safeguards import Safeguards
 from isiw.session.updates import SessionUpdate
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Stimulus
+from isiw.trials import Stimulus, TrialTable
 
-__all__ = ["ages_s", "continued", "exclude", "resume", "resumption", "with_lost_pulses"]
+__all__ = ["ages_s", "continued", "exclude", "include", "resume", "resumption", "with_lost_pulses"]
 
 
 def resume(  # noqa: PLR0913 - all but three are keyword-only
@@ -80,7 +81,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     replayed = replay(record, strategy.restarted() if strategy else strategy_of(header), verify=verify)
     warn_where_differing(replayed, header)
     if isinstance(device, HasMemory):
-        device.resume_after([Stimulus(trial.index, trial.commanded_isi_ms) for trial in replayed.trials])
+        device.resume_after([Stimulus(t.index, t.commanded_isi_ms, t.tap_alone) for t in replayed.trials])
     session = Session(
         device,
         replayed.strategy,
@@ -94,6 +95,8 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         timeout_s=header.timeout_s if timeout_s is None else timeout_s,
         ask_deadline_s=header.ask_deadline_s if ask_deadline_s is None else ask_deadline_s,
         safeguards=safeguards,
+        visit=header.visit,
+        protocol=header.protocol,
     )
     session.continue_from(
         replayed.trials,
@@ -153,20 +156,33 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
         DamagedLogError: the log's end is missing; resume the session first.
         InvalidValueError: no such trial, or one that counts for nothing anyway.
     """
+    _judge(path, lambda trials: exclusion(trials, trial, reason))
+
+
+def include(path: str | Path, trial: int) -> None:
+    """Let a trial count again that was excluded: an event is appended to the log. Resuming learns with it.
+
+    Args:
+        path: the log, with or without `.part`.
+        trial: the trial's number.
+
+    Raises:
+        LogError: no such log, or it is still being written.
+        DamagedLogError: the log's end is missing; resume the session first.
+        InvalidValueError: no excluded trial has this number.
+    """
+    _judge(path, lambda trials: inclusion(trials, trial))
+
+
+def _judge(path: str | Path, verdict: Callable[[TrialTable], Event]) -> None:
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
-    if trial not in {candidate.index for candidate in record.table.told}:
-        raise InvalidValueError(
-            "there is no such trial to exclude",
-            got=trial,
-            expected="the number of an accepted trial that is not excluded yet",
-            remedy=f"List them: isiw show {path}",
-        )
+    event = verdict(record.table)
     _require_end(record)
     with LogWriter.continuing(path, salvaged, record.header) as log:
-        log.append(Event(kind="exclusion", trial=trial, text=reason))
+        log.append(event)
         if record.losses:
-            log.append(Event(kind="fault", trial=trial, text=" ".join(record.losses)))
+            log.append(Event(kind="fault", trial=event.trial, text=" ".join(record.losses)))
 
 
 def with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> SessionRecord:

@@ -20,7 +20,7 @@ class SessionUpdate:
         trial: the trial.
         estimate: what is believed about the window.
         decision: whether the session stops here, and why.
-        next_isi_ms: what is asked next [ms]; None where the session stops.
+        next_isi_ms: what is asked next [ms]; None where the session stops, or a control trial comes next.
         stimuli_left: how many stimuli the budget and the limits still allow.
     """
 

@@ -105,18 +105,23 @@ class Course:
             paired=not alone,
         )
 
+    @property
+    def paired_trials(self) -> int:
+        """How many pairs of stimuli were told of each person."""
+        return self.told - self.alone
+
     @cached_property
     def past(self) -> tuple[tuple[WindowEstimate, ...], ...]:
         """Of each person, the estimates that the stopping rule looks back on, the first after the last initial ISI."""
         kept = looks_back(self.method.stopping)
-        if not kept or not self.paired or self.told - self.alone < len(self.method.initial_ms):
+        if not kept or not self.paired or self.paired_trials < len(self.method.initial_ms):
             return self.earlier
         return tuple((*past, self.estimate(i))[-kept:] for i, past in enumerate(self.earlier))
 
     @property
     def initial_left(self) -> tuple[float, ...]:
         """What is left of the initial ISIs [ms]."""
-        return self.method.initial_ms[self.told - self.alone :]
+        return self.method.initial_ms[self.paired_trials :]
 
     @property
     def plans_ahead(self) -> bool:
@@ -160,7 +165,7 @@ class Course:
     def estimate(self, person: int = 0) -> WindowEstimate:
         """What is believed about the window of one person."""
         if person not in self._estimates:
-            self._estimates[person] = replace(self.posterior.estimate(person), pairs=self.told - self.alone)
+            self._estimates[person] = replace(self.posterior.estimate(person), pairs=self.paired_trials)
         return self._estimates[person]
 
     def decision(self, person: int = 0, mistrials: int = 0) -> StopDecision:
@@ -168,9 +173,9 @@ class Course:
 
         Args:
             person: which.
-            mistrials: stimuli that were delivered to the person and not told.
+            mistrials: pairs of stimuli that were delivered to the person and not told.
         """
-        progress = Progress(self.told + mistrials, self.told, self.estimate(person), past=self.past[person])
+        progress = Progress(self.paired_trials + mistrials, self.told, self.estimate(person), past=self.past[person])
         return self.method.stopping(progress)
 
 
