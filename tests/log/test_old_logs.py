@@ -126,6 +126,13 @@ def test_settings_by_their_earlier_name_are_kept() -> None:
     assert strategy.recipe.settings["threshold_mv"] == 0.004
 
 
+def test_a_budget_by_its_earlier_name_is_kept() -> None:
+    header = isiw.read_session(FOLDER / "e31d040-nr.mcap").header
+    recipe = header.strategy.model_copy(update={"settings": {"initial": 5, "max_iterations": 20}})
+    strategy = strategy_of(header.model_copy(update={"strategy": recipe}))
+    assert strategy.recipe.settings["max_trials"] == 25
+
+
 def test_a_session_of_an_earlier_version_that_is_interrupted_again_goes_on_again(copy: Callable[[str], Path]) -> None:
     class InterruptedHereError(Exception):
         pass

@@ -394,3 +394,21 @@ def test_to_run_a_session_again_that_failed_says_how_to_go_on(log: Path) -> None
     session = Session(ScriptedDevice(answer), scripted_strategy(3), log=log)
     run_failing(session, DeviceError)
     assert "isiw resume" in run_failing(session, LogError)[1]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"subject": 7}, 'subject must be a text.*"7"'),
+        ({"log": None}, "needs a log"),
+        ({"limits": (0, 320)}, r"limits.*isiw\.Limits"),
+        ({"protocol": {"iti_s": (5, 8)}}, r"protocol.*isiw\.VisitProtocol"),
+        ({"visit": {"day": 1}}, r"visit.*isiw\.Visit"),
+        ({"strategy": "default"}, r"strategy.*isiw\.Strategy"),
+        ({"device": None}, r"device.*isiw\.Device"),
+    ],
+)
+def test_a_part_that_is_something_else_is_refused_in_words(log: Path, wrong: dict[str, Any], said: str) -> None:
+    parts: dict[str, Any] = {"device": ScriptedDevice(), "strategy": scripted_strategy(), "log": log} | wrong
+    with pytest.raises(InvalidValueError, match=said):
+        Session(parts.pop("device"), parts.pop("strategy"), **parts)

@@ -131,12 +131,21 @@ def _counts(record: SessionRecord) -> str:
     if unknown:
         mistrials["outcome unknown"] += unknown
     told, given = len(record.table.told), len(record.table) + unknown
-    parts = [f"{given} pairs of stimuli were delivered; {told} count"]
+    pairs = f"{given} pairs of stimuli were delivered"
+    if controls := _controls(record):
+        pairs = f"{given} stimuli were delivered, {controls} among them"
+    parts = [f"{pairs}; {told} count"]
     if mistrials:
         parts.append("mistrials: " + ", ".join(f"{count} {reason}" for reason, count in mistrials.items()))
     if excluded:
         parts.append(f"{excluded} excluded")
     return "; ".join(parts) + "."
+
+
+def _controls(record: SessionRecord) -> str:
+    """How many control trials there were, in words; empty where there were none."""
+    kinds = Counter(asked(trial) for trial in record.table if trial.is_control)
+    return " and ".join(f"{count} of {kind}" for kind, count in sorted(kinds.items(), reverse=True))
 
 
 def _fits(record: SessionRecord) -> str:

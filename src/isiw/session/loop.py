@@ -17,14 +17,13 @@ from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError, NotDelivered, StrategyError
-from isiw.log.durable import log_of
 from isiw.log.pulses import earlier_pulses_s
 from isiw.log.schema import Header, Record
 from isiw.log.verdicts import LOOKED_AT, acceptance, exclusion, inclusion
 from isiw.log.writer import LogWriter
 from isiw.session.delivery import Delivery
 from isiw.session.desk import Desk
-from isiw.session.header import header_of
+from isiw.session.header import header_of, require_parts
 from isiw.session.journal import Journal
 from isiw.session.pausing import Pausing
 from isiw.session.progress import PROGRESS_HEADINGS, progress_row, show_progress
@@ -66,8 +65,8 @@ class Session:
         DeviceError: the device counts its ISIs from another event than the space, or states another detection limit
             than the strategy's, or is not simulated and has a virtual clock, or delivers no tap alone where the
             protocol has some.
-        InvalidValueError: a time that is no positive number, a subject that is no text, a channel whose name or unit a
-            session cannot use, or earlier logs without a subject to find in them.
+        InvalidValueError: a part that is something else than it should be, a time that is no positive number, a channel
+            whose name or unit a session cannot use, or earlier logs without a subject to find in them.
     """
 
     def __init__(  # noqa: PLR0913 - the public surface of the design; all but two are keyword-only
@@ -88,16 +87,23 @@ class Session:
         visit: Visit | None = None,
         protocol: VisitProtocol | None = None,
     ) -> None:
+        self.log_path = require_parts(
+            log,
+            device=(device, Device),
+            strategy=(strategy, Strategy),
+            limits=(limits, Limits | None),
+            visit=(visit, Visit | None),
+            protocol=(protocol, VisitProtocol | None),
+        )
+        visit, protocol, self._safeguards = visit or Visit(), protocol or VisitProtocol(), safeguards or Safeguards()
         self._limits = limits or Limits.of_space(strategy.space)
-        self._safeguards = safeguards or Safeguards()
         self._rig = Rig(device, self._limits, clock, self._safeguards)
-        protocol = protocol or VisitProtocol()
         require_matching(self._rig.info, strategy, protocol)
-        self.log_path, self._on_trial = log_of(Path(log)), on_trial
+        self._on_trial = on_trial
         self._header = header_of(
             strategy,
             subject=text("subject", subject),
-            visit=visit or Visit(),
+            visit=visit,
             protocol=protocol,
             limits=self._limits,
             device=self._rig.info,

@@ -15,13 +15,13 @@ from isiw.devices.clock import Clock, MonotonicClock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo, Readiness
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
-from isiw.log.durable import log_of, part_of
+from isiw.log.durable import part_of
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Estimate, Event, EventKind, Header
 from isiw.log.verdicts import LOOKED_AT, acceptance, exclusion, inclusion
 from isiw.log.writer import LogWriter
-from isiw.session.header import header_of
+from isiw.session.header import header_of, require_parts
 from isiw.session.journal import Journal, learn, relearned
 from isiw.session.replay import replay, warn_where_differing
 from isiw.session.resume import ages_s, continued, resumption, with_lost_pulses
@@ -78,7 +78,13 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     Warns:
         OtherVersionsWarning: with other versions than those that were logged the strategy asks something else.
     """
-    path = log_of(Path(log))
+    path = require_parts(
+        log,
+        strategy=(strategy, Strategy),
+        limits=(limits, Limits | None),
+        visit=(visit, Visit | None),
+        protocol=(protocol, VisitProtocol | None),
+    )
     if strategy.delivered:
         raise StrategyError(
             "the strategy knows of trials that are not this session's",

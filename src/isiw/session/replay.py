@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -120,16 +121,25 @@ def strategy_of(header: Header) -> Strategy:
 def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
     """The settings of an earlier version that this one knows; a warning names the others."""
     known = {}
-    for key, value in recipe.settings.items():
+    settings = _renamed(recipe.settings)
+    for key, value in settings.items():
         try:
-            settings_for(recipe.name, **{_RENAMED.get(key, key): value})
+            settings_for(recipe.name, **{key: value})
         except (ConfigError, StrategyError, InvalidValueError):
             continue
-        known[_RENAMED.get(key, key)] = value
-    if unknown := sorted(key for key in recipe.settings if _RENAMED.get(key, key) not in known):
+        known[key] = value
+    if unknown := sorted(settings.keys() - known.keys()):
         text = f"Settings of an earlier version are not known any more, and are as by default: {', '.join(unknown)}."
         warnings.warn(text, OtherVersionsWarning, stacklevel=3)
     return known
+
+
+def _renamed(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by the names that they have now."""
+    renamed = {_RENAMED.get(key, key): value for key, value in settings.items()}
+    if "max_iterations" in renamed:  # which left the initial trials out
+        renamed["max_trials"] = renamed["initial"] + renamed.pop("max_iterations")
+    return renamed
 
 
 def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
