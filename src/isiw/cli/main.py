@@ -80,7 +80,7 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
     operator: Annotated[str | None, typer.Option(help="Who runs the session, for the log.", **NO_DEFAULT)] = None,
 ) -> None:
     """Run a session with a simulated person, or with the device of a configuration, and say what was found."""
-    with errors_reported(_INTERRUPTED):
+    with errors_reported():
         settings = isiw.config.load_config(config).with_overrides(
             seed=seed,
             log=log,
@@ -109,7 +109,7 @@ def resume(
     verify: Annotated[bool, typer.Option(help="Check that the strategy asks again what the log says it asked.")] = True,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Go on with a session that was interrupted."""
-    with errors_reported(_INTERRUPTED):
+    with errors_reported():
         record = isiw.read_session(log)
         settings = isiw.config.load_config(config) if config else isiw.config.config_of_log(record)
         device = isiw.config.device_for(settings.with_overrides(data=data))
@@ -278,7 +278,8 @@ def _run_to_the_end(session: Session) -> None:
     show(f"log: {session.log_path}")
     before = len(session.trials)
     try:
-        result = session.run(progress=True)
+        with errors_reported(_INTERRUPTED):
+            result = session.run(progress=True)
     except BaseException:
         if len(session.trials) > before:
             show(f"The session ended early. Its log is safe; go on with: isiw resume {session.log_path}")

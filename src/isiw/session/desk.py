@@ -123,8 +123,8 @@ class Desk:
         """
         if self._note is not None:
             self._type(self._note, key)
-        elif key in "rq":
-            self._decide(key)
+        elif key.lower() in "rq":
+            self._decide(key.lower())
         elif (act := self._acts.get(key.lower())) is not None:
             try:
                 act()
