@@ -21,6 +21,9 @@ from known import instance
 
 SPACE = DesignSpace(0, 200, reference="valve")
 
+ALONE_MS = -1.0
+"""What TMS alone is remembered as."""
+
 
 @dataclass(frozen=True)
 class RememberingPosterior:
@@ -64,7 +67,8 @@ class RememberingModel:
         return RememberingPosterior(space, seed)
 
     def update(self, posterior: RememberingPosterior, observation: Observation) -> RememberingPosterior:
-        trial = (float(observation.isi_ms[0]), float(observation.mep_mv[0]))
+        alone = bool(observation.isi_ms[0].isnan())
+        trial = (ALONE_MS if alone else float(observation.isi_ms[0]), float(observation.mep_mv[0]))
         return replace(posterior, told=(*posterior.told, trial))
 
 

@@ -45,12 +45,12 @@ def test_a_labs_own_loop_takes_ten_lines() -> None:
 
 def test_the_examples_log_to_different_files() -> None:
     logs = re.findall(r"(?:--log |log=\")([\w.]+)", TEXT)
-    assert len(logs) == len(set(logs)) == 2
+    assert len(logs) == len(set(logs)) == 3
 
 
 def test_the_first_screen_says_what_and_how() -> None:
     screen = TEXT[: TEXT.index("## ")]
-    for part in ("**window**", "**F1**", "pip install -e .", "whl/cpu", "strategy.tell("):
+    for part in ("**window**", "**F1**", "pip install -e .", "whl/cpu", "session.tell("):
         assert part in screen
 
 

@@ -189,8 +189,17 @@ def test_the_report_says_all_of_it() -> None:
     study = study_preset("cushion", taps=10, seed=4)
     report = timing_report(study)
     assert "90 taps" in report
+    assert "in ms after the valve command:" in report
+    assert float(report.split("t_hit")[1].split()[0]) == pytest.approx(180.0, abs=2.0)
     assert f"{study.pooled_sd_ms:.2f} ms" in report
     assert all(f"\n{isi:7g}" in report for isi in STUDY_ISI_MS)
+
+
+def test_what_is_not_known_is_no_number() -> None:
+    study = study_preset("cushion", taps=1, seed=4)
+    report = timing_report(study)
+    assert "nan" not in report
+    assert "No ISI has two accepted trials" in report
 
 
 def test_a_study_of_nothing_is_an_error() -> None:

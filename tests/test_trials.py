@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,10 @@ NOT_FINITE = [math.nan, math.inf, -math.inf]
 
 def accepted(index: int, mep_mv: float = 0.05) -> Trial:
     return Trial(index, Status.ACCEPTED, 100.0, isi_ms=101.0, mep_mv=mep_mv)
+
+
+def excluding(index: int) -> Callable[[Trial], Trial]:
+    return lambda trial: dataclasses.replace(trial, excluded=trial.excluded or trial.index == index)
 
 
 def mistrial(index: int) -> Trial:
@@ -102,14 +108,14 @@ def test_a_reason_outside_the_closed_list_is_refused() -> None:
 
 
 def test_a_strategy_learns_neither_from_mistrials_nor_from_excluded_trials() -> None:
-    table = TrialTable((accepted(0), mistrial(1), accepted(2), accepted(3))).excluding([2])
+    table = TrialTable((accepted(0), mistrial(1), accepted(2), accepted(3))).changed(excluding(2))
     assert [trial.index for trial in table.told] == [0, 3]
     assert len(table) == 4
 
 
 def test_appending_and_excluding_leave_the_table_itself_as_it_was() -> None:
     table = TrialTable((accepted(0),))
-    longer = table.appended(accepted(1)).excluding([0])
+    longer = table.appended(accepted(1)).changed(excluding(0))
     assert [trial.excluded for trial in longer] == [True, False]
     assert [trial.excluded for trial in table] == [False]
     assert longer[1] == accepted(1)
@@ -123,7 +129,7 @@ def test_indices_ascend(indices: tuple[int, int]) -> None:
 
 def test_a_table_is_printed_as_its_counts() -> None:
     assert str(TrialTable((accepted(0),))) == "1 delivered, 1 told"
-    table = TrialTable((accepted(0), mistrial(1), mistrial(2), accepted(3))).excluding([3])
+    table = TrialTable((accepted(0), mistrial(1), mistrial(2), accepted(3))).changed(excluding(3))
     assert str(table) == "4 delivered, 1 told, 2 mistrials (2 no pulse), 1 excluded"
 
 

@@ -39,6 +39,7 @@ from .session.loop import Session as Session
 from .session.recorder import Recorder as Recorder
 from .session.recorder import open_session as open_session
 from .session.resume import exclude as exclude
+from .session.resume import include as include
 from .session.resume import resume as resume
 from .session.safeguards import Safeguards as Safeguards
 from .strategy.catalogue import list_settings as list_settings
@@ -52,6 +53,8 @@ from .trials import Stimulus as Stimulus
 from .trials import Sweep as Sweep
 from .trials import Trial as Trial
 from .trials import TrialTable as TrialTable
+from .visit import Visit as Visit
+from .visit import VisitProtocol as VisitProtocol
 from .window import Window as Window
 from .window import WindowEstimate as WindowEstimate
 

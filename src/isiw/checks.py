@@ -22,10 +22,12 @@ __all__ = [
     "check_choice",
     "check_numbers",
     "check_probabilities",
+    "check_texts",
     "check_wholes",
     "choice",
     "deadline",
     "number",
+    "text",
     "whole",
 ]
 
@@ -127,6 +129,21 @@ def whole(what: str, value: object, **bounds: Unpack[Bounds]) -> int:
     return plain
 
 
+def text(what: str, value: object) -> str:
+    """A text.
+
+    Args:
+        what: its name, for the message.
+        value: what was given.
+
+    Raises:
+        InvalidValueError: anything else.
+    """
+    if not isinstance(value, str):
+        raise InvalidValueError(f"{what} must be a text", got=value, remedy=f'Write it in quotes: "{value}".')
+    return str(value)
+
+
 def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
     """One of some known values.
 
@@ -209,6 +226,20 @@ def check_wholes(owner: object, *names: str, optional: bool = False, **bounds: U
         value = getattr(owner, name)
         if not (optional and value is None):
             _put(owner, name, whole(f"{type(owner).__name__}.{name}", value, **bounds))
+
+
+def check_texts(owner: object, *names: str) -> None:
+    """Check fields of a frozen dataclass that are texts.
+
+    Args:
+        owner: the instance.
+        *names: its fields.
+
+    Raises:
+        InvalidValueError: a field that is none.
+    """
+    for name in names:
+        _put(owner, name, text(f"{type(owner).__name__}.{name}", getattr(owner, name)))
 
 
 def check_choice(owner: object, name: str, known: Iterable[Any]) -> None:

@@ -125,7 +125,7 @@ def require_space(space: object) -> None:
         InvalidValueError: it is none.
     """
     if not isinstance(space, DesignSpace):
-        raise InvalidValueError("a strategy needs a design space", got=space, expected="an isiw.DesignSpace")
+        raise InvalidValueError("a design space is needed", got=space, expected="an isiw.DesignSpace")
 
 
 VALVE_SPACE = DesignSpace(0, 500, reference="valve")

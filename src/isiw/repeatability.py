@@ -218,19 +218,24 @@ def study_session(record: SessionRecord) -> TimingStudy:
 def timing_report(study: TimingStudy) -> str:
     """A study in words and tables."""
     events = study.event_table
-    lines = [f"{study.name}: {len(study.commanded_ms)} taps", "", "event      mean [ms]    SD   range            n"]
+    lines = [
+        f"{study.name}: {len(study.commanded_ms)} taps",
+        "",
+        "When each event comes, in ms after the valve command:",
+        "event          mean     SD   range            n",
+    ]
     lines += [
-        f"t_{name:<8} {mean:8.1f} {sd:6.1f}   [{low:.0f}, {high:.0f}]   {n:7.0f}"
+        f"t_{name:<8} {mean - VALVE_MS:8.1f} {sd:6.1f}   [{low - VALVE_MS:.0f}, {high - VALVE_MS:.0f}]   {n:7.0f}"
         for name, mean, sd, low, high, n in events.itertuples()
     ]
     errors = study.error_table
     if len(errors):
         lines += ["", "ISI [ms]   mean error [ms]    SD      n   mistrials"]
         lines += [
-            f"{isi:7g} {mean:14.2f} {sd:12.2f} {n:6.0f} {mistrials:8.0f}"
+            f"{isi:7g} {_figure(mean):>14} {_figure(sd):>12} {n:6.0f} {mistrials:8.0f}"
             for isi, n, mean, sd, mistrials in errors.itertuples()
         ]
-        lines += ["", f"Pooled SD of the ISI error: {study.pooled_sd_ms:.2f} ms. Mistrials: {study.mistrials}."]
+        lines += ["", f"{_pooled(study)} Mistrials: {study.mistrials}."]
     hit_delay = hit_delay_ms(study)
     if hit_delay is not None:
         mean_ms, sd_ms = hit_delay
@@ -241,6 +246,16 @@ def timing_report(study: TimingStudy) -> str:
             "It is a setting of the strategy and an argument of DeviceInfo.",
         ]
     return "\n".join(lines)
+
+
+def _figure(value_ms: float) -> str:
+    return "–" if np.isnan(value_ms) else f"{value_ms:.2f}"
+
+
+def _pooled(study: TimingStudy) -> str:
+    if np.isnan(study.pooled_sd_ms):
+        return "No ISI has two accepted trials, so the SD of its error is not known."
+    return f"Pooled SD of the ISI error: {study.pooled_sd_ms:.2f} ms."
 
 
 def _tap(geometry: Geometry, pulse_ms: FloatArray, rate_hz: float, rng: np.random.Generator) -> TapEvents:

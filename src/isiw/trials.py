@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -46,18 +46,24 @@ class Stimulus:
 
     Args:
         trial: number of the trial, from 0.
-        isi_ms: inter-stimulus interval on the design space's reference [ms]; None for TMS alone (a baseline trial).
+        isi_ms: inter-stimulus interval on the design space's reference [ms]; None for a control trial, which is TMS
+            alone unless it is a tap alone.
+        tap_alone: whether the tap comes without the magnetic pulse; only for devices whose `DeviceInfo` says that they
+            can.
 
     Raises:
-        InvalidValueError: a negative trial number, or an ISI that is not finite.
+        InvalidValueError: a negative trial number, an ISI that is not finite, or a tap alone with an ISI.
     """
 
     trial: int
     isi_ms: float | None
+    tap_alone: bool = False
 
     def __post_init__(self) -> None:
         check_wholes(self, "trial", least=0)
         check_numbers(self, "isi_ms", optional=True)
+        if self.tap_alone and self.isi_ms is not None:
+            raise InvalidValueError("a tap alone has no ISI", got=self.isi_ms, expected="None")
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,20 +159,23 @@ class Trial:
     Args:
         index: number of the trial, from 0.
         status: accepted trials are told to the strategy, mistrials are not; both count as stimuli.
-        commanded_isi_ms: the ISI that was asked for [ms]; None for TMS alone.
+        commanded_isi_ms: the ISI that was asked for [ms]; None for a control trial.
         reason: why it is a mistrial; None where accepted.
-        isi_ms: the realised ISI [ms]; None for TMS alone or where unknown.
+        isi_ms: the realised ISI [ms]; None for a control trial or where unknown.
         isi_sd_ms: SD of the realised ISI [ms].
-        mep_mv: peak-to-peak amplitude of the MEP [mV]; None where there is no trustworthy one.
+        mep_mv: peak-to-peak amplitude of the MEP [mV], also of some mistrials, for whoever looks at them; None where
+            none was measured.
         background_rms_uv: EMG before the pulse [µV RMS].
         t_valve_ms: time of the valve command [ms].
         t_hit_ms: time of the impact [ms].
         t_tms_ms: time of the magnetic pulse [ms].
         excluded: excluded by an operator afterwards.
+        tap_alone: whether it was a tap without the magnetic pulse, from which a strategy learns nothing.
+        overruled: why it had been a mistrial before an operator accepted it; None otherwise.
 
     Raises:
-        InvalidValueError: a mistrial without a reason, an accepted trial with one or without an amplitude, or a value
-            that is not finite or that no amplifier gives.
+        InvalidValueError: a mistrial without a reason, an accepted trial with one or without an amplitude, a tap alone
+            with an ISI, or a value that is not finite or that no amplifier gives.
     """
 
     index: int
@@ -181,14 +190,19 @@ class Trial:
     t_hit_ms: float | None = None
     t_tms_ms: float | None = None
     excluded: bool = False
+    tap_alone: bool = False
+    overruled: MistrialReason | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "status", Status(self.status))
-        if self.reason is not None:
-            object.__setattr__(self, "reason", MistrialReason(self.reason))
+        for name in ("reason", "overruled"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, MistrialReason(getattr(self, name)))
         if (self.status is Status.MISTRIAL) != (self.reason is not None):
             raise InvalidValueError("a mistrial needs a reason and an accepted trial has none", got=self.reason)
-        if self.status is Status.ACCEPTED and self.mep_mv is None:
+        if self.tap_alone and self.commanded_isi_ms is not None:
+            raise InvalidValueError("a tap alone has no ISI", got=self.commanded_isi_ms, expected="None")
+        if self.status is Status.ACCEPTED and self.mep_mv is None and not self.tap_alone:
             raise InvalidValueError("an accepted trial needs its MEP", got=self.index)
         check_wholes(self, "index", least=0)
         check_numbers(self, "commanded_isi_ms", "isi_ms", "t_valve_ms", "t_hit_ms", "t_tms_ms", optional=True)
@@ -199,12 +213,32 @@ class Trial:
     @classmethod
     def unknown(cls, stimulus: Stimulus) -> Trial:
         """A mistrial of which nothing is known but what was commanded."""
-        return cls(stimulus.trial, Status.MISTRIAL, stimulus.isi_ms, MistrialReason.OUTCOME_UNKNOWN)
+        return cls(
+            stimulus.trial,
+            Status.MISTRIAL,
+            stimulus.isi_ms,
+            MistrialReason.OUTCOME_UNKNOWN,
+            tap_alone=stimulus.tap_alone,
+        )
+
+    @property
+    def counts(self) -> bool:
+        """Whether it was accepted, and not excluded afterwards."""
+        return self.status is Status.ACCEPTED and not self.excluded
 
     @property
     def told(self) -> bool:
         """Whether the strategy learns from it."""
-        return self.status is Status.ACCEPTED and not self.excluded
+        return self.counts and not self.tap_alone
+
+    @property
+    def is_control(self) -> bool:
+        """Whether it was TMS alone or a tap alone; of what nobody knows the outcome of, it may have been a pair."""
+        return self.commanded_isi_ms is None and self.reason is not MistrialReason.OUTCOME_UNKNOWN
+
+    def accepted_anyway(self) -> Trial:
+        """The same trial, accepted by an operator after looking at it."""
+        return dataclasses.replace(self, status=Status.ACCEPTED, reason=None, overruled=self.reason)
 
 
 @dataclass(frozen=True)
@@ -242,6 +276,7 @@ class TrialTable:
         excluded = sum(trial.excluded for trial in self.trials)
         return (
             f"{len(self)} delivered, {len(self.told)} told"
+            + (f", {taps} taps alone" if (taps := sum(trial.tap_alone for trial in self.trials)) else "")
             + (f", {mistrials.total()} mistrials ({reasons})" if reasons else "")
             + (f", {excluded} excluded" if excluded else "")
         )
@@ -258,12 +293,9 @@ class TrialTable:
         object.__setattr__(table, "trials", (*self.trials, trial))
         return table
 
-    def excluding(self, indices: Iterable[int]) -> TrialTable:
-        """A table in which the trials of these indices are excluded."""
-        dropped = set(indices)
-        return TrialTable(
-            tuple(dataclasses.replace(t, excluded=True) if t.index in dropped else t for t in self.trials)
-        )
+    def changed(self, change: Callable[[Trial], Trial]) -> TrialTable:
+        """A table of the same trials, each as the change makes it."""
+        return TrialTable(tuple(change(trial) for trial in self.trials))
 
     @property
     def told(self) -> tuple[Trial, ...]:

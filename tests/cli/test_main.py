@@ -103,7 +103,7 @@ def test_the_version_is_shown(isiw: Command) -> None:
 
 def test_a_strategys_settings_are_listed_as_a_configuration_has_them_with_unit_and_meaning(isiw: Command) -> None:
     output = isiw("strategies", "default").output
-    assert "\nmax_trials = 80\n    stop after this many stimuli; mistrials count." in output
+    assert "\nmax_trials = 80\n    stop after this many stimuli; mistrials count, control trials do not." in output
     assert "\nstop_width_ms = 30.0  # ms\n" in output
     assert "\nprior.switch.reliability = [0.2, 0.7, 0.0]  # median, sd, tail\n" in output
     assert "\nprior.profile\n" in output
@@ -360,3 +360,30 @@ def test_a_configuration_that_asks_for_too_much_is_an_error_at_once(isiw: Any, t
     assert time.process_time() - begin < 2
     assert result.exit_code == 1
     assert result.output.startswith("error: ")
+
+
+def test_an_excluded_trial_is_included_again(isiw: Command, log: Path) -> None:
+    assert isiw("exclude", log, 1, "--reason", "cough").exit_code == 0
+    assert isiw("include", log, 1).output == "Trial 1 counts again.\n"
+    assert all(trial.told for trial in read_session(log).table)
+
+
+def test_day_and_operator_are_noted_in_the_log(isiw: Command, short: Path) -> None:
+    result = isiw("run", short, "--log", "v.mcap", "--day", 2, "--operator", "MK")
+    assert result.exit_code == 0, result.output
+    visit = read_session("v.mcap").header.visit
+    assert (visit.day, visit.operator) == (2, "MK")
+
+
+def test_a_protocol_is_kept_and_its_controls_are_told_from_pairs(isiw: Command, short: Path) -> None:
+    short.write_text(SHORT + "[protocol]\niti_s = [5.0, 6.0]\ntms_alone = 0.3\ntap_alone = 0.3\n")
+    result = isiw("run", short, "--log", "p.mcap")
+    assert result.exit_code == 0, result.output
+    record = read_session("p.mcap")
+    assert record.header.protocol.iti_s == (5.0, 6.0)
+    shown = isiw("show", "p.mcap").output
+    for kind in ("tap alone", "TMS alone"):
+        assert kind in result.output
+        assert kind in shown
+    assert "stimuli were delivered, " in result.output
+    assert sum(trial.commanded_isi_ms is not None for trial in record.table) == 3

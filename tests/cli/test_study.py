@@ -52,6 +52,13 @@ def test_run_puts_the_results_beside_the_file_and_says_what_is_there(plan: Path)
     assert len(open_store(plan.with_name("tiny.study")).rows()) == 8
 
 
+def test_a_study_that_is_finished_has_nothing_left_to_run(finished: Path) -> None:
+    result = study("run", finished, "--workers", 1)
+    assert result.exit_code == 0, result.output
+    assert "Nothing is left to run." in result.output
+    assert "0/0" not in result.output
+
+
 def test_run_of_a_folder_goes_on_with_it(folder: Path) -> None:
     next((folder / "parts").glob("even.gaussian.00001.*")).unlink()
     result = study("run", folder, "--workers", 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -274,7 +275,16 @@ def test_a_right_rig_passes_with_a_table_of_what_was_found() -> None:
     assert len(rows["realised minus wanted ISI"].split(",")) == 3
     assert "ms from the pulse" in rows["pulse artefact"]
     assert "emg in mV" in rows["units"]
-    assert rows["judged"] == "accepted, accepted, accepted, accepted"
+    assert rows["judged"] == "accepted, accepted, accepted, accepted, accepted"
+
+
+def test_the_suite_finds_a_rig_that_gives_a_pulse_with_a_tap_alone(space: DesignSpace) -> None:
+    class Unaware(Rig):
+        def describe(self) -> DeviceInfo:
+            return dataclasses.replace(super().describe(), tap_alone=True)
+
+    with pytest.raises(AssertionError, match="a tap alone has no pulse"):
+        check_device(Unaware, space, clock=VirtualClock())
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,8 @@ from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.metrics import f1
-from isiw.session.loop import Session, SessionResult
+from isiw.session.loop import Session
+from isiw.session.updates import SessionResult
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject

@@ -14,8 +14,8 @@ import isiw
 from isiw.errors import OtherVersionsWarning
 from isiw.plots import save_session_plot
 from isiw.report import final_statement
-from isiw.session.loop import SessionUpdate
-from isiw.session.resume import strategy_of
+from isiw.session.replay import strategy_of
+from isiw.session.updates import SessionUpdate
 from isiw.trials import MistrialReason
 
 FOLDER = Path(__file__).parents[1] / "data" / "logs"
@@ -30,6 +30,7 @@ DIGESTS = {
     "e31d040-pf.mcap": "1c78c73e1c6f44db1909f75ab4adcf4e7fe5f5fad4b37941026c5c176c68d69c",
     "e31d040-resumed.mcap": "290aaecc3a22f95aa72cd5a928820bb192bdffe1b827db11bace82cc1d9f54e3",
     "e31d040-waveforms.mcap": "3a6af29cdbf3943ea5ff2d794ee29807b36b65322c19bebafb0a29dd7049c07e",
+    "f0fbfc8-default.mcap": "3d27373a6125117b1e349f671c7c88b005103285fb830dc0d27bc8fa64c57169",
     "f2fd174-default.mcap": "2a545e6c25d097b6b0960154cc9c85f075f93e389cad11fbe15f05692a2afe09",
     "f2fd174-killed.mcap.part": "a793ea096e05c2346da3909bcd782a13c6ee70c38c745799f1d11689b5f3113c",
 }
@@ -66,7 +67,7 @@ def test_it_opens_whole(name: str) -> None:
     record = isiw.read_session(FOLDER / log_of(name))
     assert record.losses == ()
     assert record.finished is not name.endswith(".part")
-    assert record.header.schema_version == 1
+    assert record.header.schema_version == (3 if name.startswith("f0fbfc8") else 1)
     assert [trial.index for trial in record.table] == list(range(len(record.table)))
     assert {estimate.trial for estimate in record.estimates} == {trial.index for trial in record.table}
     assert final_statement(record)
@@ -123,6 +124,13 @@ def test_settings_by_their_earlier_name_are_kept() -> None:
     recipe = header.strategy.model_copy(update={"name": "gp-ei", "settings": {"zero_below_mv": 0.004}})
     strategy = strategy_of(header.model_copy(update={"strategy": recipe}))
     assert strategy.recipe.settings["threshold_mv"] == 0.004
+
+
+def test_a_budget_by_its_earlier_name_is_kept() -> None:
+    header = isiw.read_session(FOLDER / "e31d040-nr.mcap").header
+    recipe = header.strategy.model_copy(update={"settings": {"initial": 5, "max_iterations": 20}})
+    strategy = strategy_of(header.model_copy(update={"strategy": recipe}))
+    assert strategy.recipe.settings["max_trials"] == 25
 
 
 def test_a_session_of_an_earlier_version_that_is_interrupted_again_goes_on_again(copy: Callable[[str], Path]) -> None:

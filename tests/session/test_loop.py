@@ -17,7 +17,8 @@ from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate, Intent
-from isiw.session.loop import Session, SessionUpdate
+from isiw.session.loop import Session
+from isiw.session.updates import SessionUpdate
 from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Recipe, Strategy
@@ -264,7 +265,7 @@ def test_an_active_muscle_is_a_mistrial(log: Path) -> None:
     device = ScriptedDevice(lambda stimulus: Measurement(0.1, stimulus.isi_ms, background_rms_uv=10.5))
     result = Session(device, scripted_strategy(3), log=log).run()
     assert {trial.reason for trial in result.trials} == {MistrialReason.BACKGROUND_ACTIVITY}
-    assert {trial.mep_mv for trial in result.trials} == {None}
+    assert {trial.told for trial in result.trials} == {False}
     assert result.decision.reason == "The budget of 3 stimuli is used up."
 
 
@@ -393,3 +394,21 @@ def test_to_run_a_session_again_that_failed_says_how_to_go_on(log: Path) -> None
     session = Session(ScriptedDevice(answer), scripted_strategy(3), log=log)
     run_failing(session, DeviceError)
     assert "isiw resume" in run_failing(session, LogError)[1]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"subject": 7}, 'subject must be a text.*"7"'),
+        ({"log": None}, "needs a log"),
+        ({"limits": (0, 320)}, r"limits.*isiw\.Limits"),
+        ({"protocol": {"iti_s": (5, 8)}}, r"protocol.*isiw\.VisitProtocol"),
+        ({"visit": {"day": 1}}, r"visit.*isiw\.Visit"),
+        ({"strategy": "default"}, r"strategy.*isiw\.Strategy"),
+        ({"device": None}, r"device.*isiw\.Device"),
+    ],
+)
+def test_a_part_that_is_something_else_is_refused_in_words(log: Path, wrong: dict[str, Any], said: str) -> None:
+    parts: dict[str, Any] = {"device": ScriptedDevice(), "strategy": scripted_strategy(), "log": log} | wrong
+    with pytest.raises(InvalidValueError, match=said):
+        Session(parts.pop("device"), parts.pop("strategy"), **parts)

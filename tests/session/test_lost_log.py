@@ -11,8 +11,9 @@ import pytest
 
 from isiw.errors import LogError
 from isiw.log.reader import read_session
-from isiw.session.loop import Session, SessionUpdate
+from isiw.session.loop import Session
 from isiw.session.resume import resume
+from isiw.session.updates import SessionUpdate
 from isiw.trials import Measurement, Stimulus
 from scripted import ScriptedDevice, scripted_strategy
 

@@ -20,8 +20,9 @@ from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, StrategyRecipe, decode
 from isiw.log.writer import LogWriter
-from isiw.session.loop import Session, SessionUpdate
+from isiw.session.loop import Session
 from isiw.session.resume import exclude, resume
+from isiw.session.updates import SessionUpdate
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort

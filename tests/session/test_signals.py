@@ -17,9 +17,10 @@ import pytest
 
 from isiw.log.reader import read_session
 from isiw.session.lastresort import INTERRUPTED
-from isiw.session.loop import Session, SessionUpdate
+from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.safeguards import Safeguards
+from isiw.session.updates import SessionUpdate
 from isiw.trials import Measurement, Stimulus
 from known import known
 from scripted import ScriptedDevice, scripted_strategy

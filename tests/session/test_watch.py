@@ -10,7 +10,8 @@ from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.log.reader import read_session
 from isiw.plots.session import session_figure
-from isiw.report import final_statement, progress_row
+from isiw.report import final_statement
+from isiw.session import progress_row
 from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.watch import Watch

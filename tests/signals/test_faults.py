@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import pytest
@@ -37,6 +38,14 @@ def test_a_right_rig_is_not_accused(*, accelerometer: bool) -> None:
 def test_a_wrong_rate_shows_where_no_impact_is_measured() -> None:
     device = rig("wrong rate", accelerometer=False)
     assert all("sampling rate" in str(fault) for fault in faults_of(device, (None,)))
+
+
+def test_samples_that_are_no_numbers_are_told_from_a_flat_line() -> None:
+    stimulus = Stimulus(0, 100.0)
+    answer = instance(Sweep, rig().simulation.answer(stimulus))
+    answer.channels["emg"].values[7] = math.inf
+    fault = likely_fault(answer, judge(answer, stimulus, SPACE))
+    assert "no numbers" in str(fault)
 
 
 def test_every_reason_of_a_mistrial_has_a_remedy() -> None:

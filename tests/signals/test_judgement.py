@@ -67,7 +67,8 @@ def mistrial_of(
 ) -> MistrialReason | None:
     judged = judge(sweep, stimulus, space, limits)
     assert judged.status is Status.MISTRIAL
-    assert judged.mep_mv is None
+    measured = judged.reason is MistrialReason.BACKGROUND_ACTIVITY  # which an operator may still accept
+    assert (judged.mep_mv is not None) is measured
     return judged.reason
 
 
@@ -261,4 +262,5 @@ def test_a_measurement_is_judged_by_the_rules_of_a_sweep(
     judged = judge_measurement(Measurement(0.1, isi_ms), Stimulus(0, commanded_ms), space, limits)
     assert judged.reason is reason
     assert judged.isi_ms == isi_ms
-    assert (judged.status, judged.mep_mv) == ((Status.ACCEPTED, 0.1) if reason is None else (Status.MISTRIAL, None))
+    assert judged.status is (Status.ACCEPTED if reason is None else Status.MISTRIAL)
+    assert judged.mep_mv == 0.1  # of a mistrial for whoever looks at it

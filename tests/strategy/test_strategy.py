@@ -201,12 +201,16 @@ def test_a_mistrial_moves_the_budget_and_nothing_else(particles: Strategy) -> No
     assert particles.decision().reason == reason.replace("79 stimuli", "78 stimuli")
 
 
-def test_told_trials_and_mistrials_use_up_one_budget() -> None:
+def test_pairs_and_mistrials_use_up_one_budget_and_control_trials_none() -> None:
     strategy = scripted_strategy(max_trials=3)
     strategy.tell(strategy.ask(), 0.1)
     strategy.count_mistrial()
     assert not strategy.decision().stop
     strategy.tell(None, 0.1)
+    strategy.count_control()
+    assert (strategy.delivered, strategy.spent) == (4, 2)
+    assert not strategy.decision().stop
+    strategy.tell(strategy.ask(), 0.1)
     assert strategy.decision().stop
 
 

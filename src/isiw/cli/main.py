@@ -15,7 +15,7 @@ from isiw.cli import prior, study
 from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show, show_entry
 
 if TYPE_CHECKING:
-    from isiw.session.loop import Session, SessionUpdate
+    from isiw.session.loop import Session
     from isiw.strategy.settings.described import DescribedSetting
 
 __all__ = ["app"]
@@ -31,7 +31,6 @@ app.add_typer(study.app, name="study")
 new = typer.Typer(help="Write a starting point of your own.", no_args_is_help=True)
 app.add_typer(new, name="new")
 
-_WIDTHS = (5, 7, 30, 9, 14, 8, 8, 4)
 _INTERRUPTED = "Interrupted: the device is stopped and the log is closed."
 
 Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
@@ -58,7 +57,7 @@ def main(
 
 
 @app.command()
-def run(
+def run(  # noqa: PLR0913, PLR0917 - an option each
     config: Annotated[Path | None, typer.Argument(help="A configuration file (TOML).", **NO_DEFAULT)] = None,
     subject: Annotated[
         str | None,
@@ -75,13 +74,25 @@ def run(
         list[Path] | None,
         typer.Option(help="The log of an earlier session of the same person; of several, the first one first."),
     ] = None,
+    day: Annotated[
+        int | None, typer.Option(help="The number of the person's visit, for the log.", **NO_DEFAULT)
+    ] = None,
+    operator: Annotated[str | None, typer.Option(help="Who runs the session, for the log.", **NO_DEFAULT)] = None,
 ) -> None:
     """Run a session with a simulated person, or with the device of a configuration, and say what was found."""
-    with errors_reported(_INTERRUPTED):
+    with errors_reported():
         settings = isiw.config.load_config(config).with_overrides(
-            seed=seed, log=log, subject=subject, data=data, strategy=strategy, prior=lab, after=after
+            seed=seed,
+            log=log,
+            subject=subject,
+            data=data,
+            strategy=strategy,
+            prior=lab,
+            after=after,
+            day=day,
+            operator=operator,
         )
-        _run_to_the_end(isiw.config.session_for(settings, on_trial=_show_progress))
+        _run_to_the_end(isiw.config.session_for(settings))
 
 
 @app.command()
@@ -98,11 +109,11 @@ def resume(
     verify: Annotated[bool, typer.Option(help="Check that the strategy asks again what the log says it asked.")] = True,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Go on with a session that was interrupted."""
-    with errors_reported(_INTERRUPTED):
+    with errors_reported():
         record = isiw.read_session(log)
         settings = isiw.config.load_config(config) if config else isiw.config.config_of_log(record)
         device = isiw.config.device_for(settings.with_overrides(data=data))
-        _run_to_the_end(isiw.resume(log, device, on_trial=_show_progress, lost_pulses=lost_pulses, verify=verify))
+        _run_to_the_end(isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify))
 
 
 @app.command()
@@ -145,10 +156,10 @@ def new_rig(
 @app.command("show")
 def show_log(log: Log) -> None:
     """List a session's trials and say what was found; works on a damaged log, too."""
-    with errors_reported(_INTERRUPTED):
+    with errors_reported():
         record = isiw.read_session(log)
         for row in (isiw.report.TRIAL_HEADINGS, *isiw.report.trial_rows(record)):
-            _print_row(row)
+            show(isiw.session.aligned(row))
         for event in record.events:
             show(f"{event.kind} (trial {event.trial}): {event.text}")
         show(isiw.report.final_statement(record), style="bold")
@@ -167,7 +178,7 @@ def plot(
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Draw a session: profile, trials, window, and how the edges developed."""
-    with errors_reported(_INTERRUPTED):
+    with errors_reported():
         record = isiw.read_session(log)
         truth = isiw.config.true_window(record)
         target = output or _picture_beside(Path(f"{record.path}".removesuffix(".part")))
@@ -182,9 +193,20 @@ def exclude(
     reason: Annotated[str, typer.Option(help="The reason, for readers of the log.")],
 ) -> None:
     """Exclude a trial afterwards. Nothing is erased; a resumed session learns without it."""
-    with errors_reported(_INTERRUPTED):
+    with errors_reported():
         isiw.exclude(log, trial, reason)
         show(f"Trial {trial} is excluded: {reason}")
+
+
+@app.command()
+def include(
+    log: Log,
+    trial: Annotated[int, typer.Argument(help="The trial's number, as in isiw show.")],
+) -> None:
+    """Let an excluded trial count again; a resumed session learns with it."""
+    with errors_reported():
+        isiw.include(log, trial)
+        show(f"Trial {trial} counts again.")
 
 
 @app.command()
@@ -212,7 +234,7 @@ def timing(
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Report how repeatable the taps are: events, ISI errors, mistrials."""
-    with errors_reported(_INTERRUPTED):
+    with errors_reported():
         study = (
             isiw.repeatability.study_session(isiw.read_session(source))
             if _is_log(source)
@@ -254,10 +276,10 @@ def _run_to_the_end(session: Session) -> None:
             "the log would be overwritten by its picture", got=str(session.log_path), expected=".mcap"
         )
     show(f"log: {session.log_path}")
-    _print_row(isiw.report.PROGRESS_HEADINGS)
     before = len(session.trials)
     try:
-        result = session.run()
+        with errors_reported(_INTERRUPTED):
+            result = session.run(progress=True)
     except BaseException:
         if len(session.trials) > before:
             show(f"The session ended early. Its log is safe; go on with: isiw resume {session.log_path}")
@@ -275,14 +297,6 @@ def _picture_beside(log: Path) -> Path:
     """Where a session's picture goes that nobody gave a place: beside its log, under a name that is free."""
     names = itertools.chain([log.stem], (f"{log.stem}_{number}" for number in itertools.count(2)))
     return next(path for path in (log.with_name(f"{name}.png") for name in names) if not path.exists())
-
-
-def _show_progress(update: SessionUpdate) -> None:
-    _print_row(isiw.report.progress_row(update))
-
-
-def _print_row(cells: Sequence[str]) -> None:
-    show("  ".join(cell.ljust(width) for cell, width in zip(cells, _WIDTHS, strict=False)).rstrip())
 
 
 def _exit_if_damaged(losses: Sequence[str]) -> None:

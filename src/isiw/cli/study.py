@@ -88,6 +88,10 @@ def summary(folder: Folder) -> None:
 @contextmanager
 def _bar(left: list[Unit]) -> Iterator[Callable[[Unit, Any], None]]:
     """A progress bar with rate and remaining time, and what moves it."""
+    if not left:
+        show("Nothing is left to run.")
+        yield lambda _unit, _result: None
+        return
     rate, people = TextColumn("{task.fields[rate]}"), sum(len(unit.sessions) for unit in left)
     columns = (TextColumn("sessions"), BarColumn(), MofNCompleteColumn(), rate, TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True)) as progress:

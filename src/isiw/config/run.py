@@ -32,13 +32,15 @@ from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.priors import after, load
-from isiw.session.loop import Session, SessionUpdate
+from isiw.session.loop import Session
+from isiw.session.updates import SessionUpdate
 from isiw.signals.judgement import SignalLimits
 from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
 from isiw.subjects.cohorts import COHORTS, cohort
 from isiw.subjects.subject import SimulatedSubject
 from isiw.toml_files import checked, read_toml
 from isiw.types import Reference
+from isiw.visit import Visit, VisitProtocol
 from isiw.window import Window
 
 __all__ = [
@@ -144,9 +146,19 @@ class DeviceConfig(_Section):
 
 
 class VisitConfig(_Section):
-    """Who is examined."""
+    """Who is examined, and what is noted about it, as in `isiw.Visit`."""
 
     subject: str = ""
+    day: int | None = Field(default=None, ge=1)
+    operator: str = ""
+    muscle: str = ""
+    intensity_pct_rmt: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
+    intensity_pct_mso: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
+    electrodes: str = ""
+
+    def noted(self) -> Visit:
+        """What is noted about the visit."""
+        return Visit(**self.model_dump(exclude={"subject"}))
 
 
 class RunConfig(_Section):
@@ -162,6 +174,7 @@ class RunConfig(_Section):
     space: SpaceConfig = SpaceConfig()
     strategy: StrategyConfig = StrategyConfig()
     limits: LimitsConfig = LimitsConfig()
+    protocol: VisitProtocol = VisitProtocol()
     signals: SignalLimits = SignalLimits()
 
     @model_validator(mode="after")
@@ -179,7 +192,7 @@ class RunConfig(_Section):
         """How long the device may take for one delivery [s]."""
         return self.device.timeout_s if self.device else TIMEOUT_S
 
-    def with_overrides(
+    def with_overrides(  # noqa: PLR0913 - an option of the command line each, all keyword-only
         self,
         *,
         seed: int | None = None,
@@ -189,6 +202,8 @@ class RunConfig(_Section):
         strategy: str | None = None,
         prior: Path | None = None,
         after: Sequence[Path] | None = None,
+        day: int | None = None,
+        operator: str | None = None,
     ) -> RunConfig:
         """The same, with what was given on the command line; another strategy keeps the settings that were given.
 
@@ -200,12 +215,16 @@ class RunConfig(_Section):
             strategy: one of `list_strategies()`.
             prior: a lab's prior.
             after: logs of earlier sessions of the same person, the first one first.
+            day: the number of the person's visit, from 1.
+            operator: who runs the session.
         """
         values = self.model_dump()
         given = {"seed": seed, "log": log, "prior": prior, "after": after or None}
         values |= {key: value for key, value in given.items() if value is not None}
         about = {"kind": subject, "data": data}
         values["subject"] |= {key: value for key, value in about.items() if value is not None}
+        visit = {"day": day, "operator": operator}
+        values["visit"] |= {key: value for key, value in visit.items() if value is not None}
         values["strategy"] |= {} if strategy is None else {"name": strategy}
         return _validated(values, "the command line")
 
@@ -322,6 +341,8 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         signals=config.signals,
         config={} if config.device else {RUN_KEY: _kept(config)},
         timeout_s=config.timeout_s,
+        visit=config.visit.noted(),
+        protocol=config.protocol,
     )
 
 

@@ -73,7 +73,7 @@ class LimitedDevice:
         self._delivered = delivered
         now_s = clock.now_s()
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
-        self._not_before_s = now_s + self._limits.min_iti_s
+        self._made_s, self._not_before_s = now_s, now_s + self._limits.min_iti_s
         self._staged = False
         self._one_at_a_time = threading.Lock()
 
@@ -86,6 +86,11 @@ class LimitedDevice:
     def pulses_left(self) -> int:
         """How many deliveries are still allowed."""
         return max(0, self._limits.max_pulses - self._delivered)
+
+    @property
+    def last_s(self) -> float:
+        """When the last delivery ended, by the clock [s]; before the first one, when this device was made."""
+        return self._times_s[-1] if self._times_s else self._made_s
 
     def wait_s(self) -> float:
         """How long until the interval, the rest and the period allow the next delivery [s]."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from isiw.checks import check_numbers, check_wholes
-from isiw.design import DesignSpace
+from isiw.design import DesignSpace, require_space
 from isiw.devices.protocol import Readiness
 from isiw.errors import InvalidValueError, LimitExceededError
 
@@ -76,7 +76,11 @@ class Limits:
             min_iti_s: shortest time between two deliveries [s].
             max_pulses: largest number of deliveries in a session.
             max_consecutive_mistrials: after so many mistrials in a row a session pauses.
+
+        Raises:
+            InvalidValueError: no design space, or values that are not finite or limit nothing.
         """
+        require_space(space)
         return cls(
             space.low_ms,
             space.high_ms,

@@ -31,6 +31,7 @@ class DeviceInfo:
         hit_delay_ms: from the valve command to the impact, mean and SD over people [ms]; `isiw timing LOG` measures it.
             None where it is not known, or where ISIs count from the impact.
         address: what it is connected to, such as "COM3"; no two sessions of a computer drive a device of one address.
+        tap_alone: whether it can deliver a tap without the magnetic pulse, which `Stimulus.tap_alone` asks for.
 
     Raises:
         InvalidValueError: an unknown reference, or a detection limit or a hit delay that is not positive.
@@ -44,6 +45,7 @@ class DeviceInfo:
     detection_limit_mv: float | None = None
     hit_delay_ms: tuple[float, float] | None = None
     address: str = ""
+    tap_alone: bool = False
 
     def __post_init__(self) -> None:
         check_choice(self, "reference", get_args(Reference))
@@ -95,7 +97,8 @@ class Device(Protocol):
         """Deliver one pair of stimuli and report what came of it.
 
         Args:
-            stimulus: what to deliver; an ISI of None is TMS alone.
+            stimulus: what to deliver; an ISI of None is TMS alone, or a tap alone where `stimulus.tap_alone` says so,
+                which only a device is asked for whose `DeviceInfo` says that it can.
             timeout_s: the longest the call may take [s].
 
         Raises:

@@ -145,15 +145,21 @@ class RecordedPerson:
         hit_delay_ms: tuple[float, float] | None = None,
     ) -> None:
         name, channels = "simulated person in recorded EMG (semi-synthetic)", {"emg": "mV"}
-        self.info = DeviceInfo(name, reference, simulated=True, channels=channels, hit_delay_ms=hit_delay_ms)
+        self.info = DeviceInfo(
+            name, reference, simulated=True, channels=channels, hit_delay_ms=hit_delay_ms, tap_alone=True
+        )
         self._respond, self._recordings, self._seed = respond, recordings, seed
 
     def answer(self, stimulus: Stimulus) -> Sweep:
-        """The sweep that follows the next pair of stimuli; its clock is zero at the magnetic pulse."""
-        outcome = self._respond(stimulus.isi_ms)
+        """The sweep that follows the next pair of stimuli; its clock is zero at the pulse, or at a tap alone."""
         rng = np.random.default_rng([self._seed, stimulus.trial])
-        emg_mv = self._recordings.sweep_mv(outcome.mep_mv, rng)
-        emg = Channel(emg_mv, self._recordings.rate_hz, "mV", t0_ms=float(self._recordings.time_ms[0]))
+        if stimulus.tap_alone:
+            by_valve = self.info.reference == "valve"
+            return Sweep(
+                {"emg": self._emg(0.0, rng)}, t_valve_ms=0.0 if by_valve else None, t_hit_ms=None if by_valve else 0.0
+            )
+        outcome = self._respond(stimulus.isi_ms)
+        emg = self._emg(outcome.mep_mv, rng)
         first_ms = None if outcome.isi_ms is None else -outcome.isi_ms
         return Sweep(
             {"emg": emg},
@@ -162,3 +168,7 @@ class RecordedPerson:
             t_hit_ms=first_ms if self.info.reference == "impact" else None,
             isi_sd_ms=outcome.isi_sd_ms,
         )
+
+    def _emg(self, mep_mv: float, rng: np.random.Generator) -> Channel:
+        emg_mv = self._recordings.sweep_mv(mep_mv, rng)
+        return Channel(emg_mv, self._recordings.rate_hz, "mV", t0_ms=float(self._recordings.time_ms[0]))

@@ -115,10 +115,12 @@ class SimulatedPerson:
         name: str = "simulated person",
         hit_delay_ms: tuple[float, float] | None = None,
     ) -> None:
-        self.info = DeviceInfo(name=name, reference=reference, simulated=True, hit_delay_ms=hit_delay_ms)
+        self.info = DeviceInfo(name, reference, simulated=True, hit_delay_ms=hit_delay_ms, tap_alone=True)
         self._respond = respond
 
     def answer(self, stimulus: Stimulus) -> Measurement:
-        """The person's answer to the next pair of stimuli."""
+        """The person's answer to the next pair of stimuli; a tap alone evokes nothing."""
+        if stimulus.tap_alone:
+            return Measurement(0.0, None)
         outcome = self._respond(stimulus.isi_ms)
         return Measurement(outcome.mep_mv, outcome.isi_ms, outcome.isi_sd_ms)

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.salvage import Message, Salvage, salvage
 from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Estimate, Event, Header, Intent, Record, Waveform, decode
+from isiw.log.verdicts import under_all
 from isiw.log.writer import CONFIGURATION
 from isiw.strategy.stopping import StopDecision
 from isiw.toml_files import parsed
@@ -68,10 +69,9 @@ class SessionRecord:
 
     @cached_property
     def table(self) -> TrialTable:
-        """All trials whose outcome was logged, excluded ones marked."""
+        """All trials whose outcome was logged, as they count after what an operator said about them."""
         trials = sorted((r for r in self.history if isinstance(r, Trial)), key=lambda trial: trial.index)
-        excluded = [e.trial for e in self.events if e.kind == "exclusion" and e.trial is not None]
-        return TrialTable(tuple(trials)).excluding(excluded)
+        return under_all(TrialTable(tuple(trials)), self.events)
 
     @property
     def trials(self) -> pd.DataFrame:

@@ -5,7 +5,7 @@
     /trial      what came of it
     /emg …      the waveforms of a trial, one topic a channel
     /estimate   what was believed after the trial, and what is asked next
-    /event      an exclusion, a limit, a fault, a resumption, a fallback, a refusal, a late answer, a pause
+    /event      what happened: an exclusion, a limit, a fault, a resumption, a pause, a note … (`EventKind`)
 
 JSON knows no infinity: where a number is not finite it is one of the strings "Infinity", "-Infinity" and "NaN".
 """
@@ -31,6 +31,7 @@ from isiw.signals.judgement import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
+from isiw.visit import Visit, VisitProtocol
 from isiw.window import Window, WindowEstimate, finding
 
 __all__ = [
@@ -54,8 +55,8 @@ __all__ = [
     "topic_of",
 ]
 
-SCHEMA_VERSION = 3
-"""3 since 0.1.0: pauses, and an ISI whose trial was lost is asked again twice only. Earlier versions wrote 1 and 2."""
+SCHEMA_VERSION = 4
+"""4 since 0.1.0: control trials, and trials that an operator includes again or accepts. Before came 1 to 3."""
 
 MOST_TRIALS: Final = 100_000
 """More than any session delivers; a record of a later trial makes no sense."""
@@ -101,17 +102,20 @@ class Header(_Record):
     signals: SignalLimits
     timeout_s: float = 30.0
     ask_deadline_s: float | None = None
+    visit: Visit = Visit()
+    protocol: VisitProtocol = VisitProtocol()
     versions: dict[str, str] = Field(default_factory=dict)
     asks_from: int = 0
     config: dict[str, Any] = Field(default_factory=dict)
 
 
 class Intent(_Record):
-    """A pair of stimuli that is about to be delivered."""
+    """What is about to be delivered: a pair of stimuli, or without an ISI TMS alone or a tap alone."""
 
     trial: TrialNumber
     isi_ms: float | None
     t_s: float = 0.0
+    tap_alone: bool = False
 
 
 class Waveform(_Record):
@@ -187,7 +191,7 @@ class Estimate(_Record):
             trial: the number of the trial.
             estimate: what is believed after it.
             decision: whether to stop, and why.
-            next_isi_ms: what is asked next [ms]; None where the session stops.
+            next_isi_ms: what is asked next [ms]; None where the session stops, or a control trial comes next.
         """
         segments = () if estimate.window is None else tuple(itertools.chain(*estimate.window.segments))
         start, end = estimate.interval(0.9) or ((None, None), (None, None))
@@ -251,15 +255,27 @@ def _rounded(values: FloatArray) -> tuple[float, ...]:
 
 
 EventKind: TypeAlias = Literal[
-    "exclusion", "limit", "fault", "resume", "fallback", "fit", "refused", "late", "pause", "doubt", "note"
+    "exclusion",
+    "inclusion",
+    "acceptance",
+    "limit",
+    "fault",
+    "resume",
+    "fallback",
+    "fit",
+    "refused",
+    "late",
+    "pause",
+    "doubt",
+    "note",
 ]
 
 
 class Event(_Record):
     """Something that happened to a session.
 
-    `trial` is the one that was excluded, refused or answered late, and otherwise the last one before the event. What is
-    "refused" was not delivered, whatever the intent before it says.
+    `trial` is the one that was judged by an operator, refused or answered late, and otherwise the last one before the
+    event. What is "refused" was not delivered, whatever the intent before it says.
     """
 
     kind: EventKind

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, RED, save_figure, tidied
+from isiw.signals.impact import VALVE_MS
 from isiw.texts import plain
 
 if TYPE_CHECKING:
@@ -57,12 +58,12 @@ def _draw_events(axes: Axes, study: TimingStudy) -> None:
     table = study.event_table
     for name, times in study.events.columns().items():
         if name in table.index:
-            mean, sd = table.loc[name, ["mean_ms", "sd_ms"]]
-            label = f"{_NAMES[name]}  {mean:.0f} ± {sd:.1f} ms"
-            bins = np.arange(np.floor(np.nanmin(times)), np.ceil(np.nanmax(times)) + 1).tolist()
-            axes.hist(times[~np.isnan(times)], bins=bins, color=_COLOURS[name], alpha=0.8, label=label)
+            found = times[~np.isnan(times)] - VALVE_MS
+            label = f"{_NAMES[name]}  {found.mean():.0f} ± {table['sd_ms'][name]:.1f} ms"
+            bins = np.arange(np.floor(found.min()), np.ceil(found.max()) + 1).tolist()
+            axes.hist(found, bins=bins, color=_COLOURS[name], alpha=0.8, label=label)
     axes.set_yscale("log")
-    axes.set_xlabel("time in the trial [ms]; valve command at 500", fontsize=9)
+    axes.set_xlabel("time after the valve command [ms]", fontsize=9)
     axes.set_ylabel("taps per ms", fontsize=9)
     title = plain(f"{study.name}: {len(study.commanded_ms)} taps")
     axes.set_title(title, fontsize=11, loc="left", color=INK, parse_math=False)
@@ -84,6 +85,7 @@ def _draw_errors(axes: Axes, study: TimingStudy) -> None:
     axes.set_xticks(place, [f"{isi:g}" for isi in table.index])
     axes.set_xlabel("commanded ISI [ms]", fontsize=9)
     axes.set_ylabel("ISI error [ms]", fontsize=9)
-    found = f"pooled SD {study.pooled_sd_ms:.2f} ms, mistrials: {study.mistrials} of {len(errors)}"
+    pooled = "not known" if np.isnan(study.pooled_sd_ms) else f"{study.pooled_sd_ms:.2f} ms"
+    found = f"pooled SD {pooled}, mistrials: {study.mistrials} of {len(errors)}"
     axes.set_title(found, fontsize=9, loc="left", color=INK)
     axes.legend(fontsize=7.5, frameon=False)

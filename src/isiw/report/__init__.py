@@ -1,19 +1,5 @@
 """A session in words, for people."""
 
-from isiw.report.words import (
-    PROGRESS_HEADINGS,
-    TRIAL_HEADINGS,
-    final_statement,
-    progress_row,
-    trial_rows,
-    truth_sentence,
-)
+from isiw.report.words import TRIAL_HEADINGS, final_statement, trial_rows, truth_sentence
 
-__all__ = [
-    "PROGRESS_HEADINGS",
-    "TRIAL_HEADINGS",
-    "final_statement",
-    "progress_row",
-    "trial_rows",
-    "truth_sentence",
-]
+__all__ = ["TRIAL_HEADINGS", "final_statement", "trial_rows", "truth_sentence"]

@@ -8,17 +8,14 @@ from collections import Counter
 from isiw.design import DesignSpace
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate, Event
+from isiw.log.verdicts import VERDICTS
 from isiw.metrics import f1
 from isiw.report.evidence import contradiction, nothing_measured
-from isiw.session.loop import SessionUpdate
+from isiw.session.progress import asked, outcome
 from isiw.strategy.catalogue import known_settings, list_strategies
-from isiw.trials import Trial
-from isiw.window import Interval, Window, WindowEstimate
+from isiw.window import Window
 
-__all__ = ["PROGRESS_HEADINGS", "TRIAL_HEADINGS", "final_statement", "progress_row", "trial_rows", "truth_sentence"]
-
-PROGRESS_HEADINGS = ("trial", "ISI", "MEP", "P(window)", "window", "start", "end", "left")
-"""What `progress_row` holds; start and end are 90 % intervals, left is what the budget still allows."""
+__all__ = ["TRIAL_HEADINGS", "final_statement", "trial_rows", "truth_sentence"]
 
 TRIAL_HEADINGS = ("trial", "asked", "outcome", "realised")
 """What `trial_rows` hold."""
@@ -53,7 +50,9 @@ def final_statement(record: SessionRecord) -> str:
     elif not last.stop:
         sentences.append(f"The session is not over; go on with: isiw resume {record.path}")
     if _excluded_since(record):
-        sentences.append("Trials were excluded after this estimate; resume the session to have it without them.")
+        sentences.append(
+            "Trials were judged anew after this estimate; resume the session to have it with what counts now."
+        )
     return " ".join(sentence for sentence in sentences if sentence)
 
 
@@ -141,12 +140,21 @@ def _counts(record: SessionRecord) -> str:
     if unknown:
         mistrials["outcome unknown"] += unknown
     told, given = len(record.table.told), len(record.table) + unknown
-    parts = [f"{given} pairs of stimuli were delivered; {told} count"]
+    pairs = f"{given} pairs of stimuli were delivered"
+    if controls := _controls(record):
+        pairs = f"{given} stimuli were delivered, {controls} among them"
+    parts = [f"{pairs}; {told} count"]
     if mistrials:
         parts.append("mistrials: " + ", ".join(f"{count} {reason}" for reason, count in mistrials.items()))
     if excluded:
         parts.append(f"{excluded} excluded")
     return "; ".join(parts) + "."
+
+
+def _controls(record: SessionRecord) -> str:
+    """How many control trials there were, in words; empty where there were none."""
+    kinds = Counter(asked(trial) for trial in record.table if trial.is_control)
+    return " and ".join(f"{count} of {kind}" for kind, count in sorted(kinds.items(), reverse=True))
 
 
 def _fits(record: SessionRecord) -> str:
@@ -171,7 +179,7 @@ def _unstated_hit_delay(record: SessionRecord) -> str:
 
 def _excluded_since(record: SessionRecord) -> bool:
     since = record.history[record.history.index(record.estimates[-1]) :]
-    return any(isinstance(entry, Event) and entry.kind == "exclusion" for entry in since)
+    return any(isinstance(entry, Event) and entry.kind in VERDICTS for entry in since)
 
 
 def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
@@ -190,50 +198,14 @@ def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
     return f"This simulated person in fact {true}; {said.format(share)}."
 
 
-def progress_row(update: SessionUpdate) -> tuple[str, ...]:
-    """One trial in words and figures, as in `PROGRESS_HEADINGS`.
-
-    Args:
-        update: what is known after the trial.
-    """
-    trial, estimate = update.trial, update.estimate
-    found = _found(estimate) if estimate.rests_on_data else ("", "–", "", "")
-    return (str(trial.index), _isi(trial.commanded_isi_ms), _outcome(trial), *found, str(update.stimuli_left))
-
-
-def _found(estimate: WindowEstimate) -> tuple[str, ...]:
-    """Probability, window, start and end; where too little was measured to speak of them, they are not said."""
-    start, end = estimate.interval(0.9) or (None, None)
-    return (
-        "" if estimate.probability is None else f"{estimate.probability:.2f}",
-        "none" if estimate.window is None else str(estimate.window),
-        _short(start),
-        _short(end),
-    )
-
-
 def trial_rows(record: SessionRecord) -> list[tuple[str, ...]]:
     """All trials, as in `TRIAL_HEADINGS`.
 
     Args:
         record: the session.
     """
-    return [(str(t.index), _isi(t.commanded_isi_ms), _outcome(t), _isi(t.isi_ms)) for t in record.table]
+    return [(str(t.index), asked(t), outcome(t), _isi(t.isi_ms)) for t in record.table]
 
 
 def _isi(isi_ms: float | None) -> str:
     return "–" if isi_ms is None else f"{isi_ms:.4g} ms"
-
-
-def _outcome(trial: Trial) -> str:
-    if trial.reason is not None:
-        return f"mistrial: {trial.reason}"
-    text = f"{1e3 * (trial.mep_mv or 0.0):.0f} µV"
-    return f"{text} (excluded)" if trial.excluded else text
-
-
-def _short(interval: Interval | None) -> str:
-    if interval is None:
-        return ""
-    low, high = interval
-    return f"{'<' if math.isinf(low) else f'{low:.0f}'}–{'>' if math.isinf(high) else f'{high:.0f}'}"

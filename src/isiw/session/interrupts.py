@@ -8,11 +8,14 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from types import FrameType, TracebackType
-from typing import Any, Self
+from typing import Any, ParamSpec, Self, TypeVar
 
 __all__ = ["Interrupts"]
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 _PAUSING = ("SIGINT", "SIGTSTP")  # Ctrl-C and Ctrl-Z; Windows has no Ctrl-Z
 _ENDING = ("SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK")  # the last three are not on every system
@@ -33,6 +36,8 @@ class Interrupts:
     Ctrl-Z suspends the process when the device is disarmed. Outside the main thread, which is where Python delivers
     signals, nothing is heard; what the process ignores, as under nohup, it goes on ignoring.
 
+    `away` is entered while the process is suspended.
+
     Args:
         disarm: disarms; called in another thread, at every signal.
         stuck: called in another thread where the main one does not react to a second signal.
@@ -45,6 +50,7 @@ class Interrupts:
         self._settled = 0
         self._ending = False
         self._before: dict[signal.Signals, Any] = {}
+        self.away: Callable[[], AbstractContextManager[None]] = nullcontext
         self._watcher: threading.Thread | None = None
         self._over = False
 
@@ -113,6 +119,17 @@ class Interrupts:
         finally:
             self._allowed = before
 
+    def freely(self, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Call what may be interrupted at any time, as no stimulus is in flight and no record half written.
+
+        Args:
+            call: what to call.
+            *args: with which arguments.
+            **kwargs: and which keywords.
+        """
+        with self.allowed():
+            return call(*args, **kwargs)
+
     def _receive(self, number: int, frame: FrameType | None) -> None:
         del frame
         self._handled += 1
@@ -127,7 +144,8 @@ class Interrupts:
     def _suspend(self) -> None:
         """Stop the process as Ctrl-Z does, but disarmed; it goes on here."""
         self._wait_until(self._is_disarmed, _DISARMING_S)
-        os.kill(os.getpid(), signal.SIGSTOP)
+        with self.away():
+            os.kill(os.getpid(), signal.SIGSTOP)
 
     def _watch(self) -> None:
         """Disarm at every signal, however busy the main thread is."""

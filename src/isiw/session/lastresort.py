@@ -12,6 +12,7 @@ from typing import Final, Never
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
 from isiw.session.operator import alarm
+from isiw.session.terminal import restore
 
 __all__ = ["INTERRUPTED", "STILL_ARMED", "end_process"]
 
@@ -32,6 +33,7 @@ def end_process(reason: str, log: LogWriter | None, code: int) -> Never:
         log: the session's log, which stays as it is and can be resumed; None where there is none.
         code: the exit code.
     """
+    restore()
     alarm(f"\n{reason} The process ends.")
     if log is not None:
         alarm(f"The log is safe; go on with {log.path}.")

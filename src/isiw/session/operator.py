@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 
+from isiw.session.terminal import is_terminal
 from isiw.texts import plain
 
 __all__ = ["alarm", "goes_on"]
@@ -15,7 +16,7 @@ def goes_on(reason: str) -> bool:
     Args:
         reason: why the session has paused.
     """
-    if not (_is_terminal(sys.stdin) and _is_terminal(sys.stderr)):
+    if not (is_terminal(sys.stdin) and is_terminal(sys.stderr)):
         return False
     alarm(f"\n{reason} The device is disarmed. Go on? [y/N] ", end="")
     return sys.stdin.readline().strip().lower() in {"y", "yes"}
@@ -31,7 +32,3 @@ def alarm(text: str, *, end: str = "\n") -> None:
     if sys.stderr is not None:  # as under pythonw
         sys.stderr.write(f"{plain(text)}{end}")
         sys.stderr.flush()
-
-
-def _is_terminal(stream: object) -> bool:
-    return bool(getattr(stream, "isatty", lambda: False)())

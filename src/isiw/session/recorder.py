@@ -2,39 +2,42 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import itertools
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import isiw
-from isiw.checks import number
+from isiw.checks import number, text
 from isiw.devices.clock import Clock, MonotonicClock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo, Readiness
-from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, told
-from isiw.log.durable import log_of, part_of
+from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
+from isiw.log.durable import part_of
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
-from isiw.log.schema import Estimate, Event, EventKind, Header, Intent, StrategyRecipe
+from isiw.log.schema import Estimate, Event, EventKind, Header
+from isiw.log.verdicts import LOOKED_AT, acceptance, exclusion, inclusion
 from isiw.log.writer import LogWriter
-from isiw.session.loop import learn, versions
-from isiw.session.resume import ages_s, replay, resumption_text, warn_where_differing, with_lost_pulses
+from isiw.session.header import header_of, require_parts
+from isiw.session.journal import Journal, learn, relearned
+from isiw.session.replay import replay, warn_where_differing
+from isiw.session.resume import ages_s, continued, resumption, with_lost_pulses
 from isiw.signals.faults import remedy_for
 from isiw.signals.judgement import SignalLimits
 from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
+from isiw.visit import Visit, VisitProtocol
 from isiw.window import WindowEstimate
 
 __all__ = ["Recorder", "open_session"]
 
 
-def open_session(
+def open_session(  # noqa: PLR0913 - all but two are keyword-only
     strategy: Strategy,
     log: str | Path,
     *,
@@ -42,6 +45,8 @@ def open_session(
     limits: Limits | None = None,
     clock: Clock | None = None,
     subject: str = "",
+    visit: Visit | None = None,
+    protocol: VisitProtocol | None = None,
     config: Mapping[str, Any] | None = None,
     lost_pulses: int | None = None,
 ) -> Recorder:
@@ -57,19 +62,29 @@ def open_session(
         clock: tells the time, and waits in `ask` until the interval, the rest and the period of the limits have passed,
             before the first stimulus, too, as nobody knows what came before.
         subject: the person's code, for the log.
+        visit: what is noted about the visit, for the log; of a session that goes on, the logged one by default.
+        protocol: intervals, blocks and rests, which `ask` waits for; of a session that goes on, the logged one by
+            default. Control trials are the loop's own: `tell(None, …)` is TMS alone.
         config: anything that should be kept in the log, as TOML values.
         lost_pulses: as for `isiw.resume`: needed where the end of the log is missing.
 
     Raises:
         DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
-        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there.
+        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; a subject that is no text;
+            a protocol with control trials.
         LogError: there is a log already, or it cannot be written or read.
         StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
 
     Warns:
         OtherVersionsWarning: with other versions than those that were logged the strategy asks something else.
     """
-    path = log_of(Path(log))
+    path = require_parts(
+        log,
+        strategy=(strategy, Strategy),
+        limits=(limits, Limits | None),
+        visit=(visit, Visit | None),
+        protocol=(protocol, VisitProtocol | None),
+    )
     if strategy.delivered:
         raise StrategyError(
             "the strategy knows of trials that are not this session's",
@@ -77,43 +92,47 @@ def open_session(
             remedy="Make it anew, or give the session strategy.restarted().",
         )
     limits = limits or Limits.of_space(strategy.space, min_iti_s=0.0)
-    header = _header(strategy, limits, subject, config or {})
+    header = header_of(
+        strategy,
+        subject=text("subject", subject),
+        visit=visit or Visit(),
+        protocol=_without_controls(protocol or VisitProtocol()),
+        limits=limits,
+        device=DeviceInfo("a loop of the lab's own", strategy.space.reference),
+        signals=SignalLimits(),
+        config=dict(config or {}),
+    )
     clock = clock or MonotonicClock()
     if not (resume and (path.exists() or part_of(path).exists())):
-        return Recorder(strategy, LogWriter.create(path, header), limits, clock)
+        return Recorder(strategy, LogWriter.create(path, header), header, clock)
     salvaged = salvage(path)
     record = with_lost_pulses(read_salvaged(salvaged), lost_pulses)
     replayed = replay(record, strategy)
     warn_where_differing(replayed, record.header)
     kept = {
-        "created": record.header.created,
         "subject": header.subject or record.header.subject,
-        "asks_from": replayed.asks_from,
+        "visit": visit or record.header.visit,
+        "protocol": protocol or record.header.protocol,
     }
-    writer = LogWriter.continuing(path, salvaged, record.header, header.model_copy(update=kept))
+    header = header.model_copy(update=kept)
+    writer = continued(path, salvaged, record.header, replayed, header)
     ages = ages_s(salvaged, len(replayed.trials))
-    recorder = Recorder(replayed.strategy, writer, limits, clock, replayed.trials, ages)
     for trial in replayed.unknown:
         writer.append(trial)
-    recorder.log_event("resume", resumption_text(record, replayed))
-    return recorder
+    writer.append(resumption(record, replayed))
+    writer.sync()
+    return Recorder(replayed.strategy, writer, header, clock, replayed.trials, ages)
 
 
-def _header(strategy: Strategy, limits: Limits, subject: str, config: Mapping[str, Any]) -> Header:
-    recipe = strategy.recipe
-    return Header(
-        isiw_version=isiw.__version__,
-        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
-        subject=subject,
-        seed=recipe.seed,
-        strategy=StrategyRecipe(name=recipe.name, seed=recipe.seed, settings=dict(recipe.settings)),
-        space=strategy.space,
-        limits=limits,
-        device=DeviceInfo("a loop of the lab's own", strategy.space.reference),
-        signals=SignalLimits(),
-        versions={name: version for name, version in versions().items() if name != "isiw"},
-        config=dict(config),
-    )
+def _without_controls(protocol: VisitProtocol) -> VisitProtocol:
+    if protocol.tms_alone or protocol.tap_alone:
+        raise InvalidValueError(
+            "in a loop of one's own the protocol cannot have control trials, as ask() answers with an ISI",
+            got=protocol,
+            remedy="Give TMS alone whenever you like, and tell it with tell(None, mep_mv). isiw.Session interleaves "
+            "control trials itself.",
+        )
+    return protocol
 
 
 class Recorder:
@@ -122,7 +141,7 @@ class Recorder:
     Args:
         strategy: proposes ISIs and learns.
         log: the open log.
-        limits: what may be asked.
+        header: what the session is: its limits and its protocol.
         clock: tells the time, and waits.
         trials: what was delivered before; the strategy has learned it.
         earlier_s: how long ago each of these was [s].
@@ -132,18 +151,26 @@ class Recorder:
         self,
         strategy: Strategy,
         log: LogWriter,
-        limits: Limits,
+        header: Header,
         clock: Clock,
         trials: TrialTable | None = None,
         earlier_s: Sequence[float] = (),
     ) -> None:
-        self.strategy, self.trials = strategy, trials or TrialTable()
-        self._log, self._limits, self._clock = log, limits, clock
+        self.strategy, self._journal = strategy, Journal(trials)
+        self._log, self._clock = log, clock
+        self._limits, self._protocol, self._seed = header.limits, header.protocol, header.seed
+        self._open = ExitStack()
+        self._open.enter_context(self._journal.writing(log))
         self._asked: Stimulus | None = None
         now_s = clock.now_s()
-        self._not_before_s = now_s + limits.min_iti_s
+        self._made_s = now_s
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
         self._doubted: set[DoubtKind] = set()
+
+    @property
+    def trials(self) -> TrialTable:
+        """All trials so far."""
+        return self._journal.trials
 
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], the same until its outcome; on disk as about to be delivered before this returns.
@@ -157,24 +184,29 @@ class Recorder:
         """
         if self._asked is None or self._asked.isi_ms is None:
             isi_ms = self.strategy.ask(deadline_s)
-            if self.strategy.fallback_reason is not None:
-                self._log.append(Event(kind="fallback", trial=len(self.trials), text=self.strategy.fallback_reason))
-            self._begin(isi_ms)
+            self._begin(isi_ms, self.strategy.fallback_reason)
             return isi_ms
         return self._asked.isi_ms
 
-    def _begin(self, isi_ms: float | None) -> None:
+    def _begin(self, isi_ms: float | None, fallback: str | None = None) -> None:
         """Put on disk what is about to be delivered, once the limits allow it."""
         stimulus = Stimulus(len(self.trials), isi_ms)
         self._limits.require_left(stimulus.trial)
         if isi_ms is not None:
             self._limits.require_isi(isi_ms)
         self._limits.require_state(Readiness())
-        earliest_s = max(self._not_before_s, self._limits.earliest_s(self._times_s))
-        self._clock.sleep_s(earliest_s - self._clock.now_s())
-        self._log.append(Intent(trial=stimulus.trial, isi_ms=isi_ms, t_s=self._clock.now_s()))
-        self._log.sync()
+        self._clock.sleep_s(self._earliest_s(stimulus.trial) - self._clock.now_s())
+        self._journal.intent(stimulus, self._clock.now_s(), fallback)
         self._asked = stimulus
+
+    def _earliest_s(self, trial: int) -> float:
+        """When limits and protocol allow a trial, by the clock [s]."""
+        last_s = self._times_s[-1] if self._times_s else self._made_s
+        return max(
+            self._made_s + self._limits.min_iti_s,
+            self._limits.earliest_s(self._times_s),
+            last_s + self._protocol.interval_s(trial, self._seed),
+        )
 
     def tell(
         self,
@@ -251,7 +283,7 @@ class Recorder:
         Args:
             text: anything.
         """
-        self.log_event("note", text)
+        self._journal.note(text)
 
     def exclude(self, trial: int, reason: str = "") -> None:
         """Exclude a trial from here on: an event is appended, and the strategy learns anew without it.
@@ -261,20 +293,47 @@ class Recorder:
             reason: why, for whoever reads the log.
 
         Raises:
-            InvalidValueError: no accepted trial has this number.
+            InvalidValueError: no trial that counts has this number.
         """
-        if trial not in {accepted.index for accepted in self.trials.told}:
-            raise InvalidValueError(
-                "there is no such trial to exclude",
-                got=trial,
-                expected=", ".join(str(accepted.index) for accepted in self.trials.told) or "one that was told",
-            )
-        self._log.append(Event(kind="exclusion", trial=trial, text=reason))
-        self._log.sync()
-        self.trials = self.trials.excluding([trial])
-        self.strategy = self.strategy.restarted()
-        for earlier in self.trials:
-            learn(self.strategy, earlier)
+        self._judge(lambda trials: exclusion(trials, trial, reason))
+
+    def include(self, trial: int) -> None:
+        """Let a trial count again that was excluded, and learn anew with it.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no excluded trial has this number.
+        """
+        self._judge(lambda trials: inclusion(trials, trial))
+
+    def reject(self, trial: int) -> None:
+        """Let a trial not count whose MEP you have looked at; an exclusion with this reason.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no trial that counts has this number.
+        """
+        self.exclude(trial, LOOKED_AT)
+
+    def accept(self, trial: int) -> None:
+        """Let a trial count again that was rejected or excluded.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no such trial, one that counts already, or a mistrial, which has no amplitude here.
+        """
+        self._judge(lambda trials: acceptance(trials, trial, self.strategy.space))
+
+    def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
+        self._journal.judge(verdict)
+        self.strategy, self._journal.overruled = relearned(self.strategy, self.trials), False
+        self._log_estimate(len(self.trials) - 1)
 
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""
@@ -286,6 +345,7 @@ class Recorder:
 
     def close(self) -> None:
         """Close the log; calling it again is harmless."""
+        self._open.close()
         self._log.close()
 
     def __enter__(self) -> Self:
@@ -296,19 +356,13 @@ class Recorder:
     ) -> None:
         try:
             if error is not None:
-                interrupted = isinstance(error, KeyboardInterrupt)
-                self.log_event("fault", "Interrupted by the operator." if interrupted else told(error))
+                self._journal.failure(error)
+                self._log.sync()
         finally:
             self.close()
 
-    def log_event(self, kind: EventKind, text: str) -> None:
-        """Put on disk that something happened.
-
-        Args:
-            kind: what kind of thing.
-            text: what, in words.
-        """
-        self._log.append(Event(kind=kind, trial=len(self.trials) - 1 if self.trials else None, text=text))
+    def _event(self, kind: EventKind, text: str) -> None:
+        self._journal.event(kind, text)
         self._log.sync()
 
     def _require_asked(self) -> Stimulus:
@@ -320,16 +374,19 @@ class Recorder:
 
     def _conclude(self, trial: Trial) -> None:
         """Put a trial on disk, then learn it, then put on disk what is believed."""
-        self._log.append(trial)
+        self._journal.trial(trial)
         self._log.sync()
-        self.trials, self._asked = self.trials.appended(trial), None
+        self._asked = None
         self._times_s.append(self._clock.now_s())
         learn(self.strategy, trial)
         if trial.told and self.strategy.trouble is not None:
             self._log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
-        self._log.append(Estimate.of(trial.index, self.estimate(), self.decision(), None))
+        self._log_estimate(trial.index)
+
+    def _log_estimate(self, trial: int) -> None:
+        self._log.append(Estimate.of(trial, self.estimate(), self.decision(), None))
         self._log.sync()
 
     def _warn(self, text: str) -> None:
-        self.log_event("doubt", text)
+        self._event("doubt", text)
         warnings.warn(text, ImplausibleDataWarning, stacklevel=3)

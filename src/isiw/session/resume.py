@@ -3,53 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
 
 from isiw.checks import whole
 from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, HasMemory
-from isiw.errors import (
-    ConfigError,
-    DamagedLogError,
-    DeviceError,
-    InvalidValueError,
-    OtherVersionsWarning,
-    StrategyError,
-)
+from isiw.errors import DamagedLogError, DeviceError, InvalidValueError
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Event, Header, Intent, StrategyRecipe
+from isiw.log.schema import MOST_TRIALS, Event, Header
+from isiw.log.verdicts import exclusion, inclusion
 from isiw.log.writer import LogWriter
-from isiw.session.loop import Session, SessionUpdate, learn, versions
+from isiw.session.loop import Session
+from isiw.session.replay import Replayed, replay, resumption_text, strategy_of, warn_where_differing
 from isiw.session.safeguards import Safeguards
-from isiw.strategy.catalogue import make_strategy, settings_for
+from isiw.session.updates import SessionUpdate
 from isiw.strategy.strategy import Strategy
-from isiw.texts import plain
-from isiw.trials import Stimulus, Trial, TrialTable
+from isiw.trials import Stimulus, TrialTable
 
-__all__ = [
-    "Replayed",
-    "ages_s",
-    "exclude",
-    "replay",
-    "resume",
-    "resumption_text",
-    "strategy_of",
-    "warn_where_differing",
-    "with_lost_pulses",
-]
-
-_COMPARED_AT_EACH_END = 50
-
-_RENAMED: Final = {"zero_below_mv": "threshold_mv"}
-"""Settings by the names that earlier versions logged them under."""
+__all__ = ["ages_s", "continued", "exclude", "include", "resume", "resumption", "with_lost_pulses"]
 
 
 def resume(  # noqa: PLR0913 - all but three are keyword-only
@@ -105,7 +81,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     replayed = replay(record, strategy.restarted() if strategy else strategy_of(header), verify=verify)
     warn_where_differing(replayed, header)
     if isinstance(device, HasMemory):
-        device.resume_after([Stimulus(trial.index, trial.commanded_isi_ms) for trial in replayed.trials])
+        device.resume_after([Stimulus(t.index, t.commanded_isi_ms, t.tap_alone) for t in replayed.trials])
     session = Session(
         device,
         replayed.strategy,
@@ -119,17 +95,41 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         timeout_s=header.timeout_s if timeout_s is None else timeout_s,
         ask_deadline_s=header.ask_deadline_s if ask_deadline_s is None else ask_deadline_s,
         safeguards=safeguards,
+        visit=header.visit,
+        protocol=header.protocol,
     )
-    last = len(replayed.trials) - 1 if replayed.trials else None
-    event = Event(kind="resume", trial=last, text=resumption_text(record, replayed))
-
-    def open_log(as_resumed: Header) -> LogWriter:
-        as_resumed = as_resumed.model_copy(update={"created": header.created, "asks_from": replayed.asks_from})
-        return LogWriter.continuing(path, salvaged, header, as_resumed)
-
-    earlier_s = partial(ages_s, salvaged, len(replayed.trials))
-    session.continue_from(replayed.trials, open_log, (*replayed.unknown, event), earlier_s)
+    session.continue_from(
+        replayed.trials,
+        partial(continued, path, salvaged, header, replayed),
+        (*replayed.unknown, resumption(record, replayed)),
+        partial(ages_s, salvaged, len(replayed.trials)),
+    )
     return session
+
+
+def continued(path: str | Path, salvaged: Salvage, header: Header, replayed: Replayed, as_resumed: Header) -> LogWriter:
+    """The log, open to go on.
+
+    Args:
+        path: where it is.
+        salvaged: what was read from it.
+        header: the one that held so far.
+        replayed: what the strategy has learned of it.
+        as_resumed: the one that holds from here on, but for what never changes.
+    """
+    kept = {"created": header.created, "asks_from": replayed.asks_from}
+    return LogWriter.continuing(path, salvaged, header, as_resumed.model_copy(update=kept))
+
+
+def resumption(record: SessionRecord, replayed: Replayed) -> Event:
+    """What the log says about a resumption.
+
+    Args:
+        record: the log so far.
+        replayed: what the strategy has learned of it.
+    """
+    last = len(replayed.trials) - 1 if replayed.trials else None
+    return Event(kind="resume", trial=last, text=resumption_text(record, replayed))
 
 
 def ages_s(salvaged: Salvage, trials: int) -> list[float]:
@@ -141,69 +141,6 @@ def ages_s(salvaged: Salvage, trials: int) -> list[float]:
     """
     known_s = pulses_s(salvaged)
     return [*known_s, *[0.0] * (trials - len(known_s))]
-
-
-@dataclass(frozen=True)
-class Replayed:
-    """A strategy that has learned a log.
-
-    Args:
-        strategy: the strategy.
-        trials: all trials, those with unknown outcome included.
-        unknown: the trials whose outcome is not in the log.
-        differing: trials in which it would have asked something else than was logged with other versions.
-        asks_from: the first trial whose ask can be compared with the strategy's from here on; those before were asked
-            with other versions, or never compared.
-    """
-
-    strategy: Strategy
-    trials: TrialTable
-    unknown: tuple[Trial, ...]
-    differing: tuple[int, ...] = ()
-    asks_from: int = 0
-
-
-def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) -> Replayed:
-    """Tell a strategy everything that a log holds, in the order in which it was told then.
-
-    A trial that was excluded counts from its exclusion on; asks before it are compared as they were made. Of a long
-    session the first and the last asks are compared: the last ones depend on all that was told before.
-
-    Args:
-        record: the log.
-        strategy: the session's strategy before its first trial.
-        verify: whether to compare what the strategy asks with what it asked then.
-
-    Raises:
-        StrategyError: it asks something else, although the versions are those that were logged.
-    """
-    told: list[Trial] = []
-    differing: list[int] = []
-    first = record.header.asks_from
-    by_fallback = {event.trial for event in record.events if event.kind == "fallback"}
-    last = max((intent.trial for intent in record.intents), default=0)
-    for entry in record.history:
-        if isinstance(entry, Intent):
-            # Behind a lost trial the strategy knew more than the log does.
-            comparable = entry.trial == len(told) and entry.trial >= first and entry.trial not in by_fallback
-            near_an_end = min(entry.trial - first, last - entry.trial) < _COMPARED_AT_EACH_END
-            if verify and comparable and near_an_end and (asked_ms := strategy.ask()) != entry.isi_ms:
-                _require_other_versions(entry, asked_ms, record.header)
-                differing.append(entry.trial)
-        elif isinstance(entry, Trial):
-            learn(strategy, entry)
-            told.append(entry)
-        elif isinstance(entry, Event) and entry.kind == "exclusion" and entry.trial is not None:
-            # In the order of telling, in which a trial that was lost stands behind later ones.
-            told = [dataclasses.replace(t, excluded=True) if t.index == entry.trial else t for t in told]
-            strategy = strategy.restarted()
-            for trial in told:
-                learn(strategy, trial)
-    unknown = tuple(Trial.unknown(Stimulus(intent.trial, intent.isi_ms)) for intent in record.unknown)
-    for trial in unknown:
-        learn(strategy, trial)
-    table = TrialTable(tuple(sorted((*told, *unknown), key=lambda trial: trial.index)))
-    return Replayed(strategy, table, unknown, tuple(differing), len(table) if differing or not verify else first)
 
 
 def exclude(path: str | Path, trial: int, reason: str) -> None:
@@ -219,20 +156,33 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
         DamagedLogError: the log's end is missing; resume the session first.
         InvalidValueError: no such trial, or one that counts for nothing anyway.
     """
+    _judge(path, lambda trials: exclusion(trials, trial, reason))
+
+
+def include(path: str | Path, trial: int) -> None:
+    """Let a trial count again that was excluded: an event is appended to the log. Resuming learns with it.
+
+    Args:
+        path: the log, with or without `.part`.
+        trial: the trial's number.
+
+    Raises:
+        LogError: no such log, or it is still being written.
+        DamagedLogError: the log's end is missing; resume the session first.
+        InvalidValueError: no excluded trial has this number.
+    """
+    _judge(path, lambda trials: inclusion(trials, trial))
+
+
+def _judge(path: str | Path, verdict: Callable[[TrialTable], Event]) -> None:
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
-    if trial not in {candidate.index for candidate in record.table.told}:
-        raise InvalidValueError(
-            "there is no such trial to exclude",
-            got=trial,
-            expected="the number of an accepted trial that is not excluded yet",
-            remedy=f"List them: isiw show {path}",
-        )
+    event = verdict(record.table)
     _require_end(record)
     with LogWriter.continuing(path, salvaged, record.header) as log:
-        log.append(Event(kind="exclusion", trial=trial, text=reason))
+        log.append(event)
         if record.losses:
-            log.append(Event(kind="fault", trial=trial, text=" ".join(record.losses)))
+            log.append(Event(kind="fault", trial=event.trial, text=" ".join(record.losses)))
 
 
 def with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> SessionRecord:
@@ -286,95 +236,3 @@ def _require_as_real(device: Device, header: Header) -> None:
             expected=f"a simulated one, as {was.name} was",
             remedy="Start a session of its own with the real device: isiw.Session(device, strategy, log=NEW_PATH).",
         )
-
-
-def strategy_of(header: Header) -> Strategy:
-    """The strategy of a logged session, before its first trial.
-
-    Args:
-        header: of the log.
-
-    Raises:
-        StrategyError: it was built from a user's own objects.
-
-    Warns:
-        OtherVersionsWarning: it has settings of an earlier version that this one does not know.
-    """
-    recipe = header.strategy
-    if not recipe.name:
-        raise StrategyError(
-            "the session's strategy was built from a user's own objects, which no log can hold",
-            remedy="Build the same strategy again and hand it over: isiw.resume(path, device, strategy).",
-        )
-    settings = recipe.settings
-    if header.schema_version < SCHEMA_VERSION:
-        settings = _known_settings(recipe)
-    return make_strategy(recipe.name, space=header.space, seed=recipe.seed, **settings)
-
-
-def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
-    """The settings of an earlier version that this one knows; a warning names the others."""
-    known = {}
-    for key, value in recipe.settings.items():
-        try:
-            settings_for(recipe.name, **{_RENAMED.get(key, key): value})
-        except (ConfigError, StrategyError, InvalidValueError):
-            continue
-        known[_RENAMED.get(key, key)] = value
-    if unknown := sorted(key for key in recipe.settings if _RENAMED.get(key, key) not in known):
-        text = f"Settings of an earlier version are not known any more, and are as by default: {', '.join(unknown)}."
-        warnings.warn(text, OtherVersionsWarning, stacklevel=3)
-    return known
-
-
-def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
-    """Raise where the strategy has no reason to ask something else than it did."""
-    if header.schema_version == SCHEMA_VERSION and versions() == {**header.versions, "isiw": header.isiw_version}:
-        raise StrategyError(
-            f"the strategy does not ask again what was asked in trial {intent.trial}",
-            got=f"{asked_ms:g} ms",
-            expected=f"{intent.isi_ms} ms, as logged with {_versions_text(header)}",
-            remedy="Resume with the same strategy and on the same machine, or without verification: the logged trials "
-            "are then told as they are.",
-        )
-
-
-def _versions_text(header: Header) -> str:
-    logged = {"isiw": header.isiw_version, **header.versions}
-    return plain(", ".join(f"{name} {version}" for name, version in logged.items()))
-
-
-def warn_where_differing(replayed: Replayed, header: Header) -> None:
-    """Warn whoever resumes a session that other versions would have asked something else.
-
-    Args:
-        replayed: the strategy that has learned the log.
-        header: the log's.
-    """
-    if replayed.differing:
-        warnings.warn(_differing_text(replayed, header), OtherVersionsWarning, stacklevel=3)
-
-
-def _differing_text(replayed: Replayed, header: Header) -> str:
-    return (
-        f"The session was logged with {_versions_text(header)}, log schema {header.schema_version}. With the versions "
-        f"installed here the strategy would have asked something else in {len(replayed.differing)} of "
-        f"{len(replayed.trials)} trials. The logged trials count as they were; asks from here on may differ from those "
-        "of an uninterrupted session."
-    )
-
-
-def resumption_text(record: SessionRecord, replayed: Replayed) -> str:
-    """What the log says about a resumption.
-
-    Args:
-        record: the log.
-        replayed: the strategy that has learned it.
-    """
-    sentences = [f"Resumed after {len(replayed.trials)} trials."]
-    if replayed.differing:
-        sentences.append(_differing_text(replayed, record.header))
-    if replayed.unknown:
-        numbers = ", ".join(str(trial.index) for trial in replayed.unknown)
-        sentences.append(f"Outcome unknown: {numbers}.")
-    return " ".join((*sentences, *record.losses))

@@ -22,6 +22,7 @@ from isiw.session.safeguards import Safeguards
 from isiw.signals.judgement import EMG_UNITS_MV, require_unit
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus
+from isiw.visit import VisitProtocol
 
 __all__ = ["Rig", "require_matching"]
 
@@ -71,6 +72,11 @@ class Rig:
     def pulses_left(self) -> int:
         """How many deliveries are still allowed."""
         return self._limited.pulses_left
+
+    @property
+    def last_s(self) -> float:
+        """When the last delivery ended, by the clock [s]."""
+        return self._limited.last_s
 
     @contextmanager
     def driven(self) -> Iterator[None]:
@@ -151,15 +157,16 @@ class Rig:
         end_process("The session does not react. The device is disarmed.", self.log, INTERRUPTED)
 
 
-def require_matching(info: DeviceInfo, strategy: Strategy) -> None:
-    """Raise where the strategy would misread the device's answers.
+def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtocol) -> None:
+    """Raise where the strategy would misread the device's answers, or the device cannot do what the protocol asks.
 
     Args:
         info: what the device says about itself.
         strategy: the strategy.
+        protocol: which control trials there are.
 
     Raises:
-        DeviceError: another reference, or another detection limit.
+        DeviceError: another reference, another detection limit, or no tap alone.
         InvalidValueError: a channel whose name or unit a session cannot use.
     """
     if info.reference != strategy.space.reference:
@@ -168,6 +175,13 @@ def require_matching(info: DeviceInfo, strategy: Strategy) -> None:
             got=info.reference,
             expected=strategy.space.reference,
             remedy="Give the DesignSpace the device's reference.",
+        )
+    if protocol.tap_alone and not info.tap_alone:
+        raise DeviceError(
+            "the protocol has trials with a tap alone, and the device does not deliver these",
+            got=info.name,
+            remedy="Set the protocol's tap_alone to 0. Or let the device's deliver leave out the pulse where "
+            "stimulus.tap_alone is True, and describe it with DeviceInfo(..., tap_alone=True).",
         )
     for name in info.channels:
         waveform_topic(name)

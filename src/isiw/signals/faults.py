@@ -103,6 +103,8 @@ def _fault_of_sweep(sweep: Sweep, trial: Trial) -> Fault | None:
     emg, acceleration = sweep.channels.get("emg"), sweep.channels.get("acceleration")
     if emg is None or not emg.values.size:
         return Fault("the sweep has no EMG", "Name the channel emg, and record it in every trial.")
+    if not np.isfinite(emg.values).all():
+        return Fault("the EMG has samples that are no numbers", "Look at how the rig converts what it records.")
     if not is_recording(emg.values):
         return Fault("the EMG is a flat line", "Is the amplifier on, and its cable plugged in?")
     if acceleration is not None and not _of_one_length(emg, acceleration):

@@ -110,6 +110,11 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
         InvalidValueError: an unknown unit, or a sampling rate too low to measure anything.
     """
     limits = limits or SignalLimits()
+    return _judge_tap(sweep, stimulus, limits) if stimulus.tap_alone else _judge_pulse(sweep, stimulus, space, limits)
+
+
+def _judge_pulse(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Trial:
+    """A pair of stimuli, or TMS alone."""
     timed = _judge_timing(sweep, stimulus, space, limits)
     if timed.reason is not MistrialReason.OUTCOME_UNKNOWN:
         return timed
@@ -124,9 +129,29 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
         return _mistrial(timed, MistrialReason.SATURATION)
     if timed.background_rms_uv is None:
         return _mistrial(timed, MistrialReason.MISSING_CHANNEL)
+    measured = _measured(timed, _mep_mv(emg_mv, emg, timed, limits))
     if timed.background_rms_uv > limits.background_uv:
-        return _mistrial(timed, MistrialReason.BACKGROUND_ACTIVITY)
-    return _measured(timed, _mep_mv(emg_mv, emg, timed, limits))
+        return _mistrial(measured, MistrialReason.BACKGROUND_ACTIVITY)
+    return measured
+
+
+def _judge_tap(sweep: Sweep, stimulus: Stimulus, limits: SignalLimits) -> Trial:
+    """A tap alone, of which no MEP is expected: the impact must be there, and the muscle at rest before it."""
+    if sweep.t_tms_ms is not None:
+        raise DeviceError(
+            "the device reports a magnetic pulse where a tap alone was commanded", got=f"one at {sweep.t_tms_ms:g} ms"
+        )
+    judged = replace(Trial.unknown(stimulus), t_valve_ms=sweep.t_valve_ms)
+    if not _usable(sweep, "emg") or not _of_one_length(sweep):
+        return _mistrial(judged, MistrialReason.MISSING_CHANNEL)
+    emg = sweep.channels["emg"]
+    hit_ms, wrong = _impact(sweep)
+    judged = replace(judged, t_hit_ms=hit_ms)
+    at_rest_until = replace(judged, t_tms_ms=sweep.t_valve_ms if hit_ms is None else hit_ms, t_hit_ms=None)
+    judged = replace(judged, background_rms_uv=_background_uv(emg.values * _unit_mv(emg), emg, at_rest_until))
+    if wrong is None and (judged.background_rms_uv or 0.0) > limits.background_uv:
+        wrong = MistrialReason.BACKGROUND_ACTIVITY
+    return _mistrial(judged, wrong) if wrong else replace(judged, status=Status.ACCEPTED, reason=None)
 
 
 def _measured(timed: Trial, mep_mv: float) -> Trial:
@@ -134,7 +159,7 @@ def _measured(timed: Trial, mep_mv: float) -> Trial:
     if math.isnan(mep_mv):
         return timed
     if mep_mv == 0 or implausible_amplitude(mep_mv) is not None:
-        return replace(_mistrial(timed, MistrialReason.IMPLAUSIBLE), mep_mv=mep_mv)
+        return _mistrial(replace(timed, mep_mv=mep_mv), MistrialReason.IMPLAUSIBLE)
     return replace(timed, status=Status.ACCEPTED, reason=None, mep_mv=mep_mv)
 
 
@@ -159,14 +184,16 @@ def judge_measurement(
             got=f"a realised ISI of {measurement.isi_ms}",
             expected=f"one for the commanded ISI of {stimulus.isi_ms}",
         )
-    judged = Trial(stimulus.trial, Status.ACCEPTED, stimulus.isi_ms, **asdict(measurement))
+    judged = Trial(
+        stimulus.trial, Status.ACCEPTED, stimulus.isi_ms, tap_alone=stimulus.tap_alone, **asdict(measurement)
+    )
     wrong = None
     if measurement.isi_ms is not None and stimulus.isi_ms is not None:
         wrong = wrong_isi(measurement.isi_ms, stimulus.isi_ms, space, limits)
     if wrong is None and (measurement.background_rms_uv or 0.0) > limits.background_uv:
         wrong = MistrialReason.BACKGROUND_ACTIVITY
     if wrong is None and implausible_amplitude(measurement.mep_mv) is not None:
-        return replace(_mistrial(judged, MistrialReason.IMPLAUSIBLE), mep_mv=measurement.mep_mv)
+        wrong = MistrialReason.IMPLAUSIBLE
     return judged if wrong is None else _mistrial(judged, wrong)
 
 
@@ -204,7 +231,7 @@ def _longest_run(mask: BoolArray) -> int:
 
 
 def _mistrial(judged: Trial, reason: MistrialReason) -> Trial:
-    return replace(judged, status=Status.MISTRIAL, reason=reason, mep_mv=None)
+    return replace(judged, status=Status.MISTRIAL, reason=reason)
 
 
 def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Trial:

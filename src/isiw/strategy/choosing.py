@@ -130,23 +130,28 @@ class Course:
             paired=not alone,
         )
 
+    @property
+    def paired_trials(self) -> int:
+        """How many pairs of stimuli were told of each person."""
+        return self.told - self.alone
+
     @cached_property
     def belief(self) -> Belief:
         """What is believed now."""
-        return Belief(self.posterior, self.told - self.alone)
+        return Belief(self.posterior, self.paired_trials)
 
     @cached_property
     def past(self) -> tuple[Belief, ...]:
         """What the stopping rule looks back on, the first after the last initial ISI."""
         kept = looks_back(self.method.stopping)
-        if not kept or not self.paired or self.told - self.alone < len(self.method.initial_ms):
+        if not kept or not self.paired or self.paired_trials < len(self.method.initial_ms):
             return self.earlier
         return (*self.earlier, self.belief)[-kept:]
 
     @property
     def initial_left(self) -> tuple[float, ...]:
         """What is left of the initial ISIs [ms]."""
-        return self.method.initial_ms[self.told - self.alone :]
+        return self.method.initial_ms[self.paired_trials :]
 
     @property
     def plans_ahead(self) -> bool:
@@ -192,10 +197,10 @@ class Course:
 
         Args:
             person: which.
-            mistrials: stimuli that were delivered to the person and not told.
+            mistrials: pairs of stimuli that were delivered to the person and not told.
         """
         past = tuple(belief.estimate(person) for belief in self.past)
-        progress = Progress(self.told + mistrials, self.told, self.estimate(person), past=past)
+        progress = Progress(self.paired_trials + mistrials, self.told, self.estimate(person), past=past)
         return self.method.stopping(progress)
 
 

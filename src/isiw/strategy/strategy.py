@@ -96,7 +96,7 @@ class Strategy:
                 got=f"a posterior without {', '.join(missing)}",
                 remedy="Choose another acquisition function, or a model whose posterior has the capability.",
             )
-        self._mistrials = self._lost = 0
+        self._mistrials = self._controls = self._lost = 0
         self._meps_mv: list[float] = []
         self._doubted: set[DoubtKind] = set()
         self._choice: Choice | None = None
@@ -133,8 +133,13 @@ class Strategy:
 
     @property
     def delivered(self) -> int:
-        """How many stimuli it knows of, mistrials among them."""
-        return self._course.told + self._mistrials
+        """How many stimuli it knows of, mistrials and control trials among them."""
+        return self._course.told + self._mistrials + self._controls
+
+    @property
+    def spent(self) -> int:
+        """How many stimuli its budget counts: pairs, mistrials among them, but no control trials."""
+        return self._course.paired_trials + self._mistrials
 
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], on the grid; the same until the next `tell`, or until its trial was lost three times.
@@ -207,7 +212,7 @@ class Strategy:
         """Learn from one accepted trial.
 
         Args:
-            isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone.
+            isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone, which uses up no budget.
             mep_mv: peak-to-peak amplitude [mV]; 0 is left-censored at the detection limit.
             response: whether a response was seen, instead of an amplitude.
             isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
@@ -264,7 +269,7 @@ class Strategy:
         self._course = self._course.after(Observation.of([isi_ms], [mep_mv], [isi_sd_ms], [response]))
         self._meps_mv += [] if mep_mv is None else [mep_mv]
         self._choice = self._fallback_reason = None
-        self._lost = 0
+        self._lost = 0 if isi_ms is not None else self._lost
 
     def count_mistrial(self) -> None:
         """Count a delivered stimulus whose outcome is not told: it uses up budget, and is asked again at most twice."""
@@ -274,6 +279,10 @@ class Strategy:
             reason = f"The trial was lost {self._lost} times in a row: an evenly spaced ISI instead."
             isi_ms = evenly_spaced(self.space, self._course.told + self._mistrials)
             self._choice, self._fallback_reason, self._lost = Choice(isi_ms, reason), reason, 0
+
+    def count_control(self) -> None:
+        """Count a control trial from which nothing is learnt: a tap alone, or TMS alone that was lost."""
+        self._controls += 1
 
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""

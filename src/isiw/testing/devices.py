@@ -35,9 +35,9 @@ def check_device(
 ) -> DeviceTable:
     """Check that a device keeps the promises of `isiw.Device`. It stimulates: put the coil on a phantom.
 
-    It delivers three pairs of stimuli and TMS alone, five pairs more where the device has a memory, and tries six more
-    times while the device is disarmed and must refuse. It says so beforehand, and ends with a table of what was found.
-    Whatever happens, the device is stopped and unstaged at the end.
+    It delivers three pairs of stimuli, TMS alone, a tap alone where the device says that it can, and five pairs more
+    where the device has a memory. It tries six more times while the device is disarmed and must refuse. It says so
+    beforehand, and ends with a table of what was found. Whatever happens, the device is disarmed at the end.
 
     Args:
         make: makes the device, in the same state each time; called three times where the device has a memory.
@@ -76,10 +76,8 @@ def _announcement(device: Device, pace: _Pace) -> str:
     if info.simulated:
         return f"{info.name} is simulated: nothing is delivered to anybody."
     pairs = 8 if isinstance(device, HasMemory) else 3
-    return (
-        f"This check stimulates: {pairs} pairs and one magnetic pulse alone, {pace.iti_s:g} s apart. "
-        "Keep the coil on a phantom."
-    )
+    alone = ", one magnetic pulse alone and one tap alone" if info.tap_alone else " and one magnetic pulse alone"
+    return f"This check stimulates: {pairs} pairs{alone}, {pace.iti_s:g} s apart. Keep the coil on a phantom."
 
 
 @dataclass(frozen=True)
@@ -139,6 +137,7 @@ def _check_delivery(device: Device, rules: _Rules, pace: _Pace) -> list[Delivery
     space = rules.space
     between_ms = float(space.grid_ms[(len(space.grid_ms) - 1) // 3])
     stimuli = [Stimulus(trial, isi) for trial, isi in enumerate((space.low_ms, None, between_ms, space.high_ms))]
+    stimuli += [Stimulus(4, None, tap_alone=True)] if device.describe().tap_alone else []
     deliveries = []
     for stimulus in stimuli:
         answer, took_s = pace.timed(device, stimulus)
@@ -173,7 +172,9 @@ def _checked_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, rules:
     if isinstance(answer, Sweep):
         units = {name: channel.unit for name, channel in answer.channels.items()}
         require(units == dict(info.channels), f"a sweep has the channels and units of describe(), here {units}")
-        require("emg" in units and answer.t_tms_ms is not None, "a sweep has its EMG and the time of the pulse")
+        require("emg" in units, "a sweep has its EMG")
+        timed = answer.t_tms_ms is not None
+        require(timed is not stimulus.tap_alone, "a sweep has the time of the pulse, and a tap alone has no pulse")
     else:
         require(not info.channels, "a device that measures the MEP itself describes no channels")
         alone = stimulus.isi_ms is None

@@ -135,6 +135,7 @@ class Tapper:
             simulated=True,
             channels=channels,
             hit_delay_ms=known if self.settings.reference == "valve" else None,
+            tap_alone=True,
         )
 
     @property
@@ -151,7 +152,9 @@ class Tapper:
             self._require_possible(stimulus.isi_ms)
         rng = np.random.default_rng([self._seed, stimulus.trial])
         taps = draw_taps(self.geometry, 1, rng)
-        return self._pulse_alone(taps, rng) if stimulus.isi_ms is None else self._pair(taps, stimulus.isi_ms, rng)
+        if stimulus.isi_ms is not None:
+            return self._pair(taps, stimulus.isi_ms, rng)
+        return self._tap_alone(taps, rng) if stimulus.tap_alone else self._pulse_alone(taps, rng)
 
     def _after_impact_ms(self, isi_ms: float) -> float:
         """The commanded ISI, counted from the impact as predicted [ms]."""
@@ -172,6 +175,16 @@ class Tapper:
         channels = self._channels(times, nothing, rng)
         channels["emg"] = self._emg(times, nothing, ALONE_MS, rng)
         return Sweep(channels, t_tms_ms=VALVE_MS + ALONE_MS)
+
+    def _tap_alone(self, taps: Taps, rng: np.random.Generator) -> Sweep:
+        predicted_ms, times = self.hit_delay.mean_ms, self._times_ms(ALONE_MS)
+        channels = self._channels(times, taps, rng)
+        channels["emg"] = self._emg(times, taps, None, rng)
+        measured_ms = self._measured_hit_ms(channels)
+        if measured_ms is not None:
+            self.hit_delay.measured(measured_ms)
+        blind = not self.settings.accelerometer
+        return Sweep(channels, t_valve_ms=VALVE_MS, t_hit_ms=VALVE_MS + predicted_ms if blind else None)
 
     def _pair(self, taps: Taps, isi_ms: float, rng: np.random.Generator) -> Sweep:
         after_impact_ms = self._after_impact_ms(isi_ms)

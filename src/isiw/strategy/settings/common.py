@@ -110,7 +110,7 @@ class Stopping:
     """When a strategy with a posterior of the window stops.
 
     Args:
-        max_trials: stop after this many stimuli; mistrials count.
+        max_trials: stop after this many stimuli; mistrials count, control trials do not.
         stop_width_ms: stop when the 90 % credible intervals of both edges are at most this wide [ms], under every kind
             of noise that is still probable where the model weighs more than one.
         stop_expected_f1: stop when the expected F1 of the reported window is at least this.

@@ -73,7 +73,7 @@ class Settling:
         stop_variance_ms2: stop when the variance [ms²] of the last values of the edges is below this,
         stop_last: how many values,
         stop_edges: and of which edges: "both" (the text), or "either" (the pseudo-code).
-        max_iterations: stop after this many stimuli beyond the initial ones; mistrials count.
+        max_trials: stop after this many stimuli, the initial ones among them; mistrials count, control trials do not.
 
     Raises:
         InvalidValueError: an invalid number, or an unknown value of the edges.
@@ -82,18 +82,18 @@ class Settling:
     stop_variance_ms2: float = 50.0
     stop_last: int = 5
     stop_edges: Literal["both", "either"] = "both"
-    max_iterations: int = 99
+    max_trials: int = 106
 
     def __post_init__(self) -> None:
         check_numbers(self, "stop_variance_ms2", above=0)
         check_wholes(self, "stop_last", least=2)
         check_choice(self, "stop_edges", ("both", "either"))
-        check_wholes(self, "max_iterations", least=0)
+        check_wholes(self, "max_trials", least=1)
 
-    def rule(self, initial: int) -> StoppingRule:
-        """The edges have settled, or the iterations are used up."""
+    def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - the budget counts from the first stimulus
+        """The edges have settled, or the budget is used up."""
         settled = EdgeVariance(self.stop_variance_ms2, self.stop_last, self.stop_edges)
-        return AnyOf((settled, Budget(initial + self.max_iterations)))
+        return AnyOf((settled, Budget(self.max_trials)))
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,8 @@ class Converging:
 
     Args:
         stop_sd_ms: stop when the SD of the particles is at most this [ms] (4.6).
-        max_trials: stop after this many stimuli; mistrials count (as many as a full conventional search, 4.2.1).
+        max_trials: stop after this many stimuli; mistrials count, control trials do not. By default as many as a full
+            conventional search has (4.2.1).
 
     Raises:
         InvalidValueError: an invalid number.
@@ -126,7 +127,8 @@ class Passing:
 
     Args:
         quiet_ms: stop when nothing was enhanced for so long behind a window [ms]; 0 sweeps the whole budget.
-        max_trials: stop after this many stimuli; mistrials count. Twelve at each 5 ms of 500 ms are 1212.
+        max_trials: stop after this many stimuli; mistrials count, control trials do not. Twelve at
+            each 5 ms of 500 ms are 1212.
 
     Raises:
         InvalidValueError: an invalid number.

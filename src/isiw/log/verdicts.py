@@ -1,0 +1,115 @@
+"""What an operator says about a trial afterwards: an event that is appended; the trial's own record stays as it was."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable
+from typing import Final
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.log.schema import Event, EventKind
+from isiw.trials import Trial, TrialTable
+
+__all__ = ["LOOKED_AT", "VERDICTS", "acceptance", "exclusion", "inclusion", "under", "under_all"]
+
+VERDICTS: Final[dict[EventKind, Callable[[Trial], Trial]]] = {
+    "exclusion": lambda trial: dataclasses.replace(trial, excluded=True),
+    "inclusion": lambda trial: dataclasses.replace(trial, excluded=False),
+    "acceptance": Trial.accepted_anyway,
+}
+"""What each kind of verdict makes of a trial."""
+
+LOOKED_AT: Final = "Rejected by the operator after looking at the MEP."
+"""The reason of an exclusion that rejects an MEP."""
+
+
+def under(trial: Trial, event: Event) -> Trial:
+    """A trial as it counts after an event; the same where the event says nothing about it.
+
+    Args:
+        trial: the trial.
+        event: what happened.
+    """
+    verdict = VERDICTS.get(event.kind)
+    return trial if verdict is None or event.trial != trial.index else verdict(trial)
+
+
+def under_all(trials: TrialTable, events: Iterable[Event]) -> TrialTable:
+    """All trials as they count after some events, in the order in which these happened.
+
+    Args:
+        trials: the trials.
+        events: what happened.
+    """
+    for event in events:
+        if event.kind in VERDICTS:
+            trials = trials.changed(lambda trial, event=event: under(trial, event))  # type: ignore[misc]
+    return trials
+
+
+def exclusion(trials: TrialTable, number: int, reason: str = "") -> Event:
+    """That a trial does not count from here on.
+
+    Args:
+        trials: all trials.
+        number: the trial's number.
+        reason: why, for whoever reads the log.
+
+    Raises:
+        InvalidValueError: no trial that counts has this number.
+    """
+    _require("exclude", number, [trial.index for trial in trials if trial.counts], "that counts")
+    return Event(kind="exclusion", trial=number, text=reason)
+
+
+def inclusion(trials: TrialTable, number: int) -> Event:
+    """That a trial that was excluded counts again.
+
+    Args:
+        trials: all trials.
+        number: the trial's number.
+
+    Raises:
+        InvalidValueError: no excluded trial has this number.
+    """
+    _require("include", number, [trial.index for trial in trials if trial.excluded], "that is excluded")
+    return Event(kind="inclusion", trial=number, text="Included again by the operator.")
+
+
+def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:
+    """That a mistrial counts all the same, or a trial that was excluded counts again.
+
+    Args:
+        trials: all trials.
+        number: the trial's number.
+        space: what its ISI must have come from.
+
+    Raises:
+        InvalidValueError: no such trial, one that counts already, or one without an amplitude or an ISI to count with.
+    """
+    trial = next((trial for trial in trials if trial.index == number), None)
+    if trial is not None and trial.excluded:
+        return inclusion(trials, number)
+    _require("accept", number, [trial.index for trial in trials if not trial.counts], "that does not count")
+    if trial is None or trial.mep_mv is None or not _placed(trial, space):
+        raise InvalidValueError(
+            f"trial {number} cannot be accepted: no MEP was measured at an ISI that a strategy could learn from",
+            got=None if trial is None else str(trial.reason),
+            remedy="Its waveforms, where there are any, stay in the log; the ISI is asked again.",
+        )
+    return Event(kind="acceptance", trial=number, text=f"Accepted by the operator all the same: {trial.reason}.")
+
+
+def _placed(trial: Trial, space: DesignSpace) -> bool:
+    """Whether a strategy could learn where the trial's pulse came."""
+    return trial.commanded_isi_ms is None or (trial.isi_ms is not None and space.admits(trial.isi_ms))
+
+
+def _require(verb: str, number: int, possible: list[int], which: str) -> None:
+    if number not in possible:
+        raise InvalidValueError(
+            f"there is no such trial to {verb}",
+            got=number,
+            expected=f"one {which}: {', '.join(map(str, possible)) or 'there is none'}",
+        )

@@ -1,0 +1,194 @@
+"""The operator's desk: what each key does while a session runs, how a pause is decided, and the countdown of a rest."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from typing import Final, Protocol
+
+from isiw.errors import InvalidValueError, LogError
+from isiw.session.terminal import Keys, Screen
+from isiw.trials import TrialTable
+
+__all__ = ["KEYS", "Desk", "Operated"]
+
+KEYS: Final = (
+    "p pause, x exclude the last trial, u undo that, a accept or j reject the last MEP, n note, ? these keys, "
+    "Ctrl-C pause, Ctrl-C twice end"
+)
+_WORTH_COUNTING_S = 15.0
+_NAP_S = 0.05
+
+
+class Operated(Protocol):
+    """What the keys do something to: a session."""
+
+    @property
+    def trials(self) -> TrialTable:
+        """All trials so far."""
+
+    def pause(self, reason: str) -> None:
+        """Disarm now, and pause."""
+
+    def note(self, text: str) -> None:
+        """Log a remark."""
+
+    def exclude(self, trial: int, reason: str = "") -> None:
+        """Let a trial not count.
+
+        Args:
+            trial: its number.
+            reason: why.
+        """
+
+    def include(self, trial: int) -> None:
+        """Let an excluded trial count again."""
+
+    def accept(self, trial: int) -> None:
+        """Let a mistrial count."""
+
+    def reject(self, trial: int) -> None:
+        """Let a trial not count whose MEP was looked at."""
+
+
+class Desk:
+    """Turns keys into what a session does, and answers it when it has paused.
+
+    Args:
+        session: what is operated.
+    """
+
+    def __init__(self, session: Operated) -> None:
+        self._session, self.screen = session, Screen()
+        self._note: str | None = None
+        self._asking = self._left_alone = False
+        self._answer: bool | None = None
+        self._counted: int | None = None
+        self.away: Callable[[], AbstractContextManager[None]] = nullcontext
+
+    @contextmanager
+    def staffed(self) -> Iterator[None]:
+        """Within, keys of the terminal are heard."""
+        with self.screen, Keys(self.press, self.leave) as keys:
+            self.away = keys.away
+            self.screen.say(f"Keys: {KEYS}.")
+            yield
+
+    def leave(self) -> None:
+        """Nobody is there any more: whatever is asked is answered with no."""
+        self._left_alone = True
+
+    def goes_on(self, reason: str) -> bool:
+        """Wait for the key that says whether a paused session goes on.
+
+        Args:
+            reason: why it has paused.
+        """
+        self.screen.say(f"{reason} The device is disarmed. r goes on, q ends the session, which can be resumed later.")
+        if self._note is not None:
+            self.screen.say("First finish the note with Enter, or drop it with Esc.")
+        self._asking = True
+        try:
+            while self._answer is None and not self._left_alone:
+                time.sleep(_NAP_S)
+            return bool(self._answer)
+        finally:
+            self._asking, self._answer = False, None
+
+    def count_down(self, left_s: float, text: str) -> None:
+        """Show how long a wait still lasts, where it is worth it.
+
+        Args:
+            left_s: how long [s].
+            text: what is waited for.
+        """
+        left = round(left_s)
+        if (left_s >= _WORTH_COUNTING_S or self._counted is not None) and left != self._counted:
+            self._counted = left
+            if self._note is None:
+                self.screen.count_down(f"{text}: {left // 60}:{left % 60:02d} left")
+
+    def counted_down(self) -> None:
+        """The wait is over."""
+        if self._counted is not None:
+            self._counted = None
+            self.screen.counted_down()
+
+    def press(self, key: str) -> None:
+        """Do what a key stands for, or take it for the note that is being typed.
+
+        Args:
+            key: a character.
+        """
+        if self._note is not None:
+            self._type(self._note, key)
+        elif key.lower() in "rq":
+            self._decide(key.lower())
+        elif (act := self._acts.get(key.lower())) is not None:
+            try:
+                act()
+            except (InvalidValueError, LogError) as error:
+                self.screen.say(f"{error}")
+
+    @property
+    def _acts(self) -> dict[str, Callable[[], None]]:
+        return {
+            "p": lambda: self._session.pause("Paused by the operator."),
+            "x": self._exclude,
+            "u": self._undo,
+            "a": lambda: self._judge(self._session.accept, "counts"),
+            "j": lambda: self._judge(self._session.reject, "is rejected and does not count"),
+            "n": self._begin_note,
+            "?": lambda: self.screen.say(f"Keys: {KEYS}."),
+        }
+
+    def _decide(self, key: str) -> None:
+        if self._asking:
+            self._answer = key == "r"
+        else:
+            self.screen.say("The session is not paused; p pauses it.")
+
+    def _judge(self, say: Callable[[int], None], outcome: str) -> None:
+        number = self._last()
+        say(number)
+        self.screen.say(f"Trial {number} {outcome}.")
+
+    def _last(self) -> int:
+        if not self._session.trials:
+            raise InvalidValueError("there is no trial yet")
+        return self._session.trials[-1].index
+
+    def _exclude(self) -> None:
+        self._judge(
+            lambda number: self._session.exclude(number, "Excluded by the operator."), "is excluded; u undoes it"
+        )
+
+    def _undo(self) -> None:
+        excluded = [trial.index for trial in self._session.trials if trial.excluded]
+        if not excluded:
+            raise InvalidValueError("no trial is excluded")
+        self._session.include(excluded[-1])
+        self.screen.say(f"Trial {excluded[-1]} counts again.")
+
+    def _begin_note(self) -> None:
+        self._note = ""
+        self.screen.counted_down()
+        self.screen.type("Note (Enter keeps it, Esc drops it): ")
+
+    def _type(self, note: str, key: str) -> None:
+        if key in "\r\n":
+            self._note = None
+            self.screen.type("\n")
+            if note.strip():
+                self._session.note(note.strip())
+                self.screen.say("The note is in the log.")
+        elif key == "\x1b":
+            self._note = None
+            self.screen.type("\n")
+        elif key in "\x7f\b":
+            self._note = note[:-1]
+            self.screen.type("\b \b" if note else "")
+        elif key.isprintable():
+            self._note = note + key
+            self.screen.type(key)

@@ -1,0 +1,166 @@
+"""A session's trials and the log that they are in: what is added to the one is added to the other."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from isiw.devices.protocol import Answer
+from isiw.errors import InvalidValueError, LimitExceededError, told
+from isiw.log.schema import Event, EventKind, Intent, Waveform
+from isiw.log.verdicts import under_all
+from isiw.log.writer import LogWriter
+from isiw.strategy.strategy import Strategy
+from isiw.trials import Stimulus, Sweep, Trial, TrialTable
+
+__all__ = ["Journal", "learn", "relearned"]
+
+
+def learn(strategy: Strategy, trial: Trial) -> None:
+    """Tell a strategy one trial, or count it where there is nothing to tell.
+
+    Args:
+        strategy: the strategy.
+        trial: the trial.
+    """
+    if trial.told:
+        strategy.learn(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
+    elif trial.is_control:
+        strategy.count_control()
+    else:
+        strategy.count_mistrial()
+
+
+def relearned(strategy: Strategy, trials: TrialTable) -> Strategy:
+    """The same strategy, told all trials anew.
+
+    Args:
+        strategy: the strategy.
+        trials: what it learns.
+    """
+    anew = strategy.restarted()
+    for trial in trials:
+        learn(anew, trial)
+    return anew
+
+
+class Journal:
+    """The trials so far, and the log that they are written to while it is open. Safe to use from several threads.
+
+    Args:
+        trials: what was delivered before.
+    """
+
+    def __init__(self, trials: TrialTable | None = None) -> None:
+        self.trials = trials or TrialTable()
+        self.unconcluded: Trial | None = None
+        self.overruled = False
+        self._log: LogWriter | None = None
+        self._lock = threading.RLock()
+
+    @property
+    def log(self) -> LogWriter:
+        """The open log.
+
+        Raises:
+            InvalidValueError: there is none.
+        """
+        if self._log is None:
+            raise InvalidValueError(
+                "the session is not running, so nothing can be added to its log",
+                remedy="Do it while run() is busy, from on_trial or another thread. In a log at rest, isiw.exclude and "
+                "isiw.include judge trials.",
+            )
+        return self._log
+
+    @contextmanager
+    def writing(self, log: LogWriter) -> Iterator[None]:
+        """Within, the log is open."""
+        self._log = log
+        try:
+            yield
+        finally:
+            self._log = None
+
+    @property
+    def last(self) -> int | None:
+        """The number of the last trial; None before the first."""
+        return len(self.trials) - 1 if self.trials else None
+
+    def event(self, kind: EventKind, text: str) -> None:
+        """Write that something happened, behind the last trial.
+
+        Args:
+            kind: what kind of thing.
+            text: what, in words.
+        """
+        self.log.append(Event(kind=kind, trial=self.last, text=text))
+
+    def note(self, text: str) -> None:
+        """Put a remark on disk."""
+        self.event("note", text)
+        self.log.sync()
+
+    def judge(self, verdict: Callable[[TrialTable], Event]) -> Event:
+        """Put on disk what an operator says about a trial; from then on the strategy has to learn anew.
+
+        Args:
+            verdict: says it, of all trials so far.
+        """
+        with self._lock:
+            event = verdict(self.trials)
+            self.log.append(event)
+            self.trials = under_all(self.trials, [event])
+            self.overruled = True
+        self.log.sync()
+        return event
+
+    def faults(self, faults: deque[str]) -> None:
+        """Write what went wrong and was overcome, in whichever thread."""
+        while faults:
+            self.event("fault", faults.popleft())
+
+    def failure(self, error: BaseException) -> None:
+        """Write what ends a session before its time."""
+        kind: EventKind = "limit" if isinstance(error, LimitExceededError) else "fault"
+        self.event(kind, "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else told(error))
+
+    def intent(self, stimulus: Stimulus, t_s: float, fallback: str | None = None) -> bool:
+        """Put on disk what is about to be delivered; not where a trial was judged anew since it was asked for.
+
+        Args:
+            stimulus: what is to be delivered.
+            t_s: the time [s].
+            fallback: why its ISI is not the acquisition function's choice; None where it is.
+
+        Returns:
+            Whether it may be delivered.
+        """
+        with self._lock:
+            if self.overruled:
+                return False
+            if fallback is not None:
+                self.log.append(Event(kind="fallback", trial=stimulus.trial, text=fallback))
+            self.log.append(Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=t_s, tap_alone=stimulus.tap_alone))
+        self.log.sync()
+        return True
+
+    def waveforms(self, stimulus: Stimulus, answer: Answer) -> None:
+        """Write what was recorded, where waveforms were.
+
+        Args:
+            stimulus: what was delivered.
+            answer: what came of it.
+        """
+        if isinstance(answer, Sweep):
+            for name, channel in answer.channels.items():
+                self.log.append(Waveform.of(stimulus.trial, channel), name)
+
+    def trial(self, trial: Trial) -> None:
+        """Write a trial; it is unconcluded until it is learnt and an estimate is written."""
+        with self._lock:
+            self.log.append(trial)
+            self.trials = self.trials.appended(trial)
+            self.unconcluded = trial

@@ -1,0 +1,195 @@
+"""Replaying a log: its strategy is made again, and told everything that the log holds."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from isiw.errors import ConfigError, InvalidValueError, OtherVersionsWarning, StrategyError
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent, StrategyRecipe
+from isiw.log.verdicts import VERDICTS, under
+from isiw.session.header import versions
+from isiw.session.journal import learn
+from isiw.strategy.catalogue import make_strategy, settings_for
+from isiw.strategy.strategy import Strategy
+from isiw.texts import plain
+from isiw.trials import Stimulus, Trial, TrialTable
+
+__all__ = ["Replayed", "replay", "resumption_text", "strategy_of", "warn_where_differing"]
+
+_COMPARED_AT_EACH_END = 50
+
+_RENAMED: Final = {"zero_below_mv": "threshold_mv"}
+"""Settings by the names that earlier versions logged them under."""
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A strategy that has learned a log.
+
+    Args:
+        strategy: the strategy.
+        trials: all trials, those with unknown outcome included.
+        unknown: the trials whose outcome is not in the log.
+        differing: trials in which it would have asked something else than was logged with other versions.
+        asks_from: the first trial whose ask can be compared with the strategy's from here on; those before were asked
+            with other versions, or never compared.
+    """
+
+    strategy: Strategy
+    trials: TrialTable
+    unknown: tuple[Trial, ...]
+    differing: tuple[int, ...] = ()
+    asks_from: int = 0
+
+
+def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) -> Replayed:
+    """Tell a strategy everything that a log holds, in the order in which it was told then.
+
+    What an operator said about a trial holds from then on; asks before it are compared as they were made. Of a long
+    session the first and the last asks are compared: the last ones depend on all that was told before.
+
+    Args:
+        record: the log.
+        strategy: the session's strategy before its first trial.
+        verify: whether to compare what the strategy asks with what it asked then.
+
+    Raises:
+        StrategyError: it asks something else, although the versions are those that were logged.
+    """
+    told: list[Trial] = []
+    differing: list[int] = []
+    first = record.header.asks_from
+    by_fallback = {event.trial for event in record.events if event.kind == "fallback"}
+    last = max((intent.trial for intent in record.intents), default=0)
+    for entry in record.history:
+        if isinstance(entry, Intent):
+            # Behind a lost trial the strategy knew more than the log does.
+            comparable = (
+                entry.isi_ms is not None
+                and entry.trial == len(told)
+                and entry.trial >= first
+                and entry.trial not in by_fallback
+            )
+            near_an_end = min(entry.trial - first, last - entry.trial) < _COMPARED_AT_EACH_END
+            if verify and comparable and near_an_end and (asked_ms := strategy.ask()) != entry.isi_ms:
+                _require_other_versions(entry, asked_ms, record.header)
+                differing.append(entry.trial)
+        elif isinstance(entry, Trial):
+            learn(strategy, entry)
+            told.append(entry)
+        elif isinstance(entry, Event) and entry.kind in VERDICTS:
+            # In the order of telling, in which a trial that was lost stands behind later ones.
+            told = [under(trial, entry) for trial in told]
+            strategy = strategy.restarted()
+            for trial in told:
+                learn(strategy, trial)
+    unknown = tuple(Trial.unknown(Stimulus(i.trial, i.isi_ms, i.tap_alone)) for i in record.unknown)
+    for trial in unknown:
+        learn(strategy, trial)
+    table = TrialTable(tuple(sorted((*told, *unknown), key=lambda trial: trial.index)))
+    return Replayed(strategy, table, unknown, tuple(differing), len(table) if differing or not verify else first)
+
+
+def strategy_of(header: Header) -> Strategy:
+    """The strategy of a logged session, before its first trial.
+
+    Args:
+        header: of the log.
+
+    Raises:
+        StrategyError: it was built from a user's own objects.
+
+    Warns:
+        OtherVersionsWarning: it has settings of an earlier version that this one does not know.
+    """
+    recipe = header.strategy
+    if not recipe.name:
+        raise StrategyError(
+            "the session's strategy was built from a user's own objects, which no log can hold",
+            remedy="Build the same strategy again and hand it over: isiw.resume(path, device, strategy).",
+        )
+    settings = recipe.settings
+    if header.schema_version < SCHEMA_VERSION:
+        settings = _known_settings(recipe)
+    return make_strategy(recipe.name, space=header.space, seed=recipe.seed, **settings)
+
+
+def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
+    """The settings of an earlier version that this one knows; a warning names the others."""
+    known = {}
+    settings = _renamed(recipe.settings)
+    for key, value in settings.items():
+        try:
+            settings_for(recipe.name, **{key: value})
+        except (ConfigError, StrategyError, InvalidValueError):
+            continue
+        known[key] = value
+    if unknown := sorted(settings.keys() - known.keys()):
+        text = f"Settings of an earlier version are not known any more, and are as by default: {', '.join(unknown)}."
+        warnings.warn(text, OtherVersionsWarning, stacklevel=3)
+    return known
+
+
+def _renamed(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by the names that they have now."""
+    renamed = {_RENAMED.get(key, key): value for key, value in settings.items()}
+    if "max_iterations" in renamed:  # which left the initial trials out
+        renamed["max_trials"] = renamed["initial"] + renamed.pop("max_iterations")
+    return renamed
+
+
+def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
+    """Raise where the strategy has no reason to ask something else than it did."""
+    if header.schema_version == SCHEMA_VERSION and versions() == {**header.versions, "isiw": header.isiw_version}:
+        raise StrategyError(
+            f"the strategy does not ask again what was asked in trial {intent.trial}",
+            got=f"{asked_ms:g} ms",
+            expected=f"{intent.isi_ms} ms, as logged with {_versions_text(header)}",
+            remedy="Resume with the same strategy and on the same machine, or without verification: the logged trials "
+            "are then told as they are.",
+        )
+
+
+def _versions_text(header: Header) -> str:
+    logged = {"isiw": header.isiw_version, **header.versions}
+    return plain(", ".join(f"{name} {version}" for name, version in logged.items()))
+
+
+def warn_where_differing(replayed: Replayed, header: Header) -> None:
+    """Warn whoever resumes a session that other versions would have asked something else.
+
+    Args:
+        replayed: the strategy that has learned the log.
+        header: the log's.
+    """
+    if replayed.differing:
+        warnings.warn(_differing_text(replayed, header), OtherVersionsWarning, stacklevel=3)
+
+
+def _differing_text(replayed: Replayed, header: Header) -> str:
+    return (
+        f"The session was logged with {_versions_text(header)}, log schema {header.schema_version}. With the versions "
+        f"installed here the strategy would have asked something else in {len(replayed.differing)} of "
+        f"{len(replayed.trials)} trials. The logged trials count as they were; asks from here on may differ from those "
+        "of an uninterrupted session."
+    )
+
+
+def resumption_text(record: SessionRecord, replayed: Replayed) -> str:
+    """What the log says about a resumption.
+
+    Args:
+        record: the log.
+        replayed: the strategy that has learned it.
+    """
+    sentences = [f"Resumed after {len(replayed.trials)} trials."]
+    if replayed.differing:
+        sentences.append(_differing_text(replayed, record.header))
+    if replayed.unknown:
+        numbers = ", ".join(str(trial.index) for trial in replayed.unknown)
+        sentences.append(f"Outcome unknown: {numbers}.")
+    return " ".join((*sentences, *record.losses))

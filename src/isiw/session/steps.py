@@ -1,0 +1,169 @@
+"""The steps of a session: ask, wait, deliver, learn, decide."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from isiw.errors import NotDelivered
+from isiw.log.schema import Estimate, Event, Header
+from isiw.session.delivery import Delivery
+from isiw.session.desk import Desk
+from isiw.session.journal import Journal, learn, relearned
+from isiw.session.pausing import Pausing
+from isiw.session.rig import Rig
+from isiw.session.updates import SessionUpdate
+from isiw.strategy.stopping import StopDecision, stimuli_left
+from isiw.strategy.strategy import Strategy
+from isiw.trials import Stimulus, Trial
+from isiw.visit import Control
+
+__all__ = ["Steps", "paused"]
+
+_NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
+
+
+def paused(reason: str) -> StopDecision:
+    """The decision that does not stop, of a session that waits for a person."""
+    return StopDecision(stop=False, reason=f"The session is paused: {reason}")
+
+
+class Steps:
+    """Takes one step of a session after the other; each is taken once, also where the one after is interrupted.
+
+    Args:
+        strategy: proposes ISIs and learns.
+        rig: waits and delivers.
+        journal: the trials and their log.
+        pausing: whether the session is to pause.
+        delivery: delivers and judges.
+        header: what the session is.
+        backoffs_s: how long to wait before a stimulus is tried again that was refused before firing [s].
+    """
+
+    def __init__(
+        self,
+        strategy: Strategy,
+        rig: Rig,
+        journal: Journal,
+        pausing: Pausing,
+        delivery: Delivery,
+        header: Header,
+        backoffs_s: tuple[float, ...],
+    ) -> None:
+        self.strategy, self.delivery = strategy, delivery
+        self.on_trial: Callable[[SessionUpdate], None] | None = None
+        self.desk: Desk | None = None
+        self._rig, self._journal, self._pausing, self._header = rig, journal, pausing, header
+        self._backoffs_s, self._freely = backoffs_s, rig.interrupts.freely
+
+    def next(self) -> StopDecision | None:
+        """Learn anew, conclude the trial that was delivered, or deliver the next; the decision, where there is one."""
+        if self._journal.overruled:
+            self._learn_anew()
+        if self._journal.unconcluded is not None:
+            return self._concluded(self._journal.unconcluded)
+        if (decision := self._freely(self.strategy.decision)).stop:
+            return decision
+        if not self._rig.pulses_left:
+            return self._stop_at_limit()
+        self._one_trial()
+        return None
+
+    def _learn_anew(self) -> None:
+        """Learn all trials as they count since one of them was judged anew."""
+        self._journal.overruled = False
+        try:
+            self.strategy = self._freely(relearned, self.strategy, self._journal.trials)
+        except BaseException:
+            self._journal.overruled = True
+            raise
+        if self._journal.unconcluded is None and self._journal.trials:
+            self.log_estimate(len(self._journal.trials) - 1)
+
+    def _stop_at_limit(self) -> StopDecision:
+        decision = StopDecision(stop=True, reason=f"The limit of {self._header.limits.max_pulses} pulses is reached.")
+        self._journal.event("limit", decision.reason)
+        estimate = self._freely(self.strategy.estimate)
+        self._journal.log.append(Estimate.of(len(self._journal.trials) - 1, estimate, decision, None))
+        return decision
+
+    def _one_trial(self) -> None:
+        """Ask and deliver; what was refused before firing is tried again."""
+        stimulus = Stimulus(len(self._journal.trials), self._next_isi_ms(), self._next_control is Control.TAP_ALONE)
+        for backoff_s in self._backoffs_s:
+            try:
+                return self._deliver(stimulus)
+            except NotDelivered:
+                if self._pausing.due:
+                    raise
+                self._freely(self._rig.clock.sleep_s, backoff_s)
+        return self._deliver(stimulus)
+
+    @property
+    def _next_control(self) -> Control | None:
+        return self._header.protocol.control(len(self._journal.trials), self._header.seed)
+
+    def _next_isi_ms(self) -> float | None:
+        """What is asked next [ms]; None where a control trial comes next."""
+        return None if self._next_control else self._freely(self.strategy.ask, self._header.ask_deadline_s)
+
+    def _deliver(self, stimulus: Stimulus) -> None:
+        self._freely(self._wait)
+        if not self._disturbed:
+            fallback = None if stimulus.isi_ms is None else self.strategy.fallback_reason
+            self.delivery.deliver(stimulus, fallback)
+
+    def _wait(self) -> None:
+        """Sleep until limits and protocol allow the next stimulus, or an operator has another wish."""
+        number = len(self._journal.trials)
+        rests = self._header.protocol.rests_before(number)
+        try:
+            while not self._disturbed and (wait_s := self._wait_s()) > 0:
+                if self.desk is not None:
+                    self.desk.count_down(wait_s, f"Rest after {number} trials" if rests else "Next stimulus")
+                self._rig.clock.sleep_s(min(wait_s, _NAP_S))
+        finally:
+            if self.desk is not None:
+                self.desk.counted_down()
+
+    @property
+    def _disturbed(self) -> bool:
+        return self._pausing.reason is not None or self._journal.overruled
+
+    def _wait_s(self) -> float:
+        """How long until limits and protocol allow the next stimulus [s]."""
+        due_s = self._rig.last_s + self._header.protocol.interval_s(len(self._journal.trials), self._header.seed)
+        return max(self._rig.wait_s(), due_s - self._rig.clock.now_s())
+
+    def _concluded(self, trial: Trial) -> StopDecision:
+        """Learn from a delivered trial and report; each step is taken once, also where the one after is interrupted."""
+        if self.strategy.delivered < len(self._journal.trials):
+            self._freely(learn, self.strategy, trial)
+        if trial.told and self.strategy.trouble is not None:
+            self._journal.log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
+        decision, next_isi_ms = self.log_estimate(trial.index)
+        self._journal.unconcluded = None
+        if not decision.stop and self.delivery.watch.reason is not None:
+            self._pausing.reason = self.delivery.watch.reason
+        if self.on_trial is not None:
+            estimate = self._freely(self.strategy.estimate)
+            update = SessionUpdate(trial, estimate, decision, next_isi_ms, self._stimuli_left())
+            self._freely(self.on_trial, update)
+        return decision
+
+    def log_estimate(self, trial: int) -> tuple[StopDecision, float | None]:
+        """Put what is believed after a trial on disk; the decision and the next ISI [ms]."""
+        estimate, decision = self._freely(self.strategy.estimate), self._freely(self._decision)
+        next_isi_ms = None if decision.stop else self._next_isi_ms()
+        self._journal.log.append(Estimate.of(trial, estimate, decision, next_isi_ms))
+        self._journal.log.sync()
+        return decision, next_isi_ms
+
+    def _decision(self) -> StopDecision:
+        """The strategy's decision; none is made on data that a person should look at first."""
+        reason = self.delivery.watch.reason
+        return self.strategy.decision() if reason is None or not self._stimuli_left() else paused(reason)
+
+    def _stimuli_left(self) -> int:
+        budget = stimuli_left(self.strategy.stopping, self.strategy.spent)
+        return self._rig.pulses_left if budget is None else min(budget, self._rig.pulses_left)

@@ -1,0 +1,194 @@
+"""The terminal: single keys are read in a thread of their own, and what is shown is written in another.
+
+Neither waits for the other: who presses a key is heard also where the terminal takes no output.
+"""
+
+from __future__ import annotations
+
+import codecs
+import os
+import queue
+import select
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from types import TracebackType
+from typing import Any, Self
+
+from isiw.texts import plain
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import termios
+    import tty
+
+__all__ = ["Keys", "Screen", "is_terminal", "restore", "somebody_there"]
+
+_GLANCE_S = 0.1
+_LAST_WORDS_S = 1.0
+
+_as_they_were: dict[int, Any] = {}
+"""The settings of terminals that are read key by key, for `restore`: a process that ends itself runs nothing else."""
+
+
+def is_terminal(stream: object) -> bool:
+    """Whether somebody sits at the other end of a stream."""
+    return bool(getattr(stream, "isatty", lambda: False)())
+
+
+def somebody_there() -> bool:
+    """Whether an operator at a terminal sees what is shown, and can press keys."""
+    here = threading.current_thread() is threading.main_thread()  # a program with threads of its own has its own keys
+    return here and is_terminal(sys.stdin) and is_terminal(sys.stderr)
+
+
+def restore() -> None:
+    """Give every terminal its settings back; from any thread."""
+    for terminal in list(_as_they_were):
+        _set_back(terminal)
+
+
+class Screen:
+    """Shows text on standard error; whoever shows something never waits for the terminal."""
+
+    def __init__(self) -> None:
+        self._texts: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._counting = False
+        self._thread = threading.Thread(target=self._write, name="isiw screen", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._texts.put(None)
+        self._thread.join(_LAST_WORDS_S)  # a terminal that takes no output must not keep a session open
+
+    def say(self, text: str) -> None:
+        """Show a line."""
+        self._texts.put(f"{self._line_begun()}{plain(text)}\n")
+
+    def type(self, text: str) -> None:
+        """Show what is being typed."""
+        self._texts.put(text)
+
+    def count_down(self, text: str) -> None:
+        """Show a line in the place of the last one that counted down."""
+        self._texts.put(f"\r{plain(text)}\x1b[K")
+        self._counting = True
+
+    def counted_down(self) -> None:
+        """Clear the line that counted down, where there is one."""
+        if begun := self._line_begun():
+            self._texts.put(begun)
+
+    def _line_begun(self) -> str:
+        counting, self._counting = self._counting, False
+        return "\r\x1b[K" if counting else ""
+
+    def _write(self) -> None:
+        with suppress(OSError, ValueError):  # the terminal is gone
+            while (text := self._texts.get()) is not None:
+                sys.stderr.write(text)
+                sys.stderr.flush()
+
+
+class Keys:
+    """Reads single keys of standard input while it is entered; Ctrl-C and its like stay signals.
+
+    Nothing is read while the process is in the background, where reading would stop it.
+
+    Args:
+        press: is called with each character, in a thread of its own.
+        gone: is called there where the terminal is closed.
+    """
+
+    def __init__(self, press: Callable[[str], None], gone: Callable[[], None]) -> None:
+        self._press, self._gone = press, gone
+        self._over = threading.Event()
+        self._terminal = sys.stdin.fileno()
+        self._thread = threading.Thread(target=self._read, name="isiw keys", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._take()
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._over.set()
+        self._thread.join(_LAST_WORDS_S)
+        _set_back(self._terminal)
+
+    @contextmanager
+    def away(self) -> Iterator[None]:
+        """Within, the terminal has its own settings, as while the process is suspended."""
+        _set_back(self._terminal)
+        try:
+            yield
+        finally:
+            self._take()
+
+    def _read(self) -> None:
+        decoder = codecs.getincrementaldecoder("utf-8")(errors="ignore")
+        while not self._over.is_set():
+            data = self._next()
+            if data == b"":
+                self._gone()
+                return
+            for character in decoder.decode(data or b""):
+                self._press(character)
+
+    if sys.platform == "win32":
+
+        def _take(self) -> None:
+            """Nothing has to be set."""
+
+        def _next(self) -> bytes | None:
+            if msvcrt.kbhit():
+                return msvcrt.getwch().encode()
+            self._over.wait(_GLANCE_S)
+            return None
+
+    else:
+
+        def _take(self) -> None:
+            if _in_foreground(self._terminal):
+                _as_they_were[self._terminal] = termios.tcgetattr(self._terminal)
+                tty.setcbreak(self._terminal, termios.TCSANOW)
+
+        def _next(self) -> bytes | None:
+            """What was typed; nothing after a glance without, and an empty text where the terminal is gone."""
+            try:
+                if not _in_foreground(self._terminal):
+                    self._over.wait(_GLANCE_S)
+                    return None
+                ready, _, _ = select.select([self._terminal], [], [], _GLANCE_S)
+                return os.read(self._terminal, 1024) if ready else None
+            except OSError:
+                return b""
+
+
+if sys.platform == "win32":
+
+    def _set_back(terminal: int) -> None:
+        _as_they_were.pop(terminal, None)
+
+else:
+
+    def _in_foreground(terminal: int) -> bool:
+        try:
+            return os.tcgetpgrp(terminal) == os.getpgrp()
+        except OSError:  # not the process's own terminal, which therefore does not stop it
+            return True
+
+    def _set_back(terminal: int) -> None:
+        before = _as_they_were.pop(terminal, None)
+        with suppress(OSError, termios.error):  # the terminal is gone
+            if before is not None and _in_foreground(terminal):
+                termios.tcsetattr(terminal, termios.TCSANOW, before)

@@ -1,0 +1,155 @@
+"""A visit: what is noted about it, and the protocol by which its stimuli follow each other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from fractions import Fraction
+
+import numpy as np
+
+from isiw.checks import check_numbers, check_texts, check_wholes, number
+from isiw.errors import InvalidValueError
+
+__all__ = ["Control", "Visit", "VisitProtocol"]
+
+_ITI_DRAWS, _CONTROL_DRAWS = 1, 2
+"""What is drawn, so that the two never share their draws."""
+
+_FINEST_SHARE = 1000
+
+
+class Control(StrEnum):
+    """A control trial: one of the two stimuli without the other."""
+
+    TMS_ALONE = "TMS alone"
+    TAP_ALONE = "tap alone"
+
+
+@dataclass(frozen=True)
+class Visit:
+    """What is noted about a visit, for whoever reads its log.
+
+    Args:
+        day: the number of the person's visit, from 1; None where it is not noted.
+        operator: who runs the session, as a code.
+        muscle: whose EMG is recorded, such as "FCR".
+        intensity_pct_rmt: intensity of the pulse [% of the resting motor threshold]; None where it is not noted.
+        intensity_pct_mso: the same [% of the maximum stimulator output]; None where it is not noted.
+        electrodes: which, and where they are.
+
+    Raises:
+        InvalidValueError: a day below 1, an intensity that is not positive, or a text that is none.
+    """
+
+    day: int | None = None
+    operator: str = ""
+    muscle: str = ""
+    intensity_pct_rmt: float | None = None
+    intensity_pct_mso: float | None = None
+    electrodes: str = ""
+
+    def __post_init__(self) -> None:
+        check_wholes(self, "day", least=1, optional=True)
+        check_texts(self, "operator", "muscle", "electrodes")
+        check_numbers(self, "intensity_pct_rmt", "intensity_pct_mso", above=0, optional=True)
+
+
+@dataclass(frozen=True)
+class VisitProtocol:
+    """How the stimuli of a session follow each other, within its limits.
+
+    What is random depends on the seed and the trial's number alone, so that a resumed session goes on as planned.
+
+    Args:
+        iti_s: shortest and longest interval between two trials [s], drawn evenly for each; None for as soon as the
+            limits allow.
+        tms_alone: share of trials that are a magnetic pulse without a tap.
+        tap_alone: share of trials that are a tap without a magnetic pulse; the device must be able to.
+        block_trials: a rest follows every block of so many trials; None for no rests.
+        rest_s: how long a rest lasts [s].
+
+    Raises:
+        InvalidValueError: an interval whose ends do not ascend, a share outside 0–1, shares that leave no pairs, or a
+            number that is not positive.
+    """
+
+    iti_s: tuple[float, float] | None = None
+    tms_alone: float = 0.0
+    tap_alone: float = 0.0
+    block_trials: int | None = None
+    rest_s: float = 120.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "tms_alone", "tap_alone", least=0, below=1)
+        check_wholes(self, "block_trials", least=1, optional=True)
+        check_numbers(self, "rest_s", above=0)
+        if self.iti_s is not None:
+            object.__setattr__(self, "iti_s", _interval(self.iti_s))
+        if self._share >= 1:
+            raise InvalidValueError(
+                "the control trials leave no pairs of stimuli",
+                got=(self.tms_alone, self.tap_alone),
+                expected="shares of TMS alone and tap alone that are below 1 together",
+            )
+
+    @property
+    def _share(self) -> Fraction:
+        return _exact(self.tms_alone) + _exact(self.tap_alone)
+
+    def rests_before(self, trial: int) -> bool:
+        """Whether a rest comes before this trial."""
+        return self.block_trials is not None and trial > 0 and trial % self.block_trials == 0
+
+    def interval_s(self, trial: int, seed: int) -> float:
+        """How long after the trial before this one comes at the earliest [s].
+
+        Args:
+            trial: its number.
+            seed: the session's.
+        """
+        rest_s = self.rest_s if self.rests_before(trial) else 0.0
+        if self.iti_s is None:
+            return rest_s
+        return max(rest_s, float(_draws(seed, trial, _ITI_DRAWS).uniform(*self.iti_s)))
+
+    def control(self, trial: int, seed: int) -> Control | None:
+        """Which control trial this is; None for a pair of stimuli.
+
+        The trials are cut into stretches with one control each, at a random place, so that controls are spread over the
+        session and nobody can predict them. Their kinds alternate as their shares say.
+
+        Args:
+            trial: its number.
+            seed: the session's.
+        """
+        share = self._share
+        if not share:
+            return None
+        stretch = math.floor(trial * share)
+        first, behind = (math.ceil(number / share) for number in (stretch, stretch + 1))
+        if trial != _draws(seed, stretch, _CONTROL_DRAWS).integers(first, behind):
+            return None
+        before, after = (
+            math.floor(number * _exact(self.tms_alone) / share + Fraction(1, 2)) for number in (stretch, stretch + 1)
+        )
+        return Control.TMS_ALONE if after > before else Control.TAP_ALONE
+
+
+def _draws(seed: int, number: int, kind: int) -> np.random.Generator:
+    return np.random.default_rng([abs(seed), number, kind])
+
+
+def _exact(share: float) -> Fraction:
+    """A share as a fraction, so that no stretch gains or loses a trial by rounding."""
+    return Fraction(share).limit_denominator(_FINEST_SHARE)
+
+
+def _interval(iti_s: object) -> tuple[float, float]:
+    if not isinstance(iti_s, tuple | list) or len(iti_s) != 2:
+        raise InvalidValueError("VisitProtocol.iti_s must be the shortest and the longest interval [s]", got=iti_s)
+    low_s, high_s = (number("VisitProtocol.iti_s", value, least=0) for value in iti_s)
+    if low_s > high_s:
+        raise InvalidValueError("VisitProtocol.iti_s must ascend", got=(low_s, high_s))
+    return low_s, high_s

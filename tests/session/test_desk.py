@@ -1,0 +1,131 @@
+"""What the operator's keys do."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.session.desk import Desk
+from isiw.trials import Status, Trial, TrialTable
+
+
+class Operated:
+    """A session that remembers what was done to it."""
+
+    def __init__(self, *trials: Trial) -> None:
+        self.trials = TrialTable(trials)
+        self.done: list[tuple[object, ...]] = []
+
+    def pause(self, reason: str) -> None:
+        self.done.append(("pause", reason))
+
+    def note(self, text: str) -> None:
+        self.done.append(("note", text))
+
+    def exclude(self, trial: int, reason: str = "") -> None:
+        self.done.append(("exclude", trial, reason))
+
+    def include(self, trial: int) -> None:
+        self.done.append(("include", trial))
+
+    def accept(self, trial: int) -> None:
+        raise InvalidValueError("no MEP was measured", got=trial)
+
+    def reject(self, trial: int) -> None:
+        self.done.append(("reject", trial))
+
+
+def trial(index: int, *, excluded: bool = False) -> Trial:
+    return Trial(index, Status.ACCEPTED, 50.0, isi_ms=50.0, mep_mv=0.1, excluded=excluded)
+
+
+def press(desk: Desk, keys: str) -> None:
+    for key in keys:
+        desk.press(key)
+
+
+@contextmanager
+def shown(desk: Desk, capsys: pytest.CaptureFixture[str]) -> Iterator[list[str]]:
+    lines: list[str] = []
+    with desk.screen:
+        yield lines
+    lines += capsys.readouterr().err.splitlines()
+
+
+def test_each_key_does_what_it_stands_for(capsys: pytest.CaptureFixture[str]) -> None:
+    session = Operated(trial(0), trial(1, excluded=True), trial(2))
+    desk = Desk(session)
+    with shown(desk, capsys) as lines:
+        press(desk, "pxuj")
+    assert session.done == [
+        ("pause", "Paused by the operator."),
+        ("exclude", 2, "Excluded by the operator."),
+        ("include", 1),
+        ("reject", 2),
+    ]
+    assert lines == [
+        "Trial 2 is excluded; u undoes it.",
+        "Trial 1 counts again.",
+        "Trial 2 is rejected and does not count.",
+    ]
+
+
+def test_what_cannot_be_done_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    desk = Desk(Operated(trial(0)))
+    with shown(desk, capsys) as lines:
+        press(desk, "aur")
+        press(Desk(Operated()), "z")
+    assert lines == ["no MEP was measured; got 0", "no trial is excluded", "The session is not paused; p pauses it."]
+
+
+def test_a_note_is_typed_and_its_letters_are_no_commands() -> None:
+    session = Operated(trial(0))
+    press(Desk(session), "nprexy\x7f caf\u00e9\n")
+    assert session.done == [("note", "prex caf\u00e9")]
+
+
+@pytest.mark.parametrize("keys", ["nnever\x1b", "n  \n", "n\x7f\n"])
+def test_a_note_can_be_dropped(keys: str) -> None:
+    session = Operated(trial(0))
+    desk = Desk(session)
+    press(desk, keys)
+    assert session.done == []
+    press(desk, "p")
+    assert session.done == [("pause", "Paused by the operator.")]
+
+
+@pytest.mark.parametrize(("key", "goes_on"), [("r", True), ("q", False)])
+def test_a_pause_lasts_until_it_is_decided(key: str, goes_on: bool) -> None:  # noqa: FBT001
+    desk = Desk(Operated(trial(0)))
+    answers: list[bool] = []
+    paused = threading.Thread(target=lambda: answers.append(desk.goes_on("A break.")))
+    paused.start()
+    while not answers:
+        press(desk, key)
+        paused.join(0.01)
+    assert answers == [goes_on]
+
+
+def test_where_nobody_is_left_a_pause_is_answered_with_no() -> None:
+    desk = Desk(Operated(trial(0)))
+    desk.leave()
+    assert desk.goes_on("A break.") is False
+
+
+def test_a_rest_is_counted_down_by_the_second_and_a_short_wait_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+    desk = Desk(Operated(trial(0)))
+    with shown(desk, capsys) as lines:
+        for left_s in (8.0, 7.0):
+            desk.count_down(left_s, "Next stimulus")
+        desk.counted_down()
+        for left_s in (63.2, 63.0, 62.0, 9.0):
+            desk.count_down(left_s, "Rest after 12 trials")
+        desk.counted_down()
+        desk.screen.say("next")
+    said = [part.replace("\x1b[K", "") for part in "\n".join(lines).replace("\r", "\n").splitlines()]
+    rest = "Rest after 12 trials"
+    assert [part for part in said if part] == [f"{rest}: 1:03 left", f"{rest}: 1:02 left", f"{rest}: 0:09 left", "next"]

@@ -1,0 +1,283 @@
+"""What an operator says about trials: events of the log, learnt at once, kept by a session that was killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeAlias
+
+import pytest
+
+import isiw
+from isiw.devices.limits import Limits
+from isiw.errors import InvalidValueError
+from isiw.log.reader import read_session
+from isiw.log.schema import Estimate, Event, Intent
+from isiw.log.verdicts import LOOKED_AT
+from isiw.report import final_statement
+from isiw.session.loop import Session
+from isiw.session.recorder import open_session
+from isiw.session.resume import exclude, include, resume
+from isiw.session.safeguards import Safeguards
+from isiw.session.updates import SessionUpdate
+from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Sweep
+from scripted import ScriptedDevice, scripted_strategy, told_to
+
+Act: TypeAlias = Callable[[Session], None]
+
+TESTS = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return tmp_path / "s.mcap"
+
+
+def loud_in(*trials: int) -> ScriptedDevice:
+    """A rig whose EMG is too loud in some trials."""
+
+    def answer(stimulus: Stimulus) -> Measurement:
+        loud = 50.0 if stimulus.trial in trials else 1.0
+        return Measurement(0.01 + (stimulus.isi_ms or 0) / 1e4, stimulus.isi_ms, background_rms_uv=loud)
+
+    return ScriptedDevice(answer)
+
+
+def session_that(acts: dict[int, Act], log: Path, rig: ScriptedDevice | None = None, trials: int = 8) -> Session:
+    """A session in which something is done after some trials."""
+
+    def on_trial(update: SessionUpdate) -> None:
+        if update.trial.index in acts:
+            acts[update.trial.index](session)
+
+    session = Session(rig or ScriptedDevice(), scripted_strategy(trials), log=log, on_trial=on_trial)
+    return session
+
+
+def verdicts(log: Path) -> list[tuple[str, int | None, str]]:
+    return [(event.kind, event.trial, event.text) for event in read_session(log).events]
+
+
+def test_an_excluded_trial_is_unlearnt_before_the_next_is_asked_for(log: Path) -> None:
+    session = session_that({4: lambda session: session.exclude(2, "a cough")}, log)
+    result = session.run()
+    assert verdicts(log) == [("exclusion", 2, "a cough")]
+    assert [trial.index for trial in result.trials if trial.excluded] == [2]
+    assert len(told_to(session.strategy)) == len(result.trials) - 1
+    record = read_session(log)
+    strategy = scripted_strategy(8)
+    for trial in result.trials.trials[:5]:
+        if trial.index != 2:
+            strategy.tell(trial.isi_ms, trial.mep_mv)
+    assert strategy.ask() == record.intents[5].isi_ms
+    assert "judged anew" not in final_statement(record)
+
+
+def test_the_estimate_behind_a_verdict_is_without_the_trial(log: Path) -> None:
+    session_that({4: lambda session: session.exclude(2)}, log).run()
+    history = read_session(log).history
+    place = next(place for place, entry in enumerate(history) if isinstance(entry, Event))
+    assert [type(entry) for entry in history[place : place + 3]] == [Event, Estimate, Intent]
+
+
+def test_including_undoes_an_exclusion(log: Path, tmp_path: Path) -> None:
+    undisturbed = Session(ScriptedDevice(), scripted_strategy(8), log=tmp_path / "undisturbed.mcap").run()
+
+    def both(session: Session) -> None:
+        session.exclude(2, "a cough")
+        session.include(2)
+
+    result = session_that({4: both}, log).run()
+    assert result.trials == undisturbed.trials
+    assert [kind for kind, _, _ in verdicts(log)] == ["exclusion", "inclusion"]
+
+
+def test_rejecting_is_an_exclusion_with_its_own_reason_and_accepting_undoes_it(log: Path) -> None:
+    session_that({2: lambda session: session.reject(2), 4: lambda session: session.accept(2)}, log).run()
+    assert verdicts(log) == [("exclusion", 2, LOOKED_AT), ("inclusion", 2, "Included again by the operator.")]
+    assert read_session(log).table[2].told
+
+
+def test_a_mistrial_with_an_mep_can_be_accepted_and_keeps_what_it_was_rejected_for(log: Path) -> None:
+    session = session_that({3: lambda session: session.accept(1)}, log, loud_in(1))
+    result = session.run()
+    trial = result.trials[1]
+    assert (trial.status, trial.overruled) == (Status.ACCEPTED, MistrialReason.BACKGROUND_ACTIVITY)
+    assert told_to(session.strategy)[1] == pytest.approx((trial.isi_ms, trial.mep_mv))
+    assert read_session(log).table == result.trials
+    assert verdicts(log) == [("acceptance", 1, "Accepted by the operator all the same: background activity.")]
+    assert read_session(log).trials["overruled"][1] == "background activity"
+
+
+def test_a_mistrial_without_an_mep_cannot_be_accepted_and_the_message_says_so(log: Path) -> None:
+    def answer(stimulus: Stimulus) -> Measurement | Sweep:
+        lost = stimulus.trial == 2
+        return Sweep({}, t_tms_ms=0.0) if lost else Measurement(0.01 + (stimulus.isi_ms or 0) / 1e4, stimulus.isi_ms)
+
+    def refused(session: Session) -> None:
+        with pytest.raises(InvalidValueError, match=r"no MEP was measured.*missing channel"):
+            session.accept(2)
+
+    session_that({3: refused}, log, ScriptedDevice(answer)).run()
+    assert verdicts(log) == []
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        lambda session: session.exclude(99),
+        lambda session: session.include(0),
+        lambda session: session.accept(0),
+        lambda session: session.reject(99),
+    ],
+)
+def test_what_makes_no_sense_is_refused_and_not_logged(log: Path, act: Act) -> None:
+    def refused(session: Session) -> None:
+        with pytest.raises(InvalidValueError, match=r"no such trial .*expected one that"):
+            act(session)
+
+    session_that({3: refused}, log).run()
+    assert verdicts(log) == []
+
+
+def test_notes_are_events(log: Path) -> None:
+    session_that({1: lambda session: session.note("coil moved back")}, log).run()
+    assert verdicts(log) == [("note", 1, "coil moved back")]
+
+
+def test_without_a_running_session_there_is_nothing_to_note_in(log: Path) -> None:
+    session = Session(ScriptedDevice(), scripted_strategy(2), log=log)
+    for act in (session.note, lambda text: session.exclude(0, text)):
+        with pytest.raises(InvalidValueError, match=r"not running|no such trial"):
+            act("early")
+    session.run()
+    with pytest.raises(InvalidValueError, match="not running"):
+        session.note("late")
+
+
+def test_excluding_what_the_session_wanted_to_end_with_lets_it_go_on(log: Path) -> None:
+    result = session_that({7: lambda session: session.exclude(7, "startled")}, log).run()
+    assert result.decision.stop
+    assert len(result.trials) == 8
+    assert read_session(log).estimates[-1].decision == result.decision
+
+
+def test_while_a_session_waits_another_thread_can_do_all_of_it_and_pause(log: Path) -> None:
+    reasons: list[str] = []
+    waiting = threading.Event()
+
+    class Clock:
+        """Real, but for intervals of which each lasts until the operator has had his way."""
+
+        def __init__(self) -> None:
+            self.time_s, self.naps = 0.0, 0
+
+        def now_s(self) -> float:
+            return self.time_s
+
+        def sleep_s(self, duration_s: float) -> None:
+            if len(session.trials) == 4 and not reasons:
+                waiting.set()
+                done.wait(0.01)
+            else:
+                self.time_s += duration_s
+
+    done = threading.Event()
+
+    def operate() -> None:
+        assert waiting.wait(60)
+        session.note("from elsewhere")
+        session.exclude(1, "from elsewhere")
+        session.include(1)
+        session.reject(3)
+        session.pause("A break.")
+        done.set()
+
+    def on_pause(reason: str) -> bool:
+        reasons.append(reason)
+        return True
+
+    rig = ScriptedDevice(simulated=False)
+    guards = Safeguards(on_pause=on_pause)
+    session = Session(rig, scripted_strategy(8), log=log, clock=Clock(), safeguards=guards)
+    other = threading.Thread(target=operate)
+    other.start()
+    result = session.run()
+    other.join()
+    assert [kind for kind, _, _ in verdicts(log)] == ["note", "exclusion", "inclusion", "exclusion", "pause", "pause"]
+    assert reasons == ["A break."]
+    assert rig.calls.count("stage") == 2
+    assert len(result.trials) == 8
+    assert result.trials[3].excluded
+
+
+KILLED = """
+import os, signal, sys
+sys.path.insert(0, {tests!r})
+from scripted import scripted_strategy
+from test_verdicts import loud_in, session_that
+
+def all_of_it(session):
+    session.note("a remark")
+    session.exclude(0, "a cough")
+    session.reject(2)
+    session.exclude(3, "by mistake")
+    session.include(3)
+    session.accept(1)
+
+session_that({{4: all_of_it, 5: lambda _: os.kill(os.getpid(), signal.SIGKILL)}}, {log!r}, loud_in(1)).run()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+def test_a_killed_and_resumed_session_has_them_all_and_asks_what_it_would_have_asked(log: Path) -> None:
+    folders = os.pathsep.join([str(TESTS), str(TESTS / "session"), *sys.path])
+    script = KILLED.format(tests=str(TESTS), log=str(log))
+    killed = subprocess.run([sys.executable, "-c", script], env=os.environ | {"PYTHONPATH": folders}, check=False)  # noqa: S603
+    assert killed.returncode == -signal.SIGKILL
+    session = resume(log, loud_in(), scripted_strategy(8))
+    assert [trial.index for trial in session.trials if not trial.told] == [0, 2]
+    assert session.trials[1].overruled is MistrialReason.BACKGROUND_ACTIVITY
+    result = session.run()
+    kinds = ["note", "exclusion", "exclusion", "exclusion", "inclusion", "acceptance", "resume"]
+    assert [kind for kind, _, _ in verdicts(log)] == kinds
+    assert resume(log, loud_in(), scripted_strategy(8)).trials == result.trials  # which compares what was asked
+
+
+def test_in_a_log_at_rest_trials_are_excluded_and_included(log: Path) -> None:
+    Session(ScriptedDevice(), scripted_strategy(4), log=log).run()
+    exclude(log, 2, "a cough")
+    assert "judged anew" in final_statement(read_session(log))
+    include(log, 2)
+    assert all(trial.told for trial in read_session(log).table)
+    with pytest.raises(InvalidValueError, match="that is excluded: there is none"):
+        include(log, 2)
+
+
+def test_a_loop_of_ones_own_can_do_all_of_it(log: Path) -> None:
+    limits = Limits.of_space(scripted_strategy().space, min_iti_s=0.0)
+    with open_session(scripted_strategy(9), log, limits=limits) as recorder:
+        for number in range(4):
+            recorder.tell(recorder.ask(), 0.02 + number / 1e3)
+        recorder.exclude(0, "a cough")
+        recorder.reject(1)
+        recorder.include(0)
+        recorder.accept(1)
+        recorder.reject(2)
+        assert [trial.index for trial in recorder.trials if not trial.told] == [2]
+        assert len(told_to(recorder.strategy)) == 3
+        recorder.ask()
+        recorder.mistrial("no impact")
+        with pytest.raises(InvalidValueError, match="no MEP was measured"):
+            recorder.accept(4)
+        recorder.ask()
+    kinds = ["exclusion", "exclusion", "inclusion", "inclusion", "exclusion"]
+    assert [kind for kind, _, _ in verdicts(log)] == kinds
+    assert len(read_session(log).estimates) == 10
+    with isiw.open_session(scripted_strategy(9), log, resume=True) as recorder:
+        assert [trial.told for trial in recorder.trials] == [True, True, False, True, False, False]

@@ -1,0 +1,86 @@
+"""A visit: what is noted about it, and the protocol of its stimuli."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.visit import Control, Visit, VisitProtocol
+
+MIXED = VisitProtocol(tms_alone=0.1, tap_alone=0.05)
+
+
+def controls(protocol: VisitProtocol, seed: int, trials: int = 600) -> dict[int, Control]:
+    drawn = {trial: protocol.control(trial, seed) for trial in range(trials)}
+    return {trial: control for trial, control in drawn.items() if control is not None}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_each_kind_of_control_has_its_share(seed: int) -> None:
+    kinds = list(controls(MIXED, seed).values())
+    assert (kinds.count(Control.TMS_ALONE), kinds.count(Control.TAP_ALONE)) == (60, 30)
+
+
+@pytest.mark.parametrize(("tms", "tap"), [(0.3, 0.0), (0.0, 0.07), (0.5, 0.4), (1 / 3, 1 / 3), (0.001, 0.0)])
+def test_any_shares_are_kept(tms: float, tap: float) -> None:
+    kinds = list(controls(VisitProtocol(tms_alone=tms, tap_alone=tap), 1, 6000).values())
+    assert kinds.count(Control.TMS_ALONE) == pytest.approx(6000 * tms, abs=1)
+    assert kinds.count(Control.TAP_ALONE) == pytest.approx(6000 * tap, abs=1)
+
+
+def test_controls_are_spread_over_the_session_and_come_at_other_places_each_time() -> None:
+    for seed in range(5):
+        places = list(controls(MIXED, seed))
+        assert all(after - before < 2 / 0.15 + 1 for before, after in pairwise(places))
+    gaps = {after - before for before, after in pairwise(controls(MIXED, 0))}
+    assert len(gaps) > 5
+    assert controls(MIXED, 0) != controls(MIXED, 1)
+    assert controls(MIXED, 0) == controls(MIXED, 0)
+
+
+def test_without_shares_there_are_no_controls() -> None:
+    assert controls(VisitProtocol(), 0) == {}
+
+
+def test_intervals_are_drawn_from_their_range_for_each_trial() -> None:
+    protocol = VisitProtocol(iti_s=(5.0, 8.0))
+    drawn = [protocol.interval_s(trial, 3) for trial in range(200)]
+    assert all(5.0 <= interval_s <= 8.0 for interval_s in drawn)
+    assert (min(drawn) < 5.2, max(drawn) > 7.8) == (True, True)
+    assert len(set(drawn)) == 200
+    assert drawn == [protocol.interval_s(trial, 3) for trial in range(200)]
+    assert drawn != [protocol.interval_s(trial, 4) for trial in range(200)]
+
+
+def test_a_rest_comes_after_each_block_and_never_first() -> None:
+    protocol = VisitProtocol(iti_s=(5.0, 8.0), block_trials=12, rest_s=120.0)
+    rests = [trial for trial in range(40) if protocol.interval_s(trial, 0) == 120.0]
+    assert rests == [12, 24, 36] == [trial for trial in range(40) if protocol.rests_before(trial)]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"iti_s": (8.0, 5.0)},
+        {"iti_s": (5.0,)},
+        {"iti_s": 5.0},
+        {"iti_s": (-1.0, 5.0)},
+        {"tms_alone": 1.0},
+        {"tms_alone": 0.5, "tap_alone": 0.5},
+        {"tap_alone": -0.1},
+        {"block_trials": 0},
+        {"rest_s": 0.0},
+    ],
+)
+def test_a_protocol_that_makes_no_sense_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InvalidValueError, match=r"VisitProtocol|leave no pairs"):
+        VisitProtocol(**wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"day": 0}, {"operator": 7}, {"intensity_pct_rmt": 0.0}, {"muscle": None}])
+def test_a_note_of_the_wrong_kind_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InvalidValueError, match=r"Visit\."):
+        Visit(**wrong)
