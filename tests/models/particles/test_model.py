@@ -272,6 +272,15 @@ def test_systematic_picks_are_as_frequent_as_their_weights() -> None:
     torch.testing.assert_close(torch.bincount(picks[0]) / 1000, weights[0], rtol=0, atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("trials", "resampled", "sweeps"), [(1, False, 6), (10, False, 5), (60, False, 2), (200, False, 1), (240, False, 1),
+                                        (300, False, 1), (301, False, 0), (301, True, 1), (2000, False, 0)],
+)  # fmt: skip
+def test_a_long_history_is_swept_now_and_then(trials: int, *, resampled: bool, sweeps: int) -> None:
+    assert Moving().sweeps_after(trials, resampled=resampled) == sweeps
+    assert Moving(sweeps=0).sweeps_after(trials, resampled=resampled) == 0
+
+
 def test_people_of_its_own_have_windows_as_often_as_believed_and_meps_of_their_own() -> None:
     # A small excess does not count as a window, so that a few less have one than believed.
     model = ParticleModel()

@@ -126,7 +126,7 @@ class ProfilePrior:
     """
 
     p_window: float = 0.72
-    shapes: ShapeShares = field(default_factory=ShapeShares)
+    shapes: ShapeShares = field(default_factory=ShapeShares, metadata={"shares": True})
     start: StartPrior = field(default_factory=StartPrior)
     widths: tuple[Width, ...] = (Width(0.7, Scale(100.0, 0.42)), Width(0.3, Scale(170.0, 0.5)))
     places: tuple[Place, ...] = ()

@@ -43,7 +43,8 @@ class Moving:
     Args:
         sweeps: sweeps of Markov chain moves after each trial; up to three times as many among the first 25, whose
             history is short and tells apart the particles most.
-        max_trial_sweeps: sweeps times trials are at most this many, so that a tell stays fast late in a session.
+        max_trial_sweeps: sweeps times trials are at most this many, so that a tell stays fast late in a session; where
+            there are more trials, one sweep follows every second, third or later one, and each resampling.
         min_ess: effective sample size, as a share of the particles, below which they are resampled.
 
     Raises:
@@ -58,8 +59,15 @@ class Moving:
         check_wholes(self, "sweeps", "max_trial_sweeps", least=0)
         check_probabilities(self, "min_ess")
 
-    def sweeps_after(self, trials: int) -> int:
-        """How many sweeps follow a trial: more where the history is short, fewer where it has become long."""
+    def sweeps_after(self, trials: int, *, resampled: bool = True) -> int:
+        """How many sweeps follow a trial: more where the history is short, fewer where it has become long.
+
+        Args:
+            trials: how long the history is.
+            resampled: whether particles were resampled, so that some are alike.
+        """
+        if 0 < self.max_trial_sweeps < trials and self.sweeps:
+            return int(resampled or trials % math.ceil(2 * trials / self.max_trial_sweeps) == 0)
         early = min(3.0, max(1.0, 25 / max(1, trials)))
         return min(int(self.sweeps * early), max(1, self.max_trial_sweeps // max(1, trials)))
 
@@ -124,9 +132,11 @@ class ParticleModel:
         after = self.reweighted(posterior, observation)
         generator = step_generator(self.device, posterior.seed, after.trials)
         ess = ess_share(after.log_weights)
-        after = self._resampled(after, ess, generator)
+        worn = ess < self.moves.min_ess
+        after = self._resampled(after, worn, generator)
         mover = Mover(self.prior, posterior.space, after.history, generator)
-        moved = mover.sweeps(self.moves.sweeps_after(after.trials), after.latents, after.log_likelihood)
+        sweeps = self.moves.sweeps_after(after.trials, resampled=bool(worn.any()))
+        moved = mover.sweeps(sweeps, after.latents, after.log_likelihood)
         health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))
         return replace(after, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
 
@@ -160,13 +170,13 @@ class ParticleModel:
             history=posterior.history.appended(trial),
         )
 
-    def _resampled(self, posterior: ParticlePosterior, ess: Tensor, generator: torch.Generator) -> ParticlePosterior:
-        """Resample those people whose effective sample size has fallen; nobody else notices."""
+    def _resampled(self, posterior: ParticlePosterior, worn: Tensor, generator: torch.Generator) -> ParticlePosterior:
+        """Resample those people whose effective sample size has fallen (b,); nobody else notices."""
         # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
         shuffled = torch.randperm(self.particles, generator=generator, device=generator.device)
-        worn = (ess < self.moves.min_ess).unsqueeze(-1)
         if not bool(worn.any()):
             return posterior
+        worn = worn.unsqueeze(-1)
         kept = torch.arange(self.particles, device=shuffled.device)
         picks = torch.where(worn, systematic(posterior.log_weights, self.particles)[:, shuffled], kept)
         return replace(

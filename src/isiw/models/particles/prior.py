@@ -73,7 +73,7 @@ class Prior:
     """
 
     profile: ProfilePrior = field(default_factory=ProfilePrior)
-    noise: NoiseShares = field(default_factory=NoiseShares)
+    noise: NoiseShares = field(default_factory=NoiseShares, metadata={"shares": True})
     gains: tuple[Gain, ...] = (
         Gain(0.85, Scale(7.3, 0.62), Scale(0.62, 0.26)),
         Gain(0.15, Scale(9.0, 1.2), Scale(0.62, 0.45)),

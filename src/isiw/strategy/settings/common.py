@@ -259,16 +259,22 @@ def _converted(setting: Setting, value: Any, source: str) -> Any:
         )
     if kind is None or not isinstance(value, Mapping):
         return value.item() if isinstance(value, np.generic) else value
-    default = {} if setting.default is None else asdict(setting.default)
-    return checked(kind, _merged(default, value), source)
+    return checked(kind, value if setting.default is None else _merged(setting.default, value), source)
 
 
-def _merged(default: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """The default, with what is given in its place, nested values merged in the same way."""
-    merged = dict(default)
+def _merged(default: Any, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The default's fields, with what is given in their place, nested ones merged in the same way.
+
+    Of shares what is not named is 0: they sum to 1 in a log of a version that did not know all of today's kinds.
+    """
+    merged, inner = asdict(default), {f.name: getattr(default, f.name) for f in fields(default)}
+    shares = {f.name for f in fields(default) if f.metadata.get("shares")}
     for key, value in given.items():
-        inner = default.get(key)
-        merged[key] = _merged(inner, value) if isinstance(inner, Mapping) and isinstance(value, Mapping) else value
+        nested = isinstance(value, Mapping) and is_dataclass(inner.get(key))
+        if nested and key in shares:
+            merged[key] = dict.fromkeys(merged[key], 0.0) | dict(value)
+        else:
+            merged[key] = _merged(inner[key], value) if nested else value
     return merged
 
 
