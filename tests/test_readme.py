@@ -5,10 +5,14 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from benchmarks.readme_results import table
+from typer.main import get_command
 
+import isiw
+from isiw.cli.main import app
 from isiw.config.run import load_config
 
 ROOT = Path(__file__).parents[1]
@@ -64,6 +68,22 @@ def test_the_configuration_is_valid(tmp_path: Path) -> None:
     (tmp_path / "session.toml").write_text(block)
     config = load_config(tmp_path / "session.toml")
     assert config.strategy.settings["max_trials"] == tomllib.loads(block)["strategy"]["settings"]["max_trials"]
+
+
+def test_every_strategy_is_in_the_table() -> None:
+    rows = "".join(line for line in TEXT.splitlines() if line.startswith("| `"))
+    assert [name for name in isiw.list_strategies() if f"`{name}`" not in rows] == []
+
+
+def command_names(group: Any) -> list[str]:
+    parts = {name: getattr(inner, "commands", {}) for name, inner in group.commands.items()}
+    return [f"isiw {name} {part}".strip() for name, inner in parts.items() for part in inner or [""]]
+
+
+def test_every_command_is_shown() -> None:
+    names = command_names(get_command(app))
+    assert {"isiw run", "isiw new rig"} <= set(names)
+    assert [name for name in names if name not in TEXT] == []
 
 
 def test_one_command_sets_up_one_spares_the_gpu_libraries_and_one_tests() -> None:
