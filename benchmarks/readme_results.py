@@ -25,15 +25,15 @@ GUESS = "guess without any trial"
 
 def f1_by_trial(cohort: str) -> pd.DataFrame:
     """Mean F1 after each marked trial (rows) of each method (columns)."""
-    default = _table("people_stated.json", "By trial").assign(strategy="default")
-    oracle = _table(f"acquisition_{cohort}.json").query("strategy == 'oracle'")
+    default = _table("people.json", "By trial").assign(strategy="default")
+    oracle = default.assign(strategy="oracle", f1=default["f1"] + default["behind_oracle"])
     others = _table("acquisition.json").query("strategy == 'gpr'")
-    rows = pd.concat([default, oracle, others]).query("cohort == @cohort")
-    return rows.pivot_table(index="trial", columns="strategy", values="f1")[list(METHODS)]
+    rows = pd.concat([default, oracle, others])
+    return rows[rows["cohort"] == cohort].pivot_table(index="trial", columns="strategy", values="f1")[list(METHODS)]
 
 
 def guess(cohort: str) -> float:
-    """Mean F1 of the best fixed window."""
+    """Mean F1 of the best fixed window on 1,000 people."""
     text = (RESULTS / "zero_trials.md").read_text(encoding="utf-8")
     (value,) = re.findall(rf"^\| {cohort} +\| +[\d.]+ \| +([\d.]+) \|", text, re.MULTILINE)
     return float(value)

@@ -63,7 +63,7 @@ class Soaked:
         self.device = FaultyDevice(
             isiw.CallbackDevice(answer, info), seed, self.clock, rate=rate, late_s=0.3, on_fire=self.check_intent
         )
-        self.runs = 0
+        self.runs, self.stopped = 0, False
         self.name = NAMED.get(seed % 40, "")
 
     def check_intent(self, stimulus: isiw.Stimulus) -> None:
@@ -79,7 +79,7 @@ class Soaked:
             if self.runs > MOST_RUNS:
                 sys.exit(f"session {self.seed} does not end")
             try:
-                self.session().run()
+                self.stopped = self.session().run().decision.stop
             except (isiw.errors.IsiwError, TypeError, ValueError):
                 pass  # what the device did; the log must stand it
             finally:
@@ -89,8 +89,8 @@ class Soaked:
         return isiw.read_session(self.log)
 
     def ended(self) -> bool:
-        """Whether all stimuli are used up."""
-        return self.log.exists() and len(isiw.read_session(self.log).table) >= self.trials
+        """Whether the strategy has stopped, or all stimuli are used up."""
+        return self.stopped or self.log.exists() and len(isiw.read_session(self.log).table) >= self.trials
 
     def strategy(self) -> isiw.Strategy:
         """Its strategy, before the first trial."""
@@ -113,7 +113,7 @@ class Soaked:
 def _to_the_end(name: str, trials: int) -> dict[str, float]:
     """Settings with which a named strategy does not stop before all stimuli are used up."""
     if name == "nr":
-        return {"max_iterations": trials, "stop_last": 1000}  # the limit on pulses ends it
+        return {"max_trials": 2 * trials, "stop_last": 1000}  # the limit on pulses ends it
     small = {} if name == "default" else {"particles": 100}
     never = {"stop_width_ms": 1e-6, "stop_expected_f1": 1, "stop_gain": 0, "stop_no_window": 1}
     return {"max_trials": trials, **never, **small}

@@ -229,7 +229,7 @@ def test_a_name_of_another_type_is_unknown(name: str) -> None:
 
 @pytest.mark.parametrize("space", [None, "valve", (0, 500)])
 def test_what_is_no_design_space_is_refused(space: DesignSpace) -> None:
-    with pytest.raises(InvalidValueError, match=r"needs a design space.*isiw.DesignSpace"):
+    with pytest.raises(InvalidValueError, match=r"a design space is needed.*isiw.DesignSpace"):
         make_strategy("incremental", space)
 
 

@@ -123,7 +123,7 @@ class CredibleWidth:
         # An edge that lies beyond the range for certain is an answer: its interval has no width.
         widths = [0.0 if low == high else high - low for low, high in intervals]
         known = (progress.estimate.probability or 0.0) >= self.min_probability and max(widths) <= self.width_ms
-        spans = f"the {self.level:.0%} intervals of start and end span {widths[0]:.0f} and {widths[1]:.0f} ms"
+        spans = f"the {100 * self.level:.0f} % intervals of start and end span {widths[0]:.0f} and {widths[1]:.0f} ms"
         if progress.estimate.hypotheses is not None:
             spans += " under every likely hypothesis"
         if known:

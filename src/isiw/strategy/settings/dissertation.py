@@ -65,6 +65,10 @@ class OwnPlan:
         return ()
 
 
+ITERATIONS = 99
+"""After so many stimuli beyond the initial ones a regression gives up (4.3)."""
+
+
 @dataclass(frozen=True)
 class Settling:
     """When the dissertation's regressions stop (4.3).
@@ -74,6 +78,7 @@ class Settling:
         stop_last: how many values,
         stop_edges: and of which edges: "both" (the text), or "either" (the pseudo-code).
         max_trials: stop after this many stimuli, the initial ones among them; mistrials count, control trials do not.
+            By default 99 more than the initial ones (4.3).
 
     Raises:
         InvalidValueError: an invalid number, or an unknown value of the edges.
@@ -82,18 +87,18 @@ class Settling:
     stop_variance_ms2: float = 50.0
     stop_last: int = 5
     stop_edges: Literal["both", "either"] = "both"
-    max_trials: int = 106
+    max_trials: int | None = None
 
     def __post_init__(self) -> None:
         check_numbers(self, "stop_variance_ms2", above=0)
         check_wholes(self, "stop_last", least=2)
         check_choice(self, "stop_edges", ("both", "either"))
-        check_wholes(self, "max_trials", least=1)
+        check_wholes(self, "max_trials", least=1, optional=True)
 
-    def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - the budget counts from the first stimulus
+    def rule(self, initial: int) -> StoppingRule:
         """The edges have settled, or the budget is used up."""
         settled = EdgeVariance(self.stop_variance_ms2, self.stop_last, self.stop_edges)
-        return AnyOf((settled, Budget(self.max_trials)))
+        return AnyOf((settled, Budget(initial + ITERATIONS if self.max_trials is None else self.max_trials)))
 
 
 @dataclass(frozen=True)
