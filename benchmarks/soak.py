@@ -90,7 +90,7 @@ class Soaked:
 
     def ended(self) -> bool:
         """Whether the strategy has stopped, or all stimuli are used up."""
-        return self.stopped or self.log.exists() and len(isiw.read_session(self.log).table) >= self.trials
+        return self.stopped or (self.log.exists() and len(isiw.read_session(self.log).table) >= self.trials)
 
     def strategy(self) -> isiw.Strategy:
         """Its strategy, before the first trial."""
