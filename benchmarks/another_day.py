@@ -16,12 +16,12 @@ from typing import Annotated
 import pandas as pd
 import torch
 import typer
-from rich.progress import Progress
 
 import isiw
-from earlier import logged_session
+from acquisition import facts_of
+from earlier import logged_session, measured, write
 from isiw.models.particles.prior import Prior
-from isiw.studies import Failure, Processes, SimulatedSession, simulate
+from isiw.studies import SimulatedSession, simulate
 from isiw.subjects import cohort
 
 MARKS = (1, 5, 10, 20, 25, 40)
@@ -84,18 +84,9 @@ def main(
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("another_day"),
 ) -> None:
     """Measure the same people on another day."""
-    units, tables = [Unit(person, seed, earlier_trials, trials) for person in range(people)], []
-    with Progress() as progress:
-        bar = progress.add_task("people", total=people)
-        for _, result in Processes(workers).results(examine, units):
-            if isinstance(result, Failure):
-                raise SystemExit(f"a person failed: {result.error}\n{result.details}")
-            tables.append(result)
-            pd.concat(tables).to_csv(out.with_suffix(".csv"), index=False)
-            progress.advance(bar)
-    text = summary(pd.concat(tables)).to_string(index=False, float_format="{:.3f}".format)
-    out.with_suffix(".txt").write_text(f"{text}\n")
-    print(text)
+    units = [Unit(person, seed, earlier_trials, trials) for person in range(people)]
+    rows = measured(examine, units, workers, out)
+    write(summary(rows), facts_of("benchmarks/another_day.py", seed, people), out)
 
 
 if __name__ == "__main__":

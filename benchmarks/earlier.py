@@ -1,11 +1,17 @@
-"""Sessions that were run earlier, logged as a lab has them: what `isiw.priors` learns from."""
+"""What benchmarks of priors share: sessions that were run earlier, as a lab has them, and units that are measured."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich.progress import Progress
 
 import isiw
+from isiw.studies import Failure, Processes
 from isiw.subjects import SimulatedSubject
 
 
@@ -24,3 +30,38 @@ def logged_session(subject: SimulatedSubject, name: str, seed: int, trials: int,
     never = {"stop_width_ms": 1e-3, "stop_no_window": 1.0, "stop_expected_f1": 1.0, "stop_gain": 0.0}
     strategy = isiw.make_strategy(seed=seed, max_trials=trials, **never)
     return isiw.Session(device, strategy, log=folder / f"{name}.mcap", subject=name).run().log
+
+
+def measured(examine: Callable[[Any], pd.DataFrame], units: Sequence[Any], workers: int, out: Path) -> pd.DataFrame:
+    """All rows of some units, kept beside the result as they come; it ends with the first unit that fails.
+
+    Args:
+        examine: the rows of one unit.
+        units: what is measured.
+        workers: how many processes.
+        out: path of the result, without suffix.
+    """
+    tables = []
+    with Progress() as progress:
+        bar = progress.add_task(out.name, total=len(units))
+        for _, result in Processes(workers).results(examine, units):
+            if isinstance(result, Failure):
+                raise SystemExit(f"a unit failed: {result.error}\n{result.details}")
+            tables.append(result)
+            pd.concat(tables).to_csv(out.with_suffix(".csv"), index=False)
+            progress.advance(bar)
+    return pd.concat(tables)
+
+
+def write(table: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
+    """A table under what made it, as Markdown.
+
+    Args:
+        table: the table.
+        facts: command, versions, seed and how many there were.
+        out: path of the result, without suffix.
+    """
+    header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
+    text = f"{header}\n\n{table.to_markdown(index=False, floatfmt='.3f')}\n"
+    out.with_suffix(".md").write_text(text, encoding="utf-8")
+    print(text)

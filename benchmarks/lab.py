@@ -18,16 +18,16 @@ from typing import Annotated
 import pandas as pd
 import torch
 import typer
-from rich.progress import Progress
 
 import isiw
-from earlier import logged_session
+from acquisition import facts_of
+from earlier import logged_session, measured, write
 from isiw.models.particles.laws import Floor, Muscle, NoiseShares, ShapeShares
 from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
 from isiw.models.shared.scales import Scale
 from isiw.priors import LabPrior
-from isiw.studies import Failure, Processes, SimulatedSession, simulate
+from isiw.studies import SimulatedSession, simulate
 from isiw.subjects import LABS, Lab, cohort, lab
 
 MARKS = (1, 5, 10, 20, 40)
@@ -125,18 +125,8 @@ def main(
     """Measure the eleventh person of a lab."""
     seeds = range(seed, seed + 100 * labs, 100)  # people have seeds of their own
     units = [Unit(kind, s, people, misfits, trials) for kind in kinds.split(",") for s in seeds]
-    tables = []
-    with Progress() as progress:
-        bar = progress.add_task("labs", total=len(units))
-        for _, result in Processes(workers).results(examine, units):
-            if isinstance(result, Failure):
-                raise SystemExit(f"a lab failed: {result.error}\n{result.details}")
-            tables.append(result)
-            pd.concat(tables).to_csv(out.with_suffix(".csv"), index=False)
-            progress.advance(bar)
-    text = summary(pd.concat(tables)).to_string(index=False, float_format="{:.3f}".format)
-    out.with_suffix(".txt").write_text(f"{text}\n")
-    print(text)
+    rows = measured(examine, units, workers, out)
+    write(summary(rows), facts_of("benchmarks/lab.py", seed, people), out)
 
 
 if __name__ == "__main__":

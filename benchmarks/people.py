@@ -1,6 +1,6 @@
 """The default on people whom its prior was written for, and on people off the map.
 
-    python benchmarks/people.py --cohorts recruitment,gaussian --hit-delay stated --out benchmarks/results/people_stated
+    python benchmarks/people.py --cohorts recruitment,gaussian,late --hit-delay stated --out benchmarks/results/people
 
 writes tables (Markdown) and their figures with versions, command and seeds (JSON): F1 and coverage by trial, what the
 stopping rule comes to, and how well the expected F1 foretells the actual one. Sessions are kept in a folder beside the
