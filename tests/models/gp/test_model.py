@@ -257,7 +257,7 @@ def coverage(people: int, trials: int, strategy: str = "gp-straddle", **settings
     return rows["start_covered"].mean(), rows["end_covered"].mean()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_intervals_of_the_edges_hold_them_after_thirty_random_trials() -> None:
     # 40 people, so 80 edges: 0.80 of them, less two standard errors where 0.80 were the truth.
     assert np.mean(coverage(40, 30, acquisition="random")) > 0.71
