@@ -273,7 +273,7 @@ def test_systematic_picks_are_as_frequent_as_their_weights() -> None:
 
 
 @pytest.mark.parametrize(
-    ("trials", "resampled", "sweeps"), [(1, False, 6), (10, False, 5), (60, False, 2), (200, False, 1), (240, False, 1),
+    ("trials", "resampled", "sweeps"), [(1, False, 8), (10, False, 5), (60, False, 2), (200, False, 1), (240, False, 1),
                                         (300, False, 1), (301, False, 0), (301, True, 1), (2000, False, 0)],
 )  # fmt: skip
 def test_a_long_history_is_swept_now_and_then(trials: int, *, resampled: bool, sweeps: int) -> None:

@@ -41,7 +41,7 @@ class Moving:
     """How often particles move, and when they are resampled.
 
     Args:
-        sweeps: sweeps of Markov chain moves after each trial; up to three times as many among the first 25, whose
+        sweeps: sweeps of Markov chain moves after each trial; up to four times as many among the first 25, whose
             history is short and tells apart the particles most.
         max_trial_sweeps: sweeps times trials are at most this many, so that a tell stays fast late in a session; where
             there are more trials, one sweep follows every second, third or later one, and each resampling.
@@ -68,7 +68,7 @@ class Moving:
         """
         if 0 < self.max_trial_sweeps < trials and self.sweeps:
             return int(resampled or trials % math.ceil(2 * trials / self.max_trial_sweeps) == 0)
-        early = min(3.0, max(1.0, 25 / max(1, trials)))
+        early = min(4.0, max(1.0, 25 / max(1, trials)))
         return min(int(self.sweeps * early), max(1, self.max_trial_sweeps // max(1, trials)))
 
 
