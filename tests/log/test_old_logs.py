@@ -24,7 +24,7 @@ DIGESTS = {
     "06ce820-default.mcap": "5f90af0009d8aed690ed1dab4200fc1cf24f86c5e1a9d3fef4f42d68bfe69964",
     "06ce820-killed.mcap.part": "feeb16e3a3b786f7e8959772295c129d5588e80f008121ea5318972c4fd02a92",
     "217a22d-default.mcap": "c2701192d0ac1669704b44815de8f0f1474758d402a5bd90c4562f74f108ef26",
-    "6502653-visit.mcap": "d860b8e4244ad7e2c3bcf32122f524937ee671474d4a7db1979c39c54d645267",
+    "adc1fc6-visit.mcap": "ecc7ccbdf46f4e3b4019e8f92abeb3dda88f8842ff461e4ac4df28c0f1a97e6c",
     "e31d040-default.mcap": "83587e93485c31eb5620952acd995a7a39f71615834c76714506633e3644f3c5",
     "e31d040-killed.mcap.part": "7554daa23acf26ecbff3cb96996ea3411159702cdee6656bc2e70cfa66adf254",
     "e31d040-nr.mcap": "9d815ce87a32f76f4a4bf706e352e8c2a3adea78f279f141fe969a914e067ea1",
@@ -36,7 +36,7 @@ DIGESTS = {
     "f2fd174-killed.mcap.part": "a793ea096e05c2346da3909bcd782a13c6ee70c38c745799f1d11689b5f3113c",
 }
 
-SCHEMA_VERSIONS = {"f0fbfc8": 3, "6502653": 4}
+SCHEMA_VERSIONS = {"f0fbfc8": 3, "adc1fc6": 4}
 
 
 def log_of(name: str) -> str:
@@ -115,7 +115,7 @@ def test_the_recorded_waveforms_are_there() -> None:
 
 
 def test_shares_of_a_kind_that_the_log_does_not_name_are_none() -> None:
-    header = isiw.read_session(FOLDER / "6502653-visit.mcap").header
+    header = isiw.read_session(FOLDER / "adc1fc6-visit.mcap").header
     prior = dict(header.strategy.settings["prior"])
     shares = {name: share for name, share in prior["noise"].items() if name != "all_or_none"}
     prior["noise"] = shares | {"missing": shares["missing"] + 1.0 - sum(shares.values())}
