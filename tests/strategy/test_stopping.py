@@ -130,6 +130,12 @@ def test_stimuli_that_added_little_are_the_last(first: float, told: int, probabi
     assert f"added {0.8 - first:.2f}" in decision.reason
 
 
+def test_a_gain_of_zero_lets_a_session_go_on_also_where_the_expected_f1_falls() -> None:
+    falling = expecting(*np.linspace(0.9, 0.8, 11).tolist())
+    assert SmallGain(0.001)(falling).stop
+    assert not SmallGain(0.0)(falling).stop
+
+
 def test_before_ten_stimuli_nothing_is_known_of_what_ten_add() -> None:
     assert not SmallGain(0.02)(expecting(*[0.8] * 10)).stop
     assert looks_back(AnyOf((SmallGain(), Budget(3)))) == 11

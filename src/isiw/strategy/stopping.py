@@ -191,7 +191,7 @@ class SmallGain:
     """Stop when another few stimuli would hardly add anything: returns diminish, so the last few tell what they would.
 
     Args:
-        gain: what the last stimuli must have added to the expected F1 for the session to go on.
+        gain: what the last stimuli must have added to the expected F1 for the session to go on; 0 for any, also a loss.
         last: how many stimuli.
         min_told: the fewest trials to stop after.
         min_probability: the least probability of a window.
@@ -216,7 +216,7 @@ class SmallGain:
         if now.expected_f1 is None or now.probability is None or before is None:
             return StopDecision(stop=False, reason=f"What {self.last} stimuli add is not known yet.")
         added = f"the last {self.last} stimuli added {now.expected_f1 - before:.2f} to the expected F1"
-        small = now.expected_f1 - before < self.gain and now.probability >= self.min_probability
+        small = self.gain > 0 and now.expected_f1 - before < self.gain and now.probability >= self.min_probability
         if small and progress.told >= self.min_told:
             reason = f"Another {self.last} stimuli would add little: {added}, now {now.expected_f1:.2f}."
             return StopDecision(stop=True, reason=reason)
