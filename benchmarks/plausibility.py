@@ -1,15 +1,18 @@
 """Slips of unit and order are refused or flagged, right data never: `python -m benchmarks.plausibility`.
 
 Simulated people are asked by the default strategy, and what they answer is told to it: with a slip, for four trials,
-and as it is, for a whole session. A refusal is an error, a flag is a warning; see `isiw.Strategy.tell`.
+and as it is, for a whole session. Besides, the tapping robot runs sessions in which nothing is wrong. A refusal is an
+error, a flag is a warning; see `isiw.Strategy.tell`.
 """
 
 from __future__ import annotations
 
 import argparse
+import tempfile
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -18,7 +21,9 @@ from isiw.errors import ImplausibleDataWarning, InvalidValueError
 
 RESULTS = Path(__file__).parent / "results" / "plausibility.md"
 SEED = 10_000
+RIG: Final = isiw.TapperSettings(accelerometer=True, rate_hz=3000.0)
 IN_TIME = 4
+RIG_SESSIONS, RIG_TRIALS = 200, 12
 
 Slip = Callable[[float, float], tuple[float, float]]
 
@@ -107,6 +112,27 @@ def right(people: int, trials: int, particles: int | None = None) -> dict[str, l
     }
 
 
+def right_rig(sessions: int, trials: int) -> int:
+    """How many sessions with the tapping robot, raw sweeps and all, are paused or doubted although nothing is wrong.
+
+    Args:
+        sessions: how many, each with another person.
+        trials: how many trials each.
+    """
+    space = isiw.DesignSpace(0, 320, reference="impact")
+    people = isiw.subjects.cohort("gaussian", sessions, SEED)
+    accused = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for number, person in enumerate(people):
+            respond = partial(person.begin(number).respond, reference="impact")
+            device = isiw.SimulatedDevice(isiw.Tapper(respond, "subject1", RIG, seed=number))
+            strategy = isiw.make_strategy("default", space, seed=number, particles=200, max_trials=trials)
+            result = isiw.Session(device, strategy, log=Path(folder) / f"{number}.mcap").run(progress=False)
+            kinds = {event.kind for event in isiw.read_session(result.log).events}
+            accused += not result.decision.stop or bool(kinds & {"pause", "doubt"})
+    return accused
+
+
 def report(slipped: Mapping[str, list[Told]], as_it_is: Mapping[str, list[Told]], trials: int, command: str) -> str:
     """The tables as Markdown.
 
@@ -138,7 +164,9 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=40, help="trials of each session of right data")
     given = parser.parse_args()
     command = f"python -m benchmarks.plausibility --people {given.people} --trials {given.trials}"
-    text = report(slips(12), right(given.people, given.trials), given.trials, command)
+    accused = right_rig(RIG_SESSIONS, RIG_TRIALS)
+    rigs = f"The right robot, {RIG_TRIALS} trials with raw sweeps: paused or doubted in {accused} of {RIG_SESSIONS}.\n"
+    text = "\n".join((report(slips(12), right(given.people, given.trials), given.trials, command), rigs))
     RESULTS.write_text(text, encoding="utf-8")
     print(text)
 

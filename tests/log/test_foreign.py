@@ -14,7 +14,8 @@ from mcap.writer import CompressionType, Writer
 from isiw.design import DesignSpace
 from isiw.errors import LogError
 from isiw.log.reader import MOST_LOSSES, SessionRecord, read_session
-from isiw.log.schema import CHANNEL_IDS, MOST_TRIALS, encode
+from isiw.log.schema import MOST_TRIALS
+from isiw.log.topics import CHANNEL_IDS, encode
 from isiw.report import final_statement
 
 ALLOWED_S = 2.0

@@ -7,19 +7,8 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.log.schema import (
-    CHANNEL_IDS,
-    Estimate,
-    Event,
-    Header,
-    Intent,
-    Record,
-    Waveform,
-    decode,
-    encode,
-    json_schema,
-    topic_of,
-)
+from isiw.log.schema import Estimate, Event, Header, Intent, Record, Waveform
+from isiw.log.topics import CHANNEL_IDS, decode, encode, json_schema, topic_of
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, MistrialReason, Status, Trial
 from isiw.window import Window, WindowEstimate

@@ -18,7 +18,8 @@ from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, LogError, StrategyError
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Intent, StrategyRecipe, decode
+from isiw.log.schema import Event, Intent, StrategyRecipe
+from isiw.log.topics import decode
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session
 from isiw.session.resume import exclude, resume

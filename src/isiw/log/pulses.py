@@ -9,7 +9,8 @@ from isiw.errors import DamagedLogError, LogError
 from isiw.log.durable import log_of
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import Message, Salvage, salvage
-from isiw.log.schema import Event, Intent, Record, decode
+from isiw.log.schema import Event, Intent, Record
+from isiw.log.topics import decode
 from isiw.trials import Trial
 
 __all__ = ["earlier_pulses_s", "pulses_s"]

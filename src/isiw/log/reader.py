@@ -14,7 +14,8 @@ from pydantic import ValidationError
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.salvage import Message, Salvage, salvage
-from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Estimate, Event, Header, Intent, Record, Waveform, decode
+from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Estimate, Event, Header, Intent, Record, Waveform
+from isiw.log.topics import decode
 from isiw.log.verdicts import under_all
 from isiw.log.writer import CONFIGURATION
 from isiw.strategy.stopping import StopDecision

@@ -19,7 +19,7 @@ from isiw.errors import DamagedLogError, LogError
 from isiw.log.blocks import UNREADABLE, LostBlockError, Unpacking, marked
 from isiw.log.durable import Fingerprint, disk_errors, log_of, part_of
 from isiw.log.index import RECORD_HEAD_BYTES, counted_records
-from isiw.log.schema import ANNOUNCEMENT, CHANNEL_IDS
+from isiw.log.topics import ANNOUNCEMENT, CHANNEL_IDS
 
 __all__ = ["Message", "Salvage", "current_file", "holds", "salvage", "salvage_file"]
 

@@ -13,20 +13,15 @@ JSON knows no infinity: where a number is not finite it is one of the strings "I
 from __future__ import annotations
 
 import itertools
-import json
 from collections.abc import Mapping
-from functools import cache
-from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, WithJsonSchema
-from pydantic_core import PydanticSerializationError
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
-from isiw.errors import InvalidValueError, told
 from isiw.signals.judgement import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, Trial
@@ -35,8 +30,6 @@ from isiw.visit import Visit, VisitProtocol
 from isiw.window import Window, WindowEstimate, finding
 
 __all__ = [
-    "ANNOUNCEMENT",
-    "CHANNEL_IDS",
     "MOST_TRIALS",
     "SCHEMA_VERSION",
     "Estimate",
@@ -47,12 +40,6 @@ __all__ = [
     "Record",
     "StrategyRecipe",
     "Waveform",
-    "adapter",
-    "announcement",
-    "decode",
-    "encode",
-    "json_schema",
-    "topic_of",
 ]
 
 SCHEMA_VERSION = 4
@@ -284,128 +271,3 @@ class Event(_Record):
 
 
 Record: TypeAlias = Header | Intent | Trial | Waveform | Estimate | Event
-
-_KINDS: dict[str, type[Any]] = {
-    "/header": Header,
-    "/intent": Intent,
-    "/trial": Trial,
-    "/estimate": Estimate,
-    "/event": Event,
-}
-_TOPIC_OF_KIND = {kind: topic for topic, kind in _KINDS.items()}
-
-CHANNEL_IDS: Final[Mapping[str, int]] = MappingProxyType(
-    {
-        "/header": 1,
-        "/intent": 2,
-        "/trial": 3,
-        "/estimate": 4,
-        "/event": 5,
-        "/emg": 6,
-        "/acceleration": 7,
-        "/pressure": 8,
-        "/force": 9,
-        "/valve": 10,
-    }
-)
-"""The channel numbers of the topics that every log has. They are frozen: a damaged log is read by them.
-
-Any other topic takes the next free number in its file, and announces it there (`announcement`).
-"""
-
-ANNOUNCEMENT = "channel "
-
-
-def announcement(number: int, topic: str) -> tuple[str, dict[str, str]]:
-    """Name and content of the metadata that say which topic a further channel number has.
-
-    Args:
-        number: the channel's.
-        topic: what it carries.
-    """
-    return f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic}
-
-
-_ADAPTERS: dict[str, TypeAdapter[Any]] = {topic: TypeAdapter(kind) for topic, kind in _KINDS.items()}
-_WAVEFORM: TypeAdapter[Any] = TypeAdapter(Waveform)
-
-
-def adapter(topic: str) -> TypeAdapter[Any]:
-    """What turns a topic's records into JSON and back; any topic that is not isiw's own holds waveforms."""
-    return _ADAPTERS.get(topic, _WAVEFORM)
-
-
-def topic_of(record: Record, channel_name: str | None = None) -> str:
-    """The topic of a record.
-
-    Args:
-        record: any record.
-        channel_name: the channel, for a waveform.
-
-    Raises:
-        InvalidValueError: a waveform without a channel's name, or with one that isiw uses for itself.
-    """
-    if not isinstance(record, Waveform):
-        return _TOPIC_OF_KIND[type(record)]
-    return waveform_topic(channel_name or "")
-
-
-def waveform_topic(channel_name: str) -> str:
-    """The topic of a channel's waveforms.
-
-    Raises:
-        InvalidValueError: an empty name, or one that isiw uses for itself.
-    """
-    topic = f"/{channel_name}"
-    if topic == "/" or topic in _KINDS or not channel_name.isprintable():  # half a surrogate pair is not printable
-        raise InvalidValueError(
-            "a waveform's channel cannot have this name", got=channel_name, remedy="Rename it in the device."
-        )
-    return topic
-
-
-def encode(topic: str, record: Record) -> bytes:
-    """A record as JSON.
-
-    Args:
-        topic: of the record.
-        record: what to write.
-
-    Raises:
-        InvalidValueError: a text in it is none that JSON can hold.
-    """
-    try:
-        return adapter(topic).dump_json(record)
-    except (PydanticSerializationError, UnicodeEncodeError) as error:
-        raise InvalidValueError(
-            f"a record of {topic} cannot be written as JSON",
-            got=told(error),
-            remedy="Look at the names, units and texts that the device gives.",
-        ) from error
-
-
-def decode(topic: str, data: bytes) -> Record:
-    """The record that was encoded.
-
-    Args:
-        topic: of the record.
-        data: JSON.
-
-    Raises:
-        ValueError: not such a record.
-    """
-    record: Record = adapter(topic).validate_json(data)
-    if isinstance(record, Trial) and record.index >= MOST_TRIALS:
-        raise InvalidValueError("no session has so many trials", got=record.index, expected=f"below {MOST_TRIALS}")
-    return record
-
-
-def json_schema(topic: str) -> tuple[str, bytes]:
-    """Name and JSON schema of a topic's records; the root is an object."""
-    return _json_schema(topic if topic in _KINDS else "")
-
-
-@cache
-def _json_schema(topic: str) -> tuple[str, bytes]:
-    kind = _KINDS.get(topic, Waveform)
-    return f"isiw.{kind.__name__}", json.dumps(adapter(topic).json_schema(mode="serialization")).encode()

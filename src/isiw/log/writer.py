@@ -25,7 +25,8 @@ from isiw.log.durable import (
 )
 from isiw.log.locks import claimed, refuse_if_locked
 from isiw.log.salvage import Message, Salvage, holds, salvage_file
-from isiw.log.schema import CHANNEL_IDS, Header, Record, announcement, encode, json_schema, topic_of
+from isiw.log.schema import Header, Record
+from isiw.log.topics import CHANNEL_IDS, announcement, encode, json_schema, topic_of
 
 __all__ = ["CONFIGURATION", "LogWriter"]
 

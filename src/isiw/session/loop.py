@@ -18,13 +18,13 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError, NotDelivered, StrategyError
 from isiw.log.pulses import earlier_pulses_s
-from isiw.log.schema import Header, Record
-from isiw.log.verdicts import LOOKED_AT, acceptance, exclusion, inclusion
+from isiw.log.schema import Event, Header, Record
 from isiw.log.writer import LogWriter
 from isiw.session.delivery import Delivery
 from isiw.session.desk import Desk
 from isiw.session.header import header_of, require_parts
 from isiw.session.journal import Journal
+from isiw.session.judging import Judging
 from isiw.session.pausing import Pausing
 from isiw.session.progress import PROGRESS_HEADINGS, progress_row, show_progress
 from isiw.session.rig import Rig, require_matching
@@ -42,8 +42,10 @@ from isiw.visit import Visit, VisitProtocol
 __all__ = ["Session"]
 
 
-class Session:
+class Session(Judging):
     """One person's session, from the first ask to the decision.
+
+    While it runs, an operator may note, exclude, include, accept and reject, from any thread and from `on_trial`.
 
     Args:
         device: delivers the stimuli; its ISIs count from the same event as the strategy's space.
@@ -120,7 +122,7 @@ class Session:
         self._first_records: Sequence[Record] = ()
         self._own_earlier_s: Callable[[], Sequence[float]] = tuple
         self._resumed = False
-        self._journal = Journal()
+        self._journal, self._space = Journal(), strategy.space
         self._pausing = Pausing(self._rig, self._journal, self._safeguards)
         self._steps = self._steps_with(strategy)
 
@@ -134,11 +136,6 @@ class Session:
     def strategy(self) -> Strategy:
         """What proposes ISIs and learns; another object once a trial was judged anew."""
         return self._steps.strategy
-
-    @property
-    def trials(self) -> TrialTable:
-        """All trials so far."""
-        return self._journal.trials
 
     def continue_from(
         self,
@@ -235,62 +232,8 @@ class Session:
         """
         self._pausing.now(reason)
 
-    def note(self, text: str) -> None:
-        """Log a remark; from any thread while the session runs, as `exclude`, `include`, `accept` and `reject`.
-
-        Args:
-            text: anything.
-
-        Raises:
-            InvalidValueError: the session is not running.
-        """
-        self._journal.note(text)
-
-    def exclude(self, trial: int, reason: str = "") -> None:
-        """Let a trial not count: on disk when this returns, and learnt before the next stimulus is asked for.
-
-        Args:
-            trial: its number.
-            reason: why, for whoever reads the log.
-
-        Raises:
-            InvalidValueError: no trial that counts has this number, or the session is not running.
-        """
-        self._journal.judge(lambda trials: exclusion(trials, trial, reason))
-
-    def include(self, trial: int) -> None:
-        """Let a trial count again that was excluded.
-
-        Args:
-            trial: its number.
-
-        Raises:
-            InvalidValueError: no excluded trial has this number, or the session is not running.
-        """
-        self._journal.judge(lambda trials: inclusion(trials, trial))
-
-    def reject(self, trial: int) -> None:
-        """Let a trial not count whose MEP an operator has looked at; an exclusion with this reason.
-
-        Args:
-            trial: its number.
-
-        Raises:
-            InvalidValueError: no trial that counts has this number, or the session is not running.
-        """
-        self.exclude(trial, LOOKED_AT)
-
-    def accept(self, trial: int) -> None:
-        """Let a trial count all the same that was judged a mistrial or excluded, once an operator has looked at it.
-
-        Args:
-            trial: its number.
-
-        Raises:
-            InvalidValueError: no such trial, one that counts already or of which no MEP was measured, or the session is
-                not running.
-        """
-        self._journal.judge(lambda trials: acceptance(trials, trial, self.strategy.space))
+    def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
+        self._journal.judge(verdict)
 
     def _require_own_strategy(self) -> None:
         if self.strategy.delivered > len(self.trials):

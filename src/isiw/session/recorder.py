@@ -19,10 +19,10 @@ from isiw.log.durable import part_of
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Estimate, Event, EventKind, Header
-from isiw.log.verdicts import LOOKED_AT, acceptance, exclusion, inclusion
 from isiw.log.writer import LogWriter
 from isiw.session.header import header_of, require_parts
 from isiw.session.journal import Journal, learn, relearned
+from isiw.session.judging import Judging
 from isiw.session.replay import replay, warn_where_differing
 from isiw.session.resume import ages_s, continued, resumption, with_lost_pulses
 from isiw.signals.faults import remedy_for
@@ -135,7 +135,7 @@ def _without_controls(protocol: VisitProtocol) -> VisitProtocol:
     return protocol
 
 
-class Recorder:
+class Recorder(Judging):
     """A session whose loop is the lab's own; `isiw.open_session` opens one. As a context manager it closes its log.
 
     Args:
@@ -156,7 +156,7 @@ class Recorder:
         trials: TrialTable | None = None,
         earlier_s: Sequence[float] = (),
     ) -> None:
-        self.strategy, self._journal = strategy, Journal(trials)
+        self.strategy, self._journal, self._space = strategy, Journal(trials), strategy.space
         self._log, self._clock = log, clock
         self._limits, self._protocol, self._seed = header.limits, header.protocol, header.seed
         self._open = ExitStack()
@@ -166,11 +166,6 @@ class Recorder:
         self._made_s = now_s
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
         self._doubted: set[DoubtKind] = set()
-
-    @property
-    def trials(self) -> TrialTable:
-        """All trials so far."""
-        return self._journal.trials
 
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], the same until its outcome; on disk as about to be delivered before this returns.
@@ -276,59 +271,6 @@ class Recorder:
         lost = len(list(itertools.takewhile(lambda trial: trial.reason is not None, reversed(self.trials.trials))))
         if lost == self._limits.max_consecutive_mistrials:
             self._warn(f"{lost} trials in a row were lost: {known}. {remedy_for(known)}")
-
-    def note(self, text: str) -> None:
-        """Log a remark.
-
-        Args:
-            text: anything.
-        """
-        self._journal.note(text)
-
-    def exclude(self, trial: int, reason: str = "") -> None:
-        """Exclude a trial from here on: an event is appended, and the strategy learns anew without it.
-
-        Args:
-            trial: its number.
-            reason: why, for whoever reads the log.
-
-        Raises:
-            InvalidValueError: no trial that counts has this number.
-        """
-        self._judge(lambda trials: exclusion(trials, trial, reason))
-
-    def include(self, trial: int) -> None:
-        """Let a trial count again that was excluded, and learn anew with it.
-
-        Args:
-            trial: its number.
-
-        Raises:
-            InvalidValueError: no excluded trial has this number.
-        """
-        self._judge(lambda trials: inclusion(trials, trial))
-
-    def reject(self, trial: int) -> None:
-        """Let a trial not count whose MEP you have looked at; an exclusion with this reason.
-
-        Args:
-            trial: its number.
-
-        Raises:
-            InvalidValueError: no trial that counts has this number.
-        """
-        self.exclude(trial, LOOKED_AT)
-
-    def accept(self, trial: int) -> None:
-        """Let a trial count again that was rejected or excluded.
-
-        Args:
-            trial: its number.
-
-        Raises:
-            InvalidValueError: no such trial, one that counts already, or a mistrial, which has no amplitude here.
-        """
-        self._judge(lambda trials: acceptance(trials, trial, self.strategy.space))
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         self._journal.judge(verdict)

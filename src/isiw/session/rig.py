@@ -14,7 +14,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.lock import driven
 from isiw.devices.protocol import Answer, Device, DeviceInfo
 from isiw.errors import DeviceError, StillArmedError, told
-from isiw.log.schema import waveform_topic
+from isiw.log.topics import waveform_topic
 from isiw.log.writer import LogWriter
 from isiw.session.interrupts import Interrupts
 from isiw.session.lastresort import INTERRUPTED, STILL_ARMED, end_process

@@ -12,7 +12,7 @@ from isiw.design import DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
 from isiw.errors import DeviceError, IsiwError
-from isiw.log.schema import waveform_topic
+from isiw.log.topics import waveform_topic
 from isiw.signals import SignalLimits, judge, judge_measurement
 from isiw.signals.faults import likely_fault, too_early_by_chance
 from isiw.signals.plausibility import DoubtKind, doubt_of

@@ -28,6 +28,7 @@ from isiw.models.particles.prior import Person, Prior
 from isiw.models.particles.shapes import ShapeKind
 from isiw.models.shared.scales import Scale
 from isiw.models.shared.start import StartPrior
+from isiw.priors.components import beside
 
 MANY = 20_000
 ONLY_CURVES = NoiseShares(0.0, 0.0, 1.0, 0.0)
@@ -170,3 +171,21 @@ def test_a_person_unlike_most_is_told_by_the_part_that_is_unusual() -> None:
         assert max(shares.values()) < 0.4
     nobody = latents._replace(present=torch.zeros_like(latents.present))
     assert list(prior.unusual(nobody, VALVE_SPACE)) == ["the EMG floor"]
+
+
+def test_whoever_is_as_in_the_lab_is_not_unlike_most() -> None:
+    lab = Floor(0.8, Scale(0.05, 0.1), Scale(0.22, 0.3))
+    prior = Prior(floors=beside(Prior().floors, [lab]))
+    latents = prior.sample(1, 500, torch.Generator().manual_seed(0), VALVE_SPACE)
+    values = latents.values.clone()
+    values[..., LATENTS.index("log_floor_mv")] = math.log(0.05)
+    values[..., LATENTS.index("log_floor_sd")] = math.log(0.22)
+    assert prior.unusual(latents._replace(values=values), VALVE_SPACE)["the EMG floor"] < 0.1
+
+
+def test_a_usual_start_is_usual_with_whatever_rig_where_none_is_stated() -> None:
+    prior = Prior()
+    latents = prior.sample(1, 500, torch.Generator().manual_seed(0), VALVE_SPACE)
+    values = latents.values.clone()
+    values[..., LATENTS.index("start_ms")] = 100.0  # too early for the robot
+    assert prior.unusual(latents._replace(values=values), VALVE_SPACE)["the start of the window"] < 0.5

@@ -51,8 +51,8 @@ class Mixture:
         return density
 
     def usual(self, x: Tensor) -> Tensor:
-        """Probability that x (..., d) is of the first component, shape (...)."""
-        share: Tensor = torch.softmax(self.log_parts(x), dim=-1)[..., 0]
+        """Probability that x (..., d) is of the component that is most probable beforehand, shape (...)."""
+        share: Tensor = torch.softmax(self.log_parts(x), dim=-1)[..., self.shares.argmax()]
         return share
 
     def component(self, x: Tensor) -> Tensor:

@@ -127,15 +127,16 @@ class StartPrior:
         return torch.where(inside, density.clamp_min(1e-30).log(), -torch.inf)
 
     def usual(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
-        """Probability that some starts are of the usual span, same shape.
+        """Probability that some starts are of the usual span, whatever the rig, same shape.
 
         Args:
             start_ms: the starts [ms], any shape.
             space: the design space.
         """
-        spans = [span.share * span.density(start_ms) for span in self.in_space(space)]
+        spans = torch.stack([span.share * span.density(start_ms) for span in self.in_space(space)])
+        usual = spans[:: len(self.spans)].sum(0)  # the first of all spans is there once for each kind of rig
         even = self.p_anywhere / (space.high_ms - space.low_ms + BEFORE_MS)
-        return (1.0 - self.p_anywhere) * spans[0] / ((1.0 - self.p_anywhere) * torch.stack(spans).sum(0) + even)
+        return (1.0 - self.p_anywhere) * usual / ((1.0 - self.p_anywhere) * spans.sum(0) + even)
 
     def in_space(self, space: DesignSpace) -> tuple[Span, ...]:
         """The spans on the clock of a space."""

@@ -1,0 +1,87 @@
+"""What an operator says about trials while a session is open, whoever drives its loop."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+from isiw.design import DesignSpace
+from isiw.log.schema import Event
+from isiw.log.verdicts import LOOKED_AT, acceptance, exclusion, inclusion
+from isiw.session.journal import Journal
+from isiw.trials import TrialTable
+
+__all__ = ["Judging"]
+
+
+class Judging(ABC):
+    """An open session whose trials an operator judges; each verdict is on disk when its call returns."""
+
+    _journal: Journal
+    _space: DesignSpace
+
+    @abstractmethod
+    def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
+        """Put a verdict on disk, and see to it that it is learnt before the next stimulus is asked for."""
+
+    @property
+    def trials(self) -> TrialTable:
+        """All trials so far."""
+        return self._journal.trials
+
+    def note(self, text: str) -> None:
+        """Log a remark.
+
+        Args:
+            text: anything.
+
+        Raises:
+            InvalidValueError: the session is not open.
+        """
+        self._journal.note(text)
+
+    def exclude(self, trial: int, reason: str = "") -> None:
+        """Let a trial not count from here on: an event is appended, and the strategy learns anew without it.
+
+        Args:
+            trial: its number.
+            reason: why, for whoever reads the log.
+
+        Raises:
+            InvalidValueError: no trial that counts has this number, or the session is not open.
+        """
+        self._judge(lambda trials: exclusion(trials, trial, reason))
+
+    def include(self, trial: int) -> None:
+        """Let a trial count again that was excluded, and learn anew with it.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no excluded trial has this number, or the session is not open.
+        """
+        self._judge(lambda trials: inclusion(trials, trial))
+
+    def reject(self, trial: int) -> None:
+        """Let a trial not count whose MEP an operator has looked at; an exclusion with this reason.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no trial that counts has this number, or the session is not open.
+        """
+        self.exclude(trial, LOOKED_AT)
+
+    def accept(self, trial: int) -> None:
+        """Let a trial count all the same that was judged a mistrial or excluded, once an operator has looked at it.
+
+        Args:
+            trial: its number.
+
+        Raises:
+            InvalidValueError: no such trial, one that counts already or of which no MEP was measured, or the session is
+                not open.
+        """
+        self._judge(lambda trials: acceptance(trials, trial, self._space))
