@@ -16,6 +16,7 @@ from isiw.errors import InvalidValueError
 
 __all__ = [
     "MOST_MEP_MV",
+    "MOST_OF_A_KIND",
     "amplitude",
     "ascending",
     "check_amplitude",
@@ -34,6 +35,9 @@ __all__ = [
 
 MOST_MEP_MV = 1000.0
 """More than any amplifier of EMG gives [mV]: their inputs take some hundred millivolts to either side at most."""
+
+MOST_OF_A_KIND = 100_000
+"""Of trials, particles, samples or anything else that a setting counts; more would fill the memory."""
 
 
 class Bounds(TypedDict, total=False):

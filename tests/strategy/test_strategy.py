@@ -321,6 +321,11 @@ def test_a_batch_from_a_model_that_imagines_no_trials_is_refused() -> None:
         scripted_strategy().ask_batch(0)
 
 
+def test_a_batch_that_no_session_delivers_is_refused_at_once() -> None:
+    with pytest.raises(InvalidValueError, match="at most 1000"):
+        make_strategy("random").ask_batch(10**9)
+
+
 def test_a_slip_that_is_refused_changes_nothing() -> None:
     strategy = scripted_strategy()
     isi_ms = strategy.ask()

@@ -162,6 +162,7 @@ def workers_of(process: psutil.Process) -> list[psutil.Process]:
 
 
 @posix
+@pytest.mark.slow
 def test_the_death_of_a_worker_in_mid_study_loses_no_row(tmp_path: Path) -> None:
     study, killed = tiny(people=6), list[int]()
     keys: list[str] = []
@@ -215,6 +216,7 @@ def finished_to_the_end(folder: Path) -> pd.DataFrame:
 
 
 @posix
+@pytest.mark.slow
 def test_the_death_of_the_main_process_in_mid_study_loses_no_row(
     tmp_path: Path, started: subprocess.Popen[str]
 ) -> None:
@@ -226,6 +228,7 @@ def test_the_death_of_the_main_process_in_mid_study_loses_no_row(
 
 
 @posix
+@pytest.mark.slow
 def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path: Path, started: subprocess.Popen[str]) -> None:
     os.killpg(started.pid, signal.SIGINT)  # a terminal tells the workers, too
     _, errors = started.communicate(timeout=30)

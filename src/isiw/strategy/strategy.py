@@ -30,6 +30,9 @@ _T = TypeVar("_T")
 ASKED_AGAIN = 2
 """How often an ISI whose trial was lost is asked again before another one."""
 
+MOST_OF_A_BATCH = 1000
+"""ISIs to be delivered before anything is told; more than any session has."""
+
 
 def _fulfil(answer: Future[_T], choose: Callable[[], _T]) -> None:
     try:
@@ -175,13 +178,13 @@ class Strategy:
         """The next n ISIs [ms], to be delivered before anything is told; the first is what `ask` answers.
 
         Args:
-            n: how many.
+            n: how many, at most 1,000.
 
         Raises:
-            InvalidValueError: fewer than one.
+            InvalidValueError: fewer than one, or too many.
             StrategyError: the model cannot imagine trials, or does not plan so far ahead.
         """
-        n = whole("the size of a batch", n, least=1)
+        n = whole("the size of a batch", n, least=1, most=MOST_OF_A_BATCH)
         own = map(self.space.snap, own_plan(self.posterior, self.acquisition))
         chosen = ([*self._course.initial_left, *own] or [self.ask()])[:n]
         return greedy_batch(self.posterior, self.acquisition, chosen, n, self._next_of_batch)

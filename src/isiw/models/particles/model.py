@@ -13,7 +13,7 @@ from functools import cached_property
 
 import torch
 
-from isiw.checks import check_numbers, check_probabilities, check_wholes
+from isiw.checks import MOST_OF_A_KIND, check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
 from isiw.models.particles.latents import Latents
@@ -86,7 +86,7 @@ class ParticleModel:
         device: torch device.
 
     Raises:
-        InvalidValueError: fewer than two particles, or an invalid number.
+        InvalidValueError: fewer than two particles or more than a memory holds, or an invalid number.
     """
 
     prior: Prior = field(default_factory=Prior)
@@ -98,8 +98,8 @@ class ParticleModel:
     device: str = "cpu"
 
     def __post_init__(self) -> None:
-        check_wholes(self, "particles", least=2)  # half of them move at a time
-        check_wholes(self, "thinned", least=1)
+        check_wholes(self, "particles", least=2, most=MOST_OF_A_KIND)  # half of them move at a time
+        check_wholes(self, "thinned", least=1, most=MOST_OF_A_KIND)
         check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:

@@ -19,7 +19,7 @@ import numpy as np
 
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import acquisition_named
-from isiw.checks import check_numbers, check_probabilities, check_wholes, whole
+from isiw.checks import MOST_OF_A_KIND, check_numbers, check_probabilities, check_wholes, whole
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
 from isiw.models.protocol import ResponseModel
@@ -27,9 +27,6 @@ from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoW
 from isiw.toml_files import checked
 
 __all__ = ["Asking", "Setting", "Settings", "Stopping", "settings_from", "settings_keys", "settings_values"]
-
-MOST_OF_A_KIND = 100_000
-"""Of trials, particles, samples or anything else that a setting counts."""
 
 _S = TypeVar("_S", bound="Settings")
 
