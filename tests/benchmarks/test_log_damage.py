@@ -3,7 +3,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
 from benchmarks.log_damage import all_cases, drawn_cases, faults, write_log
 
 
