@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Final, NamedTuple
 
 import torch
@@ -39,8 +40,9 @@ _USED: Final = {
 }
 
 
+@cache
 def latents_of(*blocks: str, device: torch.device) -> Tensor:
-    """Which latents belong to some of `BLOCKS`, shape (d,).
+    """Which latents belong to some of `BLOCKS`, shape (d,); one tensor for all callers, who leave it as it is.
 
     Args:
         *blocks: names of the blocks.
@@ -60,9 +62,13 @@ def used_by(noise: Tensor, present: Tensor) -> Tensor:
     Returns:
         Shape (b, p, d).
     """
-    device = noise.device
-    by_kind = torch.stack([latents_of(*_COMMON, *_USED[kind], device=device) for kind in NoiseKind])
-    return by_kind[noise] | (present.unsqueeze(-1) & latents_of(*PROFILE_BLOCKS, device=device))
+    of_profile = latents_of(*PROFILE_BLOCKS, device=noise.device)
+    return _used_by_kind(noise.device)[noise] | (present.unsqueeze(-1) & of_profile)
+
+
+@cache
+def _used_by_kind(device: torch.device) -> Tensor:
+    return torch.stack([latents_of(*_COMMON, *_USED[kind], device=device) for kind in NoiseKind])
 
 
 class Latents(NamedTuple):

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import torch
 
 from isiw.models.protocol import Tensor
 
-__all__ = ["JointMixture", "Mixture"]
+__all__ = ["JointMixture", "Mixture", "drawn"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,3 +105,18 @@ class JointMixture:
         parts = torch.addmm(log_shares.repeat(x[..., 0].numel(), 1), z.square().flatten(0, -2), belongs, alpha=-0.5)
         density: Tensor = torch.logsumexp(parts.view(*z.shape[:-1], -1), dim=-2).sum(-1)
         return density
+
+
+def drawn(shares: tuple[float, ...], quantile: Tensor) -> Tensor:
+    """Which of some alternatives is drawn at each quantile, same shape.
+
+    Args:
+        shares: their probabilities, summing to 1.
+        quantile: uniform draws from 0 to 1, any shape.
+    """
+    return torch.bucketize(quantile, _inner_edges(shares, quantile.device))
+
+
+@cache
+def _inner_edges(shares: tuple[float, ...], device: torch.device) -> Tensor:
+    return torch.tensor(shares, device=device).cumsum(0)[:-1]

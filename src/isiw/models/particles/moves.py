@@ -14,6 +14,7 @@ import torch
 from isiw.design import DesignSpace
 from isiw.models.particles.latents import PROFILE_BLOCKS, RESPONSE_BLOCKS, Latents, latents_of, used_by
 from isiw.models.particles.likelihood import total_log_likelihood
+from isiw.models.particles.mixture import drawn
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
@@ -124,7 +125,7 @@ class Mover:
             )
             for _ in range(2)
         )
-        part = _drawn(PART_PROBABILITY, self._uniform(mine.present)).unsqueeze(-1)
+        part = drawn(PART_PROBABILITY, self._uniform(mine.present)).unsqueeze(-1)
         of_profile = latents_of(*PROFILE_BLOCKS, device=mine.values.device)
         moves = (part == 0) | ((part == 1) & of_profile) | ((part == 2) & ~of_profile)
         moves = moves & used_by(mine.noise, mine.present)
@@ -136,16 +137,16 @@ class Mover:
         """Draw some kinds, and the latents that go with them, anew from the prior."""
         people, size = mine.present.shape
         fresh = self.prior.sample(people, size, self.generator, self.space)
-        jump = _drawn(tuple(JUMPS.values()), self._uniform(mine.present))
+        jump = drawn(tuple(JUMPS.values()), self._uniform(mine.present))
         form, noise, window, place, response = (jump == number for number in range(len(JUMPS)))
-        drawn = {
+        anew = {
             ("form",): form,
             RESPONSE_BLOCKS: noise | response,
             PROFILE_BLOCKS: window,
             ("start", "width"): place,
         }
         redraw = torch.zeros_like(mine.values, dtype=torch.bool)
-        for blocks, who in drawn.items():
+        for blocks, who in anew.items():
             redraw |= who.unsqueeze(-1) & latents_of(*blocks, device=mine.values.device)
         return Latents(
             values=torch.where(redraw, fresh.values, mine.values),
@@ -162,12 +163,6 @@ class Mover:
 
     def _pick(self, people: int, size: int, of: int) -> Tensor:
         return torch.randint(of, (people, size), generator=self.generator, device=self.generator.device)
-
-
-def _drawn(probabilities: tuple[float, ...], uniform: Tensor) -> Tensor:
-    """Which of some alternatives is drawn at each quantile, same shape."""
-    ends = torch.tensor(probabilities, device=uniform.device).cumsum(0)[:-1]
-    return torch.bucketize(uniform, ends)
 
 
 def _choose(condition: Tensor, yes: Tensor, no: Tensor) -> Tensor:

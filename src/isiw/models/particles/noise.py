@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
+from functools import cache
 from typing import NamedTuple
 
 import torch
@@ -114,13 +115,20 @@ def log_gain(response: Response, order: Tensor) -> Tensor:
 
 
 def _nodes(like: Tensor) -> Tensor:
-    reach = NODE_REACH * ON_NODES
-    return torch.linspace(-reach, reach, NODES, device=like.device, dtype=like.dtype)
+    return _quadrature(like.device, like.dtype)[0]
 
 
 def _node_weights(like: Tensor) -> Tensor:
-    density = torch.exp(-0.5 * (_nodes(like) / ON_NODES).square())
-    return density / density.sum()
+    return _quadrature(like.device, like.dtype)[1]
+
+
+@cache
+def _quadrature(device: torch.device, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
+    """Nodes of the input noise, and their weights."""
+    reach = NODE_REACH * ON_NODES
+    nodes = torch.linspace(-reach, reach, NODES, device=device, dtype=dtype)
+    density = torch.exp(-0.5 * (nodes / ON_NODES).square())
+    return nodes, density / density.sum()
 
 
 def _over_nodes(values: Tensor, axis: int = -2) -> Tensor:

@@ -8,7 +8,7 @@ on, and moves need no Jacobians.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import astuple, dataclass, field
 from functools import cached_property
 from typing import Final, NamedTuple
 
@@ -27,10 +27,9 @@ from isiw.models.particles.laws import (
     NoiseShares,
     ProfilePrior,
     SessionPrior,
-    ShapeShares,
     SwitchPrior,
 )
-from isiw.models.particles.mixture import JointMixture, Mixture
+from isiw.models.particles.mixture import JointMixture, Mixture, drawn
 from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.places import mixture_of
 from isiw.models.particles.shapes import Shape
@@ -134,7 +133,7 @@ class Prior:
             known = torch.rand((*size, 1), generator=generator, device=generator.device) < self.profile.p_place
             place = self._joint_place.sample(size, generator)
             values = torch.cat([torch.where(known, place, values[..., :2]), values[..., 2:]], dim=-1)
-        shape, noise = _kinds(self.profile.shapes, uniform[0]), _kinds(self.noise, uniform[1])
+        shape, noise = drawn(astuple(self.profile.shapes), uniform[0]), drawn(astuple(self.noise), uniform[1])
         return Latents(values, shape, noise, uniform[2] < self.profile.p_window)
 
     def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
@@ -274,12 +273,6 @@ def _of_muscle(muscle: Muscle) -> list[tuple[float, float]]:
 
 def _mixture(components: list[tuple[float, list[tuple[float, float]]]]) -> Mixture:
     return Mixture.of(components, "cpu")
-
-
-def _kinds(shares: ShapeShares | NoiseShares, uniform: Tensor) -> Tensor:
-    """The kind at each quantile, same shape."""
-    values = torch.tensor([getattr(shares, f.name) for f in fields(shares)], device=uniform.device)
-    return torch.bucketize(uniform, values.cumsum(0)[:-1])
 
 
 def _even(z: Tensor) -> Tensor:
