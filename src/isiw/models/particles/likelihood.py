@@ -65,9 +65,9 @@ def in_pieces(function: Callable[..., Tensor], response: Response, others: tuple
         others: tensors of shape (b, p or 1, ...).
         elements: size of the intermediate values for one particle.
     """
-    if response.log_floor.is_cuda:
-        return function(response, *others)
     people, particles = response.log_floor.shape
+    if response.log_floor.is_cuda or people * particles * elements <= CHUNK_ELEMENTS:
+        return function(response, *others)
     together = max(1, CHUNK_ELEMENTS // max(1, elements * particles))
     step = max(1, CHUNK_ELEMENTS // max(1, elements))
     rows = []

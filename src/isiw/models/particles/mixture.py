@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import torch
 
@@ -72,14 +73,16 @@ class JointMixture:
         most = max(len(block.shares) for block in blocks)
         # Missing components have no share, and the law of the first, so that nothing is infinite but their log share.
         filled = [torch.arange(most).where(torch.arange(most) < len(block.shares), 0) for block in blocks]
-        shares = [torch.nn.functional.pad(b.shares, (0, most - len(b.shares))) for b in blocks]
-        self._means = torch.cat([block.means[rows] for block, rows in zip(blocks, filled, strict=True)], dim=-1)
-        self._sds = torch.cat([block.sds[rows] for block, rows in zip(blocks, filled, strict=True)], dim=-1)
+        shares = torch.stack([torch.nn.functional.pad(b.shares, (0, most - len(b.shares))) for b in blocks])
+        means, sds = (
+            torch.cat([getattr(block, law)[rows] for block, rows in zip(blocks, filled, strict=True)], dim=-1)
+            for law in ("means", "sds")
+        )
         sizes = torch.tensor([block.means.shape[-1] for block in blocks])
-        self._block = torch.repeat_interleave(torch.arange(len(blocks)), sizes)
-        self._belongs = torch.nn.functional.one_hot(self._block, len(blocks)).float()
-        self._below = torch.stack(shares).cumsum(-1)[:, :-1]
-        self._log_shares = torch.stack(shares, dim=-1).log() - self._sds.log() @ self._belongs
+        block = torch.repeat_interleave(torch.arange(len(blocks)), sizes)
+        belongs = torch.nn.functional.one_hot(block, len(blocks)).float().T
+        log_shares = shares.log().T.unsqueeze(-1) - belongs @ sds.log().unsqueeze(-1)
+        self._tables = {torch.device("cpu"): _Tables(means, sds, block, belongs, shares.cumsum(-1)[:, :-1], log_shares)}
 
     def sample(self, size: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """Draws, shape (*size, d).
@@ -88,23 +91,37 @@ class JointMixture:
             size: how many.
             generator: source of randomness.
         """
-        device = generator.device
-        uniform = torch.rand((*size, len(self._below)), generator=generator, device=device)
-        component = (uniform.unsqueeze(-1) > self._below.to(device)).sum(-1)[..., self._block.to(device)]
-        latent = torch.arange(self._means.shape[-1], device=device)
-        means, sds = (law.to(device)[component, latent] for law in (self._means, self._sds))
-        normal = torch.randn((*size, self._means.shape[-1]), generator=generator, device=device)
+        tables = self._on(generator.device)
+        uniform = torch.rand((*size, len(tables.below)), generator=generator, device=generator.device)
+        component = (uniform.unsqueeze(-1) > tables.below).sum(-1)[..., tables.block].flatten(0, -2)
+        normal = torch.randn((*size, len(tables.block)), generator=generator, device=generator.device)
+        means, sds = (law.gather(0, component).view_as(normal) for law in (tables.means, tables.sds))
         return torch.addcmul(means, sds, normal)
 
     def log_density(self, x: Tensor) -> Tensor:
         """Log density but for a constant at x (..., d), shape (...)."""
-        means, sds, belongs, log_shares = (
-            law.to(x) for law in (self._means, self._sds, self._belongs, self._log_shares)
-        )
-        z = (x.unsqueeze(-2) - means) / sds
-        parts = torch.addmm(log_shares.repeat(x[..., 0].numel(), 1), z.square().flatten(0, -2), belongs, alpha=-0.5)
-        density: Tensor = torch.logsumexp(parts.view(*z.shape[:-1], -1), dim=-2).sum(-1)
-        return density
+        tables = self._on(x.device)
+        # With the particles last, every step runs along memory.
+        z = (x.flatten(0, -2).T - tables.means.unsqueeze(-1)) / tables.sds.unsqueeze(-1)
+        parts = torch.matmul(tables.belongs, z.square_()).mul_(-0.5).add_(tables.log_shares)
+        density: Tensor = torch.logsumexp(parts, dim=0).sum(0)
+        return density.view(x.shape[:-1])
+
+    def _on(self, device: torch.device) -> _Tables:
+        if device not in self._tables:
+            self._tables[device] = _Tables(*(table.to(device) for table in self._tables[torch.device("cpu")]))
+        return self._tables[device]
+
+
+class _Tables(NamedTuple):
+    """What is computed with, on one device."""
+
+    means: Tensor  # (k, d)
+    sds: Tensor  # (k, d)
+    block: Tensor  # of each latent, (d,)
+    belongs: Tensor  # latents to blocks, (blocks, d)
+    below: Tensor  # sums of the shares of earlier components, (blocks, k - 1)
+    log_shares: Tensor  # less the logs of the SDs, (k, blocks, 1)
 
 
 def drawn(shares: tuple[float, ...], quantile: Tensor) -> Tensor:

@@ -7,7 +7,8 @@ to another kind of profile, of noise, or to and from "no window", the latents co
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cache
+from typing import Final, NamedTuple
 
 import torch
 
@@ -25,9 +26,18 @@ JUMP_PROBABILITY = 0.3
 PART_PROBABILITY = (0.35, 0.35, 0.30)
 """How often a difference moves all latents, those of the profile alone, and those of the response alone."""
 
-JUMPS = {"form": 0.25, "noise": 0.2, "window": 0.35, "place": 0.12, "response": 0.08}
+JUMPS: Final = {"form": 0.25, "noise": 0.2, "window": 0.35, "place": 0.12, "response": 0.08}
 """Shares of the jumps. They draw anew: the profile's kind and form; the noise's kind and all that belongs to it;
 whether there is a window, and all of it; where and how wide it is; what belongs to the noise's kind."""
+
+REDRAWN: Final = {
+    "form": ("form",),
+    "noise": RESPONSE_BLOCKS,
+    "window": PROFILE_BLOCKS,
+    "place": ("start", "width"),
+    "response": RESPONSE_BLOCKS,
+}
+"""The blocks of latents that each jump draws anew."""
 
 BLUR = 0.02
 """SD of what is added to a difference, as a share of the usual SD of each latent."""
@@ -119,16 +129,10 @@ class Mover:
     def _shift(self, mine: Latents, theirs: Latents) -> Latents:
         """Add a scaled difference of two of the others, in those latents that mean anything to the particle."""
         people, size, _ = mine.values.shape
-        first, second = (
-            torch.gather(
-                theirs.values, 1, self._pick(people, size, theirs.values.shape[1]).unsqueeze(-1).expand_as(mine.values)
-            )
-            for _ in range(2)
-        )
-        part = drawn(PART_PROBABILITY, self._uniform(mine.present)).unsqueeze(-1)
-        of_profile = latents_of(*PROFILE_BLOCKS, device=mine.values.device)
-        moves = (part == 0) | ((part == 1) & of_profile) | ((part == 2) & ~of_profile)
-        moves = moves & used_by(mine.noise, mine.present)
+        who = torch.arange(people, device=mine.values.device).unsqueeze(-1)
+        first, second = (theirs.values[who, self._pick(people, size, theirs.values.shape[1])] for _ in range(2))
+        part = drawn(PART_PROBABILITY, self._uniform(mine.present))
+        moves = _shifted(mine.values.device)[part] & used_by(mine.noise, mine.present)
         scale = torch.where(self._uniform(mine.present) < 0.1, 1.0, 0.15 + 0.7 * self._uniform(mine.present))
         blur = BLUR * self.prior.spreads.to(mine.values) * self._normal(mine.values)
         return mine._replace(values=mine.values + moves * (scale.unsqueeze(-1) * (first - second) + blur))
@@ -138,16 +142,8 @@ class Mover:
         people, size = mine.present.shape
         fresh = self.prior.sample(people, size, self.generator, self.space)
         jump = drawn(tuple(JUMPS.values()), self._uniform(mine.present))
-        form, noise, window, place, response = (jump == number for number in range(len(JUMPS)))
-        anew = {
-            ("form",): form,
-            RESPONSE_BLOCKS: noise | response,
-            PROFILE_BLOCKS: window,
-            ("start", "width"): place,
-        }
-        redraw = torch.zeros_like(mine.values, dtype=torch.bool)
-        for blocks, who in anew.items():
-            redraw |= who.unsqueeze(-1) & latents_of(*blocks, device=mine.values.device)
+        form, noise, window, _, _ = (jump == number for number in range(len(JUMPS)))
+        redraw = _redrawn(mine.values.device)[jump]
         return Latents(
             values=torch.where(redraw, fresh.values, mine.values),
             shape=torch.where(form | window, fresh.shape, mine.shape),
@@ -163,6 +159,19 @@ class Mover:
 
     def _pick(self, people: int, size: int, of: int) -> Tensor:
         return torch.randint(of, (people, size), generator=self.generator, device=self.generator.device)
+
+
+@cache
+def _shifted(device: torch.device) -> Tensor:
+    """Which latents a difference moves by its part, shape (parts, d)."""
+    of_profile = latents_of(*PROFILE_BLOCKS, device=device)
+    return torch.stack([torch.ones_like(of_profile), of_profile, ~of_profile])
+
+
+@cache
+def _redrawn(device: torch.device) -> Tensor:
+    """Which latents each of `JUMPS` draws anew, shape (jumps, d)."""
+    return torch.stack([latents_of(*REDRAWN[jump], device=device) for jump in JUMPS])
 
 
 def _choose(condition: Tensor, yes: Tensor, no: Tensor) -> Tensor:

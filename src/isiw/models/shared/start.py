@@ -111,8 +111,8 @@ class StartPrior:
             quantile: the quantiles in 0–1, any shape.
             space: the design space.
         """
-        law = _law(space, self)
-        return _interpolate(quantile, law.below.to(quantile), law.knots_ms.to(quantile))
+        law = _law(space, self, quantile.dtype, quantile.device)
+        return _interpolate(quantile, law.below, law.knots_ms)
 
     def log_density(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
         """Log density at some starts, same shape; -inf where no start can be.
@@ -121,9 +121,9 @@ class StartPrior:
             start_ms: the starts [ms], any shape.
             space: the design space.
         """
-        law = _law(space, self)
+        law = _law(space, self, start_ms.dtype, start_ms.device)
         inside = (start_ms >= law.knots_ms[0]) & (start_ms <= law.knots_ms[-1])
-        density = _interpolate(start_ms, law.knots_ms.to(start_ms), law.density.to(start_ms))
+        density = _interpolate(start_ms, law.knots_ms, law.density)
         return torch.where(inside, density.clamp_min(1e-30).log(), -torch.inf)
 
     def usual(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
@@ -164,7 +164,7 @@ class _Law(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _law(space: DesignSpace, prior: StartPrior) -> _Law:
+def _law(space: DesignSpace, prior: StartPrior, dtype: torch.dtype, device: torch.device) -> _Law:
     low_ms, high_ms = space.low_ms - BEFORE_MS, space.high_ms
     knots_ms = torch.linspace(low_ms, high_ms, min(MAX_KNOTS, math.ceil((high_ms - low_ms) / KNOT_MS) + 1)).double()
     expected = torch.stack([span.share * span.density(knots_ms) for span in prior.in_space(space)]).sum(0)
@@ -175,7 +175,8 @@ def _law(space: DesignSpace, prior: StartPrior) -> _Law:
         mixed, below = even, torch.cumulative_trapezoid(even, knots_ms)
     # Given that it lies in the range: the further that is from where starts usually are, the more "anywhere" counts.
     total = below[-1]
-    return _Law(knots_ms, mixed / total, torch.nn.functional.pad(below / total, (1, 0)))
+    exact = knots_ms, mixed / total, torch.nn.functional.pad(below / total, (1, 0))
+    return _Law(*(values.to(device, dtype) for values in exact))
 
 
 def _interpolate(x: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
