@@ -114,6 +114,10 @@ def test_a_window_that_is_expected_to_be_right_stops(f1: float, probability: flo
     assert f"F1 of {f1:.2f}" in decision.reason
 
 
+def test_an_expected_f1_of_1_asked_for_never_stops() -> None:
+    assert not ExpectedF1(1.0)(expecting(1.0, probability=1.0)).stop
+
+
 def test_without_an_expected_f1_neither_rule_stops() -> None:
     assert not ExpectedF1(0.0)(progress()).stop
     assert not SmallGain(1.0)(progress(40)).stop

@@ -162,7 +162,7 @@ class ExpectedF1:
     """Stop when the reported window is expected to be right enough.
 
     Args:
-        f1: the least expected F1 to stop at.
+        f1: the least expected F1 to stop at; 1 for never, as a posterior of finitely many samples may agree on one window.
         min_probability: the least probability of a window.
 
     Raises:
@@ -181,7 +181,7 @@ class ExpectedF1:
         if estimate.expected_f1 is None or estimate.probability is None:
             return StopDecision(stop=False, reason="The F1 to be expected is not known.")
         expected = f"an F1 of {estimate.expected_f1:.2f} is expected"
-        if estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
+        if self.f1 < 1.0 and estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
             return StopDecision(stop=True, reason=f"The window is known: {expected}.")
         return StopDecision(stop=False, reason=f"Of the window as it is known, {expected}.")
 
