@@ -162,7 +162,7 @@ class ExpectedF1:
     """Stop when the reported window is expected to be right enough.
 
     Args:
-        f1: the least expected F1 to stop at; 1 for never, as a posterior of finitely many samples may agree on one window.
+        f1: the least expected F1 to stop at; 1 for never, as finitely many samples may all agree on one window.
         min_probability: the least probability of a window.
 
     Raises:
