@@ -21,6 +21,7 @@ import numpy as np
 import torch
 
 import isiw
+from isiw.strategy.stopping import Budget
 
 SPACE = isiw.DesignSpace(0, 200, reference="valve")
 AT = (50, 200, 500, 1000, 2000)
@@ -48,14 +49,23 @@ def run(name: str, trials: int, log: Path) -> np.ndarray:
         if update.trial.index == trials - 1:
             raise Interrupted
 
-    never = {"stop_width_ms": 1e-6, "stop_expected_f1": 1, "stop_gain": 0, "stop_no_window": 1}
-    strategy = isiw.make_strategy(name, SPACE, seed=3, max_trials=trials + 1, **never)
     limits = isiw.Limits.of_space(SPACE, max_pulses=trials + 1)
     try:
-        isiw.Session(device(), strategy, log=log, limits=limits, on_trial=on_trial).run()
+        isiw.Session(device(), unstopped(name, trials), log=log, limits=limits, on_trial=on_trial).run()
     except Interrupted:
         return 1e3 * np.diff(ended_s)
     raise RuntimeError("the session has ended before its time")
+
+
+def unstopped(name: str, trials: int) -> isiw.Strategy:
+    """A strategy that only its budget stops, which is one trial more than are run.
+
+    Args:
+        name: the strategy.
+        trials: how many are run.
+    """
+    usual = isiw.make_strategy(name, SPACE)
+    return isiw.Strategy(SPACE, usual.model, usual.acquisition, Budget(trials + 1), seed=3)
 
 
 def device() -> isiw.SimulatedDevice:
@@ -64,11 +74,11 @@ def device() -> isiw.SimulatedDevice:
     return isiw.SimulatedDevice(isiw.SimulatedPerson(lambda isi_ms: person.respond(isi_ms, "valve"), "valve"))
 
 
-def resuming_s(log: Path) -> tuple[float, bool]:
+def resuming_s(log: Path, strategy: isiw.Strategy) -> tuple[float, bool]:
     """How long resuming a session takes [s], and whether it is identical to the one that was interrupted."""
     last = isiw.read_session(log).estimates[-1]
     begin_s = time.process_time()
-    strategy = isiw.resume(log, device()).strategy
+    strategy = isiw.resume(log, device(), strategy).strategy
     spent_s = time.process_time() - begin_s
     now = strategy.estimate()
     again = now.probability, now.start_ms, now.end_ms, now.expected_f1, strategy.ask()
@@ -88,7 +98,7 @@ def main() -> None:
             for trials in sorted({min(each, arguments.most) for each in RESUMED_AT}):
                 log = Path(folder) / f"{name}-{trials}.mcap"
                 cost_ms = run(name, trials, log)
-                spent_s, identical = resuming_s(log)
+                spent_s, identical = resuming_s(log, unstopped(name, trials))
                 resumptions.append(f"| {name} | {trials:,} | {spent_s:.1f} | {'yes' if identical else 'NO'} |")
             near = [cost_ms[max(0, at - NEAR) : at] for at in AT if at <= arguments.most]
             costs.append(f"| {name} | {' | '.join(f'{np.median(part):.0f} ({part.mean():.0f})' for part in near)} |")
