@@ -12,9 +12,12 @@ from isiw.signals.mep import (
     mep_onsets,
     mep_present,
 )
+from isiw.signals.stream import Impact, ImpactDetector
 
 __all__ = [
     "MEP_WINDOWS_MS",
+    "Impact",
+    "ImpactDetector",
     "SignalLimits",
     "TapEvents",
     "background_rms",

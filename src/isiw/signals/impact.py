@@ -17,7 +17,16 @@ from isiw.errors import InvalidValueError
 from isiw.signals.waveforms import as_waveforms, rest_level
 from isiw.types import ArrayLike, FloatArray, IntArray
 
-__all__ = ["DETECTION_LATENCY_MS", "HYSTERESIS_SD", "VALVE_MS", "impact_time", "impact_times"]
+__all__ = [
+    "DETECTION_LATENCY_MS",
+    "FALL_MS",
+    "HYSTERESIS_SD",
+    "MOTION_MS",
+    "VALVE_MS",
+    "impact_time",
+    "impact_times",
+    "last_fall",
+]
 
 VALVE_MS = 500.0
 """The valve command in a trial of 1 s [Kim2020, 4.2]."""
@@ -26,7 +35,11 @@ HYSTERESIS_SD = 6.0
 """Half-width of the hysteresis band, in SDs of the noise at rest."""
 
 FALL_MS = 2.0
+"""How long a fall may take."""
+
 MOTION_MS = 10.0
+"""How much of the motion before a fall is compared with the deceleration."""
+
 DETECTION_LATENCY_MS = 5.0
 """How much of the deceleration is seen before an impact is called one; nothing can be triggered sooner."""
 
@@ -74,7 +87,7 @@ def impact_times(acceleration: ArrayLike, rate_hz: float, after_ms: float = VALV
     times = np.full(len(waves), math.nan)
     hit_rows, first = np.unique(rows[impact], return_index=True)  # the candidates ascend within a row
     chosen = np.flatnonzero(impact)[first]
-    times[hit_rows] = (falls[chosen] - steps + _last_fall(fall[chosen])) * 1000 / rate_hz
+    times[hit_rows] = (falls[chosen] - steps + last_fall(fall[chosen])) * 1000 / rate_hz
     return times
 
 
@@ -92,8 +105,12 @@ def _samples(waves: FloatArray, rows: IntArray, columns: IntArray, start: int, s
     return samples
 
 
-def _last_fall(fall: FloatArray) -> FloatArray:
-    """Where each row last fell through zero [samples], its last sample being below, its largest above."""
+def last_fall(fall: FloatArray) -> FloatArray:
+    """Where each row last fell through zero [samples], its last sample being below, its largest above, shape (n,).
+
+    Args:
+        fall: acceleration above its level at rest, shape (n, w).
+    """
     last = fall.shape[-1] - 1 - (fall[:, ::-1] > 0).argmax(axis=-1)
     rows = np.arange(len(fall))
     before, after = fall[rows, last], fall[rows, last + 1]

@@ -14,6 +14,7 @@ from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
     "MIN_RATE_HZ",
+    "REST_MS",
     "as_waveforms",
     "crossing_before",
     "cut",
@@ -27,7 +28,9 @@ MIN_RATE_HZ = 1000.0
 """Below this a surface MEP and an impact are not resolved; recordings use 3–10 kHz."""
 
 MIN_REST_MS = 20.0
-REST_MS = 200.0  # the last part of the rest, where a baseline that drifts is nearest to what it will be
+REST_MS = 200.0
+"""The last part of the rest, where a baseline that drifts is nearest to what it will be."""
+
 MAD_TO_SD = 1.4826  # of a normal distribution
 
 
