@@ -146,6 +146,14 @@ class Exchange:
                 raise DeviceError(f"{self._name} was disarmed while it was being armed")
             self._staged = True
 
+    def require_staged(self) -> None:
+        """Raise where it is not known to be armed.
+
+        Raises:
+            NotDelivered: it is not.
+        """
+        require_staged(self._name, staged=self._staged)
+
     def deliver(self, stimulus: Stimulus, timeout_s: float, read: Callable[[Reply], _T]) -> _T:
         """Have a pair of stimuli, or TMS alone, delivered.
 
@@ -162,7 +170,7 @@ class Exchange:
         if stimulus.tap_alone:
             raise NotDelivered(f"{self._name} cannot deliver a tap alone")
         with self._sending:
-            require_staged(self._name, staged=self._staged)
+            self.require_staged()
             request = self._next(Verb.DELIVER, timeout_s - min(_RESERVE_S, 0.1 * timeout_s), stimulus)
             with self._disarmed_after_failure(request):
                 self._carrier.send(request)

@@ -25,7 +25,7 @@ from isiw.trials import Channel, Stimulus, Sweep
 __all__ = ["LslChannel", "LslDevice"]
 
 _KEYS: Final = ("t_fired", "t_valve_ms", "t_hit_ms", "isi_sd_ms")
-_SEARCH_S: Final = 1.0  # liblsl finds only some of the streams in less than half a second
+_SEARCH_S: Final = 1.0  # in half a second liblsl finds only some of the streams
 _CLOCKS_S: Final = 0.05  # how far two clocks of the network may seem to be apart after their correction
 _BUFFER_S: Final = 10.0
 
@@ -100,9 +100,10 @@ class LslDevice:
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Sweep:
         """Have it fire by a marker, await its echo, and cut the sweep out of the streams."""
         end_s = time.monotonic() + timeout_s
+        self._exchange.require_staged()
         asked_s = self._lsl.local_clock()
         for stream in self._streams.values():
-            stream.require_live(self._lsl.local_clock())
+            stream.require_live(asked_s, self._before_s)
         return self._exchange.deliver(stimulus, _left_s(end_s), partial(self._sweep, asked_s, end_s))
 
     def stop(self) -> None:
@@ -153,8 +154,9 @@ class LslDevice:
     def _found(self, end_s: float) -> dict[str, Any]:
         """The streams by name, each there once."""
         wanted = {*self._rates_hz, self._markers.echo}
+        query = " or ".join(f"name='{name}'" for name in sorted(wanted))
         while True:
-            there = [info for info in self._lsl.resolve_streams(_SEARCH_S) if info.name() in wanted]
+            there = self._lsl.resolve_bypred(query, minimum=len(wanted) + 1, timeout=_SEARCH_S)
             if wanted == {info.name() for info in there}:
                 _require_once(there)
                 return {info.name(): info for info in there}
@@ -220,6 +222,8 @@ def _rates_hz(channels: Mapping[str, LslChannel]) -> dict[str, float]:
         raise InvalidValueError("a sweep needs its EMG", got=", ".join(channels), expected="a channel named emg")
     rates_hz: dict[str, float] = {}
     for channel in channels.values():
+        if "'" in channel.stream:
+            raise InvalidValueError("liblsl cannot look for a name with an apostrophe", got=channel.stream)
         if rates_hz.setdefault(channel.stream, channel.rate_hz) != channel.rate_hz:
             raise InvalidValueError(f"the stream {channel.stream} has two rates", got=channel.rate_hz)
     return rates_hz

@@ -96,11 +96,12 @@ class SampleStream:
         self._values: FloatArray = np.empty((0, 0))
         self._correction_s = 0.0
 
-    def require_live(self, now_s: float) -> None:
+    def require_live(self, now_s: float, history_s: float) -> None:
         """Raise where the stream is not running before anything is delivered.
 
         Args:
             now_s: the local clock [s].
+            history_s: how much must have come before [s]; it is awaited.
 
         Raises:
             NotDelivered: it is lost, silent or late.
@@ -108,6 +109,7 @@ class SampleStream:
         try:
             if not self._update(LATE_S):
                 raise self._silent()
+            self._await(float(self._stamps_s[0]) + self._correction_s + history_s, math.inf)
         except DeviceError as error:
             raise NotDelivered(error.what, remedy="Nothing was delivered. Start it again, then resume.") from error
         age_s = now_s - (self._stamps_s[-1] + self._correction_s)
