@@ -28,6 +28,7 @@ class Amplifier(threading.Thread):
         self.outlet: pylsl.StreamOutlet | None = pylsl.StreamOutlet(info)
         self.rate_hz, self.random = rate_hz, random.Random(1)  # noqa: S311 - noise
         self.start_s, self.sent, self.fired_s, self.fault = pylsl.local_clock(), 0, -math.inf, ""
+        self.drift_s = 0.0
 
     def run(self) -> None:
         while self.outlet is not None:
@@ -36,8 +37,8 @@ class Amplifier(threading.Thread):
             if self.outlet is not None and due > self.sent and self.fault != "silent":
                 last = self.sent + 2 if self.fault == "late" else due
                 samples = [self.sample(number) for number in range(self.sent, last)]
-                slower = 1.05 if self.fault == "rate" else 1.0
-                stamps = [self.start_s + number * slower / self.rate_hz for number in range(self.sent, last)]
+                self.drift_s += 0.05 * (last - self.sent) / self.rate_hz if self.fault == "rate" else 0.0
+                stamps = [self.start_s + self.drift_s + number / self.rate_hz for number in range(self.sent, last)]
                 self.outlet.push_chunk(samples, stamps)
                 self.sent = last
             time.sleep(_TICK_S)
