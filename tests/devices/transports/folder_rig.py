@@ -1,4 +1,7 @@
-"""A process that answers in a folder: `python folder_rig.py FOLDER [LIE] [--waveforms]`. It lies about trial 1 only."""
+"""A process that answers in a folder: `python -m devices.transports.folder_rig FOLDER [LIE] [--waveforms]`.
+
+It lies about trial 1 only, or where it arms or disarms, if the lie is about that.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import sys
 import time
 from pathlib import Path
 
-from lies import Values, answer
+from devices.transports.lies import Values, answer
 
 RATE_HZ, SAMPLES, T_TMS_MS = 2000.0, 1400, 600.0
 

@@ -1,4 +1,4 @@
-"""A process that answers on the Lab Streaming Layer: `python lsl_rig.py NAME FAULTS RATE_HZ`.
+"""A process that answers on the Lab Streaming Layer: `python -m devices.transports.lsl_rig NAME FAULTS RATE_HZ`.
 
 FAULTS is JSON: what is wrong with each trial, by its number; "arm" and "disarm" may be there, too.
 """
@@ -13,7 +13,8 @@ import threading
 import time
 
 import pylsl
-from lies import Values, answer
+
+from devices.transports.lies import Values, answer
 
 LATENCY_S = 0.025  # from the pulse to the peak of the MEP
 _TICK_S = 0.01
@@ -28,7 +29,7 @@ class Amplifier(threading.Thread):
         self.outlet: pylsl.StreamOutlet | None = pylsl.StreamOutlet(info)
         self.rate_hz, self.random = rate_hz, random.Random(1)  # noqa: S311 - noise
         self.start_s, self.sent, self.fired_s, self.fault = pylsl.local_clock(), 0, -math.inf, ""
-        self.drift_s = 0.0
+        self.stamp_s = self.start_s
 
     def run(self) -> None:
         while self.outlet is not None:
@@ -37,8 +38,9 @@ class Amplifier(threading.Thread):
             if self.outlet is not None and due > self.sent and self.fault != "silent":
                 last = self.sent + 2 if self.fault == "late" else due
                 samples = [self.sample(number) for number in range(self.sent, last)]
-                self.drift_s += 0.05 * (last - self.sent) / self.rate_hz if self.fault == "rate" else 0.0
-                stamps = [self.start_s + self.drift_s + number / self.rate_hz for number in range(self.sent, last)]
+                step_s = (1.05 if self.fault == "rate" else 1.0) / self.rate_hz
+                stamps = [self.stamp_s + step_s * ahead for ahead in range(last - self.sent)]
+                self.stamp_s += step_s * (last - self.sent)
                 self.outlet.push_chunk(samples, stamps)
                 self.sent = last
             time.sleep(_TICK_S)
@@ -48,6 +50,7 @@ class Amplifier(threading.Thread):
         if pylsl.local_clock() - self.fired_s < 0.03:
             return
         if self.fault == "dropped":
+            self.stamp_s += (due - self.sent) / self.rate_hz
             self.sent, self.fault = due, ""
         if self.fault == "lost":
             self.outlet = None

@@ -20,7 +20,7 @@ from isiw.testing import check_device
 from isiw.trials import Measurement, Stimulus, Sweep
 from known import instance
 
-RIG = Path(__file__).parent / "folder_rig.py"
+TESTS = Path(__file__).parents[2]
 SPACE = isiw.DesignSpace(10, 100, reference="impact")
 INFO = {"name": "folder", "reference": "impact", "simulated": True}
 WAVEFORMS: dict[str, Any] = {"info": INFO | {"channels": {"emg": "mV", "force": "N"}}, "rate_hz": 2000.0}
@@ -30,7 +30,8 @@ WAVEFORMS: dict[str, Any] = {"info": INFO | {"channels": {"emg": "mV", "force": 
 def rig(place: Path, lie: str = "", *, waveforms: bool = False) -> Iterator[None]:
     """Another process that answers in a folder, honestly or not."""
     flags = ["--waveforms"] if waveforms else []
-    with subprocess.Popen([sys.executable, RIG, place, lie, *flags]) as process:  # noqa: S603 - our own
+    command = [sys.executable, "-m", "devices.transports.folder_rig", str(place), lie, *flags]
+    with subprocess.Popen(command, cwd=TESTS) as process:  # noqa: S603 - our own
         try:
             wait_for((place / "ready").exists)
             yield

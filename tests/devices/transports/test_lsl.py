@@ -26,7 +26,7 @@ from isiw.trials import Stimulus
 pylsl = pytest.importorskip("pylsl", reason="the extra lsl is not installed")
 assert lsl_network
 
-RIG = Path(__file__).parent / "lsl_rig.py"
+TESTS = Path(__file__).parents[2]
 SPACE = isiw.DesignSpace(10, 100, reference="impact")
 RATE_HZ = 2000.0
 
@@ -35,8 +35,8 @@ RATE_HZ = 2000.0
 def rig(faults: Mapping[str, str] | None = None, *, rate_hz: float = RATE_HZ) -> Iterator[str]:
     """Another process with an amplifier and a stimulator, by the name of its streams."""
     name = f"rig-{uuid.uuid4().hex[:8]}"
-    arguments = [sys.executable, str(RIG), name, json.dumps(faults or {}), str(rate_hz)]
-    with subprocess.Popen(arguments) as process:  # noqa: S603 - our own
+    command = [sys.executable, "-m", "devices.transports.lsl_rig", name, json.dumps(faults or {}), str(rate_hz)]
+    with subprocess.Popen(command, cwd=TESTS) as process:  # noqa: S603 - our own
         try:
             yield name
         finally:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -91,7 +91,7 @@ class FolderDevice:
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
         """Have the other software deliver, and read what came of it."""
-        read = self._sweep if self._info.channels else partial(_measurement, stimulus)
+        read: Callable[[Reply], Answer] = self._sweep if self._info.channels else partial(_measurement, stimulus)
         return self._exchange.deliver(stimulus, timeout_s, read)
 
     def stop(self) -> None:
