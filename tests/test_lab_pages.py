@@ -8,13 +8,15 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
 from docs.draw_wiring import IMAGES, PICTURES
 
 import lsl_network
-from isiw.config.run import load_config, session_for
+from isiw.config.run import device_for, load_config, session_for
+from isiw.testing import check_device
 
 PAGES = Path(__file__).parents[1] / "docs" / "lab"
 assert lsl_network
@@ -42,7 +44,9 @@ def test_the_example_of_the_folder_runs(tmp_path: Path, monkeypatch: pytest.Monk
     with example("folder.md", tmp_path):
         while not (tmp_path / "shared").exists():
             time.sleep(0.01)
-        result = session_for(load_config("session.toml")).run()
+        config = load_config("session.toml")
+        check_device(partial(device_for, config), config.space.design())
+        result = session_for(config).run()
     assert len(result.trials.told) == 6
 
 
@@ -50,7 +54,9 @@ def test_the_example_of_lsl_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     pytest.importorskip("pylsl", reason="the extra lsl is not installed")
     monkeypatch.chdir(tmp_path)
     with example("lsl.md", tmp_path):
-        result = session_for(load_config("session.toml")).run()
+        config = load_config("session.toml")
+        check_device(partial(device_for, config), config.space.design())
+        result = session_for(config).run()
     assert len(result.trials.told) == 6
     assert all(trial.mep_mv is not None and 0.25 < trial.mep_mv < 0.35 for trial in result.trials.told)
 

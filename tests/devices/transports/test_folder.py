@@ -17,7 +17,7 @@ import isiw
 from isiw.config.run import load_config, session_for
 from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
 from isiw.testing import check_device
-from isiw.trials import Measurement, Stimulus, Sweep
+from isiw.trials import Measurement, MistrialReason, Stimulus, Sweep
 from known import instance
 
 TESTS = Path(__file__).parents[2]
@@ -110,6 +110,19 @@ def test_a_session_runs_from_a_configuration_file_and_leaves_no_answers_behind(t
     assert (place / "ledger").read_text().split() == ["0", "1", "2", "3"]
     assert request_in(place)["verb"] == "disarm"
     assert not list(place.glob("answer-*"))
+
+
+def test_a_session_with_an_answer_that_is_lost_goes_on_and_gives_nothing_twice(tmp_path: Path) -> None:
+    strategy = isiw.make_strategy("incremental", space=SPACE, max_trials=4)
+    with rig(tmp_path, "silence"):
+        session = isiw.Session(device(tmp_path), strategy, log=tmp_path / "log.mcap", timeout_s=0.5)
+        with pytest.raises(DeviceTimeoutError, match="nobody answered to deliver"):
+            session.run()
+        result = isiw.resume(tmp_path / "log.mcap", device(tmp_path)).run()
+    assert (tmp_path / "ledger").read_text().split() == [
+        str(trial.index) for trial in result.trials if trial.index != 1
+    ]
+    assert [trial.reason for trial in result.trials][:2] == [None, MistrialReason.OUTCOME_UNKNOWN]
 
 
 LIES: dict[str, tuple[type[Exception], str]] = {

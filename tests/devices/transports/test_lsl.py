@@ -19,7 +19,7 @@ import pytest
 
 import isiw
 import lsl_network
-from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
+from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
 from isiw.testing import check_device
 from isiw.trials import Stimulus
 
@@ -179,6 +179,12 @@ def test_stopping_from_another_thread_ends_a_delivery_that_waits() -> None:
         made.stop()
         delivering.join(5.0)
     assert "disarmed before it answered to deliver" in str(errors[0])
+
+
+def test_without_pylsl_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pylsl", None)
+    with pytest.raises(ConfigError, match=r'pip install "isiw\[lsl\]"'):
+        device("rig")
 
 
 def test_channels_must_make_sense() -> None:

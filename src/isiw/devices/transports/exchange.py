@@ -137,14 +137,20 @@ class Exchange:
             DeviceTimeoutError: no answer in time.
         """
         end_s = time.monotonic() + timeout_s
-        self._confirmed(self._sent(Verb.DISARM, timeout_s))
-        request = self._sent(Verb.ARM, max(0.0, end_s - time.monotonic()))
-        with self._disarmed_after_failure(request):
-            self._confirmed(request)
+        disarming = self._sent(Verb.DISARM, timeout_s)
+        self._confirmed(disarming)
         with self._sending:
-            if self._newest is not request:
-                raise DeviceError(f"{self._name} was disarmed while it was being armed")
+            self._require_newest(disarming)
+            arming = self._sent(Verb.ARM, max(0.0, end_s - time.monotonic()))
+        with self._disarmed_after_failure(arming):
+            self._confirmed(arming)
+        with self._sending:
+            self._require_newest(arming)
             self._staged = True
+
+    def _require_newest(self, request: Request) -> None:
+        if self._newest is not request:
+            raise DeviceError(f"{self._name} was stopped while it was being armed")
 
     def require_staged(self) -> None:
         """Raise where it is not known to be armed.
