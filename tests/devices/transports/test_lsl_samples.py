@@ -52,7 +52,7 @@ def test_a_cut_is_made_on_the_local_clock() -> None:
 def test_the_correction_of_the_clock_is_that_of_the_moment() -> None:
     inlet = FakeInlet(stamps(0, 900))
     made = stream(inlet)
-    made.require_live(CORRECTION_S + 0.9, 0.5)
+    made.require_live(lambda: CORRECTION_S + 0.9, 0.5)
     inlet.correction_s, inlet.chunks = CORRECTION_S + 0.1, [stamps(900, 1000)]
     assert made.cut(250.2995, 251.05, np.inf)[1][0, 0] == 200.0
 
@@ -72,13 +72,20 @@ def test_only_the_newest_samples_are_kept() -> None:
 @pytest.mark.parametrize(
     ("chunk", "words"),
     [
-        (np.delete(stamps(0, 700), slice(300, 310)), "were dropped; got '10 ms after 199 ms of the sweep'"),
+        (np.delete(stamps(0, 700), slice(300, 310)), "were dropped; got '10 ms after 200 ms of the sweep'"),
         (np.concatenate([stamps(0, 300), stamps(280, 700)]), "jumped back; got '20 ms after"),
         (stamps(0, 700) * 1.02, "do not come at their rate; got '980.392 Hz in the sweep'; expected 1000 Hz"),
     ],
 )
 def test_what_is_wrong_with_the_timing_of_samples_is_told(chunk: FloatArray, words: str) -> None:
     with pytest.raises(DeviceError, match=words):
+        stream(FakeInlet(chunk)).cut(250.1, 250.6, np.inf)
+
+
+@pytest.mark.parametrize("edge", [100, 600])
+def test_a_gap_at_the_edge_of_a_sweep_is_seen(edge: int) -> None:
+    chunk = np.delete(stamps(0, 700), slice(edge - 5, edge + 5))
+    with pytest.raises(DeviceError, match="were dropped; got '10 ms"):
         stream(FakeInlet(chunk)).cut(250.1, 250.6, np.inf)
 
 
@@ -96,13 +103,13 @@ def test_a_sweep_without_samples_is_told() -> None:
 @pytest.mark.parametrize(("now_s", "words"), [(255.0, "are late; got '4.1 s'"), (247.0, "are ahead of time")])
 def test_nothing_is_delivered_while_samples_are_late_or_ahead(now_s: float, words: str) -> None:
     with pytest.raises(NotDelivered, match=words):
-        stream(FakeInlet(stamps(0, 900))).require_live(now_s, 0.5)
+        stream(FakeInlet(stamps(0, 900))).require_live(lambda: now_s, 0.5)
 
 
 def test_nothing_is_delivered_while_a_stream_is_lost_or_silent() -> None:
     inlet = FakeInlet()
     with pytest.raises(NotDelivered, match=r"the stream emg has fallen silent.*Nothing was delivered"):
-        stream(inlet).require_live(0.0, 0.5)
+        stream(inlet).require_live(lambda: 0.0, 0.5)
     inlet.lost = True
     with pytest.raises(NotDelivered, match=r"the stream emg is lost.*Nothing was delivered"):
-        stream(inlet).require_live(0.0, 0.5)
+        stream(inlet).require_live(lambda: 0.0, 0.5)

@@ -101,9 +101,9 @@ class LslDevice:
         """Have it fire by a marker, await its echo, and cut the sweep out of the streams."""
         end_s = time.monotonic() + timeout_s
         self._exchange.require_staged()
-        asked_s = self._lsl.local_clock()
         for stream in self._streams.values():
-            stream.require_live(asked_s, self._before_s)
+            stream.require_live(self._lsl.local_clock, self._before_s)
+        asked_s = self._lsl.local_clock()
         return self._exchange.deliver(stimulus, _left_s(end_s), partial(self._sweep, asked_s, end_s))
 
     def stop(self) -> None:

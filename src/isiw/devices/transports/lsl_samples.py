@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -96,11 +97,11 @@ class SampleStream:
         self._values: FloatArray = np.empty((0, 0))
         self._correction_s = 0.0
 
-    def require_live(self, now_s: float, history_s: float) -> None:
+    def require_live(self, clock: Callable[[], float], history_s: float) -> None:
         """Raise where the stream is not running before anything is delivered.
 
         Args:
-            now_s: the local clock [s].
+            clock: the local clock [s].
             history_s: how much must have come before [s]; it is awaited.
 
         Raises:
@@ -109,10 +110,11 @@ class SampleStream:
         try:
             if not self._update(LATE_S):
                 raise self._silent()
-            self._await(float(self._stamps_s[0]) + self._correction_s + history_s, math.inf)
+            begun_s = float(self._stamps_s[0]) + self._correction_s
+            self._await(begun_s + history_s, time.monotonic() + history_s + LATE_S)
         except DeviceError as error:
             raise NotDelivered(error.what, remedy="Nothing was delivered. Start it again, then resume.") from error
-        age_s = now_s - (self._stamps_s[-1] + self._correction_s)
+        age_s = clock() - self._newest_s
         if abs(age_s) > LATE_S:
             raise NotDelivered(
                 f"the samples of {self._name} are {'late' if age_s > 0 else 'ahead of time'}",
@@ -142,7 +144,8 @@ class SampleStream:
             raise DeviceError(
                 f"the samples of {self._name} begin after the sweep does", got=f"{times_s[0] - start_s:.3g} s later"
             )
-        check_timing(self._name, times_s[first:last], self._rate_hz, self._max_jitter_ms)
+        about = times_s[max(first - 1, 0) : last + 1]  # so that a gap at either end is seen
+        check_timing(self._name, about, self._rate_hz, self._max_jitter_ms)
         begin_s = float(np.median(times_s[first:last] - np.arange(last - first) / self._rate_hz))
         return begin_s, self._values[first:last]
 
