@@ -61,7 +61,7 @@ def rig(name: str, rate_hz: float, columns: int) -> None:
 def staged(rate_hz: float, sweep_s: float) -> Iterator[isiw.LslDevice]:
     """A device with a rig of its own."""
     name = f"throughput-{uuid.uuid4().hex[:8]}"
-    process = multiprocessing.Process(target=rig, args=(name, rate_hz, len(UNITS)), daemon=True)
+    process = multiprocessing.get_context("spawn").Process(target=rig, args=(name, rate_hz, len(UNITS)), daemon=True)
     process.start()
     channels = {
         channel: isiw.LslChannel(f"{name}-emg", unit, rate_hz, column)
