@@ -1,10 +1,11 @@
-"""A process that answers in a folder: `python -m devices.transports.folder_rig FOLDER [LIE] [--waveforms]`.
+"""A process that answers in a folder: `python -m devices.transports.folder_rig FOLDER FAULTS [--waveforms]`.
 
-It lies about trial 1 only, or where it arms or disarms, if the lie is about that.
+FAULTS is JSON: what is wrong with each trial, by its number; "arm" and "disarm" may be there, too.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import random
 import sys
@@ -35,7 +36,13 @@ def write(path: Path, text: str) -> None:
 
 def measured(request: Values, lie: str) -> Values:
     """What an answer has besides, where the rig measures the MEP itself."""
-    values: Values = {"mep_mv": "0,4" if lie == "a decimal comma" else "nan" if lie == "a NaN MEP" else 0.4}
+    values: Values = {
+        "mep_mv": "0,4"
+        if lie == "a decimal comma"
+        else "nan"
+        if lie == "a NaN MEP"
+        else 0.4 + 0.001 * int(request["trial"])
+    }
     if lie == "no MEP":
         values = {}
     if lie == "an enormous MEP":
@@ -85,8 +92,6 @@ def as_text(values: Values, lie: str) -> str:
 
 def obey(request: Values, lie: str, place: Path, *, records: bool) -> None:
     """Answer one request."""
-    if lie in {"silence", f"deaf to {request['verb']}"}:
-        return
     values = answer(request, lie)
     if request["verb"] == "deliver":
         with (place / "ledger").open("a") as ledger:
@@ -94,20 +99,21 @@ def obey(request: Values, lie: str, place: Path, *, records: bool) -> None:
         values |= recorded(request, lie, place) if records else measured(request, lie)
         if lie == "late":
             time.sleep(1.0)
-    write(place / request["answer"], as_text(values, lie))
+    if lie != "silence":
+        write(place / request["answer"], as_text(values, lie))
 
 
 def main() -> None:
     """Answer until the folder is gone."""
-    place, lie = Path(sys.argv[1]), (sys.argv[2:] or [""])[0]
+    place, faults = Path(sys.argv[1]), json.loads(sys.argv[2])
     last: tuple[str, str] | None = None
     (place / "ready").touch()
     while (place / "ready").exists():
         request = read(place)
         if request is not None and (request["token"], request["number"]) != last:
             last = (request["token"], request["number"])
-            spoilt = request["trial"] == "1" if request["verb"] == "deliver" else lie.endswith(f" {request['verb']}")
-            obey(request, lie if spoilt else "", place, records="--waveforms" in sys.argv)
+            fault = faults.get(request["trial"] if request["verb"] == "deliver" else request["verb"], "")
+            obey(request, fault, place, records="--waveforms" in sys.argv)
         time.sleep(0.005)
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import random
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,9 +18,11 @@ import pytest
 import isiw
 from isiw.config.run import load_config, session_for
 from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
+from isiw.session.loop import SessionResult
 from isiw.testing import check_device
 from isiw.trials import Measurement, MistrialReason, Stimulus, Sweep
 from known import instance
+from scripted import scripted_strategy
 
 TESTS = Path(__file__).parents[2]
 SPACE = isiw.DesignSpace(10, 100, reference="impact")
@@ -27,10 +31,10 @@ WAVEFORMS: dict[str, Any] = {"info": INFO | {"channels": {"emg": "mV", "force": 
 
 
 @contextmanager
-def rig(place: Path, lie: str = "", *, waveforms: bool = False) -> Iterator[None]:
+def rig(place: Path, faults: Mapping[str, str] | None = None, *, waveforms: bool = False) -> Iterator[None]:
     """Another process that answers in a folder, honestly or not."""
     flags = ["--waveforms"] if waveforms else []
-    command = [sys.executable, "-m", "devices.transports.folder_rig", str(place), lie, *flags]
+    command = [sys.executable, "-m", "devices.transports.folder_rig", str(place), json.dumps(faults or {}), *flags]
     with subprocess.Popen(command, cwd=TESTS) as process:  # noqa: S603 - our own
         try:
             wait_for((place / "ready").exists)
@@ -53,7 +57,7 @@ def device(place: Path, **changed: Any) -> isiw.FolderDevice:
 
 @contextmanager
 def staged(place: Path, lie: str = "", *, waveforms: bool = False, **changed: Any) -> Iterator[isiw.FolderDevice]:
-    with rig(place, lie, waveforms=waveforms):
+    with rig(place, {"1": lie}, waveforms=waveforms):
         made = device(place, **(WAVEFORMS if waveforms else {}) | changed)
         made.stage()
         yield made
@@ -112,19 +116,6 @@ def test_a_session_runs_from_a_configuration_file_and_leaves_no_answers_behind(t
     assert not list(place.glob("answer-*"))
 
 
-def test_a_session_with_an_answer_that_is_lost_goes_on_and_gives_nothing_twice(tmp_path: Path) -> None:
-    strategy = isiw.make_strategy("incremental", space=SPACE, max_trials=4)
-    with rig(tmp_path, "silence"):
-        session = isiw.Session(device(tmp_path), strategy, log=tmp_path / "log.mcap", timeout_s=0.5)
-        with pytest.raises(DeviceTimeoutError, match="nobody answered to deliver"):
-            session.run()
-        result = isiw.resume(tmp_path / "log.mcap", device(tmp_path)).run()
-    assert (tmp_path / "ledger").read_text().split() == [
-        str(trial.index) for trial in result.trials if trial.index != 1
-    ]
-    assert [trial.reason for trial in result.trials][:2] == [None, MistrialReason.OUTCOME_UNKNOWN]
-
-
 LIES: dict[str, tuple[type[Exception], str]] = {
     "silence": (DeviceTimeoutError, "nobody answered to deliver"),
     "late": (DeviceTimeoutError, "nobody answered to deliver"),
@@ -176,6 +167,31 @@ def test_another_realised_isi_is_left_to_the_judgement_of_the_session(tmp_path: 
         assert instance(Measurement, made.deliver(Stimulus(1, 50.0), 5.0)).isi_ms == 1050.0
 
 
+def test_whatever_fails_a_session_goes_on_and_its_log_has_each_pair_that_was_fired_once(tmp_path: Path) -> None:
+    rng, trials = random.Random(20), 30  # noqa: S311 - which trials fail
+    lies = [lie for lie in LIES if lie not in {"refuses", "late"}]
+    faults = {str(trial): rng.choice(lies) for trial in rng.sample(range(trials), 12)}
+    strategy, log = scripted_strategy(trials, space=SPACE), tmp_path / "log.mcap"
+    with rig(tmp_path, faults):
+        session = isiw.Session(device(tmp_path), strategy, log=log, timeout_s=0.6)
+        ended = 0
+        while (result := finished(session)) is None:
+            ended += 1
+            session = isiw.resume(log, device(tmp_path), scripted_strategy(trials, space=SPACE))
+    assert ended == len(faults)
+    assert (tmp_path / "ledger").read_text().split() == [str(trial.index) for trial in result.trials]
+    unknown = {str(trial.index) for trial in result.trials if trial.reason is MistrialReason.OUTCOME_UNKNOWN}
+    assert unknown == set(faults)
+
+
+def finished(session: isiw.Session) -> SessionResult | None:
+    """The result of a session; None where it ended because the device failed."""
+    try:
+        return session.run()
+    except DeviceError:
+        return None
+
+
 WRONG_WAVEFORMS = {
     "no waveforms": "the waveforms are missing",
     "too few samples": "not whole; got 1399; expected 1400 samples",
@@ -219,7 +235,7 @@ def test_without_the_folder_staging_fails(tmp_path: Path) -> None:
 
 
 def test_what_does_not_arm_is_not_staged(tmp_path: Path) -> None:
-    with rig(tmp_path, "cannot arm"):
+    with rig(tmp_path, {"arm": "cannot arm"}):
         made = device(tmp_path)
         with pytest.raises(DeviceError, match="failed to arm: the relay is stuck"):
             made.stage()
@@ -229,7 +245,7 @@ def test_what_does_not_arm_is_not_staged(tmp_path: Path) -> None:
 
 
 def test_what_is_deaf_to_arming_is_disarmed(tmp_path: Path) -> None:
-    with rig(tmp_path, "deaf to arm"):
+    with rig(tmp_path, {"arm": "silence"}):
         made = device(tmp_path, stage_timeout_s=0.3)
         with pytest.raises(DeviceTimeoutError, match="nobody answered to arm"):
             made.stage()
@@ -265,7 +281,7 @@ def test_a_delivery_that_nobody_has_read_is_gone_when_it_is_stopped(tmp_path: Pa
 
 def test_stopping_ends_a_delivery_that_waits(tmp_path: Path) -> None:
     errors: list[BaseException] = []
-    with staged(tmp_path, "deaf to deliver") as made:
+    with staged(tmp_path, "silence") as made:
         delivering = threading.Thread(target=failing_delivery, args=(made, 20.0, errors))
         delivering.start()
         wait_for(lambda: request_in(tmp_path)["verb"] == "deliver")
@@ -279,7 +295,7 @@ def test_what_an_earlier_run_left_behind_is_never_taken(tmp_path: Path) -> None:
         made.deliver(Stimulus(0, 50.0), 5.0)
         left = tmp_path / "answer-0badf00d-3.txt"
         left.write_text("token=0badf00d\nnumber=3\nsaid=delivered\ntrial=1\nset_isi_ms=50\nmep_mv=9\nisi_ms=50\nend\n")
-        assert instance(Measurement, made.deliver(Stimulus(1, 60.0), 5.0)) == Measurement(0.4, 60.1)
+        assert instance(Measurement, made.deliver(Stimulus(1, 60.0), 5.0)) == Measurement(0.401, 60.1)
         assert left.exists()
 
 

@@ -232,5 +232,5 @@ def _rates_hz(channels: Mapping[str, LslChannel]) -> dict[str, float]:
 def _pylsl() -> Any:
     try:
         return importlib.import_module("pylsl")
-    except ImportError as error:
-        raise ConfigError("pylsl is not installed", remedy='Install it with: pip install "isiw[lsl]"') from error
+    except (ImportError, RuntimeError) as error:  # the latter where liblsl itself is missing
+        raise ConfigError("pylsl is not installed", got=f"{error}", remedy='pip install "isiw[lsl]"') from error
