@@ -1,6 +1,7 @@
-"""A process that answers on the Lab Streaming Layer: `python -m devices.transports.lsl_rig NAME FAULTS RATE_HZ`.
+"""A process that answers on the Lab Streaming Layer: `python -m devices.transports.lsl_rig NAME FAULTS RATE_HZ …`.
 
-FAULTS is JSON: what is wrong with each trial, by its number; "arm" and "disarm" may be there, too.
+FAULTS is JSON: what is wrong with each trial, by its number; "arm" and "disarm" may be there, too. A second rate is that
+of an accelerometer.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ class Amplifier(threading.Thread):
 
     def __init__(self, name: str, rate_hz: float) -> None:
         super().__init__(daemon=True)
-        info = pylsl.StreamInfo(f"{name}-emg", "EMG", 2, rate_hz, "float32", f"{name}-emg")
+        info = pylsl.StreamInfo(name, "EMG", 2, rate_hz, "float32", name)
         self.outlet: pylsl.StreamOutlet | None = pylsl.StreamOutlet(info)
         self.rate_hz, self.random = rate_hz, random.Random(1)  # noqa: S311 - noise
         self.start_s, self.sent, self.fired_s, self.fault = pylsl.local_clock(), 0, -math.inf, ""
@@ -64,8 +65,10 @@ class Amplifier(threading.Thread):
 def main() -> None:
     """Answer until nobody cares."""
     name, faults, rate_hz = sys.argv[1], json.loads(sys.argv[2]), float(sys.argv[3])
-    amplifier = Amplifier(name, rate_hz)
+    amplifier = Amplifier(f"{name}-emg", rate_hz)
     amplifier.start()
+    for accelerometer_hz in map(float, sys.argv[4:]):
+        Amplifier(f"{name}-accelerometer", accelerometer_hz).start()
     echo = pylsl.StreamOutlet(pylsl.StreamInfo(f"{name}-echo", "Markers", 1, 0, "string", f"{name}-echo"))
     found = pylsl.resolve_byprop("name", f"{name}-markers", 1, 30)
     markers = pylsl.StreamInlet(found[0])

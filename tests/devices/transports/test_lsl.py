@@ -32,10 +32,11 @@ RATE_HZ = 2000.0
 
 
 @contextmanager
-def rig(faults: Mapping[str, str] | None = None, *, rate_hz: float = RATE_HZ) -> Iterator[str]:
+def rig(faults: Mapping[str, str] | None = None, *others_hz: float) -> Iterator[str]:
     """Another process with an amplifier and a stimulator, by the name of its streams."""
     name = f"rig-{uuid.uuid4().hex[:8]}"
-    command = [sys.executable, "-m", "devices.transports.lsl_rig", name, json.dumps(faults or {}), str(rate_hz)]
+    command = [sys.executable, "-m", "devices.transports.lsl_rig", name, json.dumps(faults or {})]
+    command += map(str, (RATE_HZ, *others_hz))
     with subprocess.Popen(command, cwd=TESTS) as process:  # noqa: S603 - our own
         try:
             yield name
@@ -63,9 +64,11 @@ def staged(faults: Mapping[str, str]) -> Iterator[isiw.LslDevice]:
         yield made
 
 
-def test_it_conforms() -> None:
-    with rig() as name:
-        made = device(name, before_ms=150.0)
+def test_it_conforms_also_with_an_accelerometer_on_a_stream_of_its_own() -> None:
+    with rig({}, 1000.0) as name:
+        emg = {"stream": f"{name}-emg", "unit": "mV", "rate_hz": RATE_HZ}
+        acceleration = {"stream": f"{name}-accelerometer", "unit": "m/s^2", "rate_hz": 1000.0, "column": 1}
+        made = device(name, channels={"emg": emg, "acceleration": acceleration}, before_ms=150.0)
         rows = dict(check_device(lambda: made, SPACE, iti_s=0.15, clock=isiw.MonotonicClock()).rows)
     assert rows["realised minus wanted ISI"] == "+0.0, +0.0, +0.0 ms"
     assert rows["judged"] == "accepted, accepted, accepted, accepted"
