@@ -6,6 +6,7 @@ and nothing of a lab's network is seen. Import it before anything calls liblsl, 
 
 from __future__ import annotations
 
+import atexit
 import os
 import tempfile
 import uuid
@@ -33,4 +34,5 @@ level = -3
 
 with tempfile.NamedTemporaryFile("w", suffix=".cfg", prefix="isiw-lsl-", delete=False) as _file:
     _file.write(_CONFIGURATION)
-os.environ["LSLAPICFG"] = str(Path(_file.name))
+os.environ["LSLAPICFG"] = _file.name
+atexit.register(Path(_file.name).unlink, missing_ok=True)

@@ -1,7 +1,7 @@
 """A process that answers on the Lab Streaming Layer: `python -m devices.transports.lsl_rig NAME FAULTS RATE_HZ …`.
 
-FAULTS is JSON: what is wrong with each trial, by its number; "arm" and "disarm" may be there, too. A second rate is that
-of an accelerometer.
+FAULTS is JSON: what is wrong with each trial, by its number; "arm" and "disarm" may be there, too. A second rate is
+that of an accelerometer.
 """
 
 from __future__ import annotations

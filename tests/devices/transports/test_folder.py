@@ -18,7 +18,7 @@ import pytest
 import isiw
 from isiw.config.run import load_config, session_for
 from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
-from isiw.session.loop import SessionResult
+from isiw.session.updates import SessionResult
 from isiw.testing import check_device
 from isiw.trials import Measurement, MistrialReason, Stimulus, Sweep
 from known import instance
