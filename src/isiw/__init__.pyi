@@ -34,6 +34,9 @@ from .devices.robot.tapper import Tapper as Tapper
 from .devices.robot.tapper import TapperSettings as TapperSettings
 from .devices.simulated import SimulatedDevice as SimulatedDevice
 from .devices.simulated import SimulatedPerson as SimulatedPerson
+from .devices.transports.folder import FolderDevice as FolderDevice
+from .devices.transports.lsl import LslChannel as LslChannel
+from .devices.transports.lsl import LslDevice as LslDevice
 from .log.reader import read_session as read_session
 from .session.loop import Session as Session
 from .session.recorder import Recorder as Recorder

@@ -1,0 +1,288 @@
+"""Requests to the software that drives the hardware, and its answers, whatever carries them.
+
+Each request has a number and the token of the device object, and its answer has both, so that no answer to another
+request or of an earlier run is ever taken. The newest request replaces all before it. Nothing counts as armed,
+delivered or disarmed because nobody objected: each needs an answer that says so. A delivery or an arming that is not
+answered as it should be is followed by a request to disarm at once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import secrets
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Final, Protocol, TypeVar
+
+from isiw.checks import number
+from isiw.devices.protocol import DeviceInfo, require_staged
+from isiw.devices.transports.reply import Reply
+from isiw.errors import DeviceError, InvalidValueError, NotDelivered
+from isiw.trials import Stimulus
+
+__all__ = ["Carrier", "Exchange", "Request", "Verb", "described"]
+
+_T = TypeVar("_T")
+
+SET_TOLERANCE_MS: Final = 0.5
+"""How far the ISI that the hardware was set to may be from the one that was asked for: what a coarse timer rounds."""
+
+_GLANCE_S: Final = 0.05  # how long an answer is awaited before looking whether the request is still the newest
+_RESERVE_S: Final = 0.2  # of a delivery's time, kept for what follows the answer
+
+
+class Verb(StrEnum):
+    """What is asked for."""
+
+    ARM = "arm"
+    DELIVER = "deliver"
+    DISARM = "disarm"
+
+
+_WANTED: Final[Mapping[Verb, str]] = {Verb.ARM: "armed", Verb.DELIVER: "delivered", Verb.DISARM: "disarmed"}
+_KEYS: Final = frozenset({"token", "number", "said", "reason", "trial", "set_isi_ms"})
+
+
+@dataclass(frozen=True)
+class Request:
+    """One request.
+
+    Args:
+        token: of the device object that asks.
+        number: counts up from 1.
+        verb: what is asked for.
+        timeout_s: how long an answer is awaited [s]; what is read later must not be obeyed.
+        stimulus: what to deliver.
+    """
+
+    token: str
+    number: int
+    verb: Verb
+    timeout_s: float
+    stimulus: Stimulus | None = None
+
+    def values(self) -> dict[str, str | int | float]:
+        """What is sent, in the order in which it is written; TMS alone has no `isi_ms`."""
+        values: dict[str, str | int | float] = {"token": self.token, "number": self.number, "verb": self.verb.value}
+        if self.stimulus is not None:
+            values |= {"trial": self.stimulus.trial, "kind": "tms_alone" if self.stimulus.isi_ms is None else "pair"}
+            values |= {} if self.stimulus.isi_ms is None else {"isi_ms": self.stimulus.isi_ms}
+        return values | {"timeout_s": self.timeout_s}
+
+
+class Carrier(Protocol):
+    """Takes requests to the other software, and brings its answers."""
+
+    def send(self, request: Request) -> None:
+        """Send a request.
+
+        Raises:
+            NotDelivered: nobody can have seen it.
+            DeviceError: it cannot be sent.
+        """
+
+    def reply(self, request: Request, wait_s: float) -> Reply | None:
+        """The answer to a request; None where there is none yet.
+
+        Args:
+            request: the request.
+            wait_s: the longest to wait for it [s].
+
+        Raises:
+            DeviceError: an answer that cannot be read, or a connection that is lost.
+        """
+
+    def silence(self, request: Request) -> DeviceError:
+        """The error to raise where no answer came in time."""
+
+
+class Exchange:
+    """Arms, delivers and disarms by requests, one at a time; `disarm` may come from any thread.
+
+    Args:
+        name: what is asked, for messages.
+        carrier: carries requests and answers.
+        keys: what an answer to a delivery may have besides what every answer has.
+        stop_timeout_s: how long an answer to a request to disarm is awaited [s].
+    """
+
+    def __init__(self, name: str, carrier: Carrier, keys: Iterable[str], stop_timeout_s: float) -> None:
+        self._name, self._carrier = name, carrier
+        self._keys = {Verb.ARM: _KEYS, Verb.DELIVER: _KEYS | frozenset(keys), Verb.DISARM: _KEYS}
+        self._stop_timeout_s = number("stop_timeout_s", stop_timeout_s, above=0)
+        self._token = secrets.token_hex(4)
+        self._sending = threading.RLock()
+        self._newest: Request | None = None
+        self._numbers = 0
+        self._arming = self._disarmed = 0  # the last request to arm, and the last to disarm that was obeyed
+        self._staged = False
+
+    @property
+    def may_be_armed(self) -> bool:
+        """Whether arming was asked for since the last time that something was known to be disarmed."""
+        return self._arming > self._disarmed
+
+    def arm(self, timeout_s: float) -> None:
+        """Have it disarmed, which shows that somebody is there and undoes what an earlier run left, and then armed.
+
+        Args:
+            timeout_s: the longest that both may take [s].
+
+        Raises:
+            DeviceError: it cannot be armed.
+            DeviceTimeoutError: no answer in time.
+        """
+        end_s = time.monotonic() + timeout_s
+        disarming = self._sent(Verb.DISARM, timeout_s)
+        self._confirmed(disarming)
+        with self._sending:
+            self._require_newest(disarming)
+            arming = self._sent(Verb.ARM, max(0.0, end_s - time.monotonic()))
+        with self._disarmed_after_failure(arming):
+            self._confirmed(arming)
+        with self._sending:
+            self._require_newest(arming)
+            self._staged = True
+
+    def _require_newest(self, request: Request) -> None:
+        if self._newest is not request:
+            raise DeviceError(f"{self._name} was stopped while it was being armed")
+
+    def require_staged(self) -> None:
+        """Raise where it is not known to be armed.
+
+        Raises:
+            NotDelivered: it is not.
+        """
+        require_staged(self._name, staged=self._staged)
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float, read: Callable[[Reply], _T]) -> _T:
+        """Have a pair of stimuli, or TMS alone, delivered.
+
+        Args:
+            stimulus: what to deliver.
+            timeout_s: the longest it may take [s].
+            read: makes of the answer what is returned.
+
+        Raises:
+            NotDelivered: not armed, or refused before firing.
+            DeviceTimeoutError: no answer in time.
+            DeviceError: anything else; whether the pulse was given is not known.
+        """
+        if stimulus.tap_alone:
+            raise NotDelivered(f"{self._name} cannot deliver a tap alone")
+        with self._sending:
+            self.require_staged()
+            request = self._next(Verb.DELIVER, timeout_s - min(_RESERVE_S, 0.1 * timeout_s), stimulus)
+            with self._disarmed_after_failure(request):
+                self._carrier.send(request)
+        with self._disarmed_after_failure(request):
+            reply = self._confirmed(request)
+            _require_answer_to(stimulus, reply)
+            try:
+                return read(reply)
+            except InvalidValueError as error:
+                raise reply.broken(error.what, got=error.got) from error
+
+    def disarm(self) -> None:
+        """Have it disarmed. Where nobody answers, that is an error only if it may be armed.
+
+        Raises:
+            DeviceError: it may still be armed.
+        """
+        try:
+            self._confirmed(self._sent(Verb.DISARM, self._stop_timeout_s))
+        except DeviceError:
+            if self.may_be_armed:
+                raise
+
+    def _next(self, verb: Verb, timeout_s: float, stimulus: Stimulus | None = None) -> Request:
+        self._numbers += 1
+        self._newest = Request(self._token, self._numbers, verb, timeout_s, stimulus)
+        return self._newest
+
+    def _sent(self, verb: Verb, timeout_s: float) -> Request:
+        """A new request to arm or to disarm, sent."""
+        with self._sending:
+            self._staged = False
+            request = self._next(verb, timeout_s)
+            if verb is Verb.ARM:
+                self._arming = request.number
+            self._carrier.send(request)
+        return request
+
+    @contextmanager
+    def _disarmed_after_failure(self, request: Request) -> Iterator[None]:
+        """Within, whatever fails but a refusal has it disarmed, unless something newer was asked for meanwhile."""
+        try:
+            yield
+        except NotDelivered:
+            raise
+        except BaseException:
+            with self._sending, suppress(DeviceError):  # whoever calls `stop` after the failure is told
+                if self._newest is request:
+                    self._sent(Verb.DISARM, self._stop_timeout_s)
+            raise
+
+    def _confirmed(self, request: Request) -> Reply:
+        """The answer to a request, which says that what was asked for was done."""
+        reply = self._awaited(request)
+        reply.require_known(self._keys[request.verb])
+        said = reply.text("said")
+        if said in {"refused", "failed"}:
+            kind = NotDelivered if (said, request.verb) == ("refused", Verb.DELIVER) else DeviceError
+            raise kind(f"{self._name} {said} to {request.verb}: {reply.text('reason') or 'it does not say why'}")
+        if said != _WANTED[request.verb]:
+            raise reply.broken(f"the answer to {request.verb} is another", got=said, expected=_WANTED[request.verb])
+        if request.verb is Verb.DISARM:
+            self._disarmed = max(self._disarmed, request.number)
+        return reply
+
+    def _awaited(self, request: Request) -> Reply:
+        end_s = time.monotonic() + request.timeout_s
+        while True:
+            left_s = end_s - time.monotonic()
+            disarmed = self._disarmed > request.number
+            reply = self._carrier.reply(request, max(0.0, min(left_s, _GLANCE_S)))
+            if reply is not None:
+                return reply
+            if disarmed:
+                raise DeviceError(
+                    f"{self._name} was disarmed before it answered to {request.verb}",
+                    remedy="Whether the pulse was given is not known.",
+                )
+            if left_s <= 0:
+                raise self._carrier.silence(request)
+
+
+def _require_answer_to(stimulus: Stimulus, reply: Reply) -> None:
+    """Raise where an answer is not about the stimulus that was asked for."""
+    if (trial := reply.whole("trial")) != stimulus.trial:
+        raise reply.broken("the answer is about another trial", got=trial, expected=f"trial {stimulus.trial}")
+    if stimulus.isi_ms is None:
+        if reply.has("set_isi_ms"):
+            raise reply.broken("an ISI was set where TMS alone was asked for", got=reply.number("set_isi_ms"))
+        return
+    set_ms = reply.number("set_isi_ms")
+    if abs(set_ms - stimulus.isi_ms) > SET_TOLERANCE_MS:
+        raise reply.broken(
+            "the hardware was set to another ISI",
+            got=set_ms,
+            expected=f"{stimulus.isi_ms:g} ms",
+            remedy="set_isi_ms is what was read back from the hardware. Does the software read isi_ms as ms?",
+        )
+
+
+def described(info: DeviceInfo | Mapping[str, Any], **known: Any) -> DeviceInfo:
+    """What a device says about itself, from a table of a configuration or from the object.
+
+    Args:
+        info: the fields of a `DeviceInfo`.
+        **known: fields that the device itself knows.
+    """
+    given = info if isinstance(info, DeviceInfo) else DeviceInfo(**info)
+    return dataclasses.replace(given, **known)

@@ -1,0 +1,236 @@
+"""A device on the Lab Streaming Layer: markers out, echoes in, and the sweep cut out of the streams by timestamps.
+
+A marker asks and an echo answers, both as JSON. The hardware times the ISI: a marker reaches the software that drives
+it within a millisecond usually and within tens of milliseconds at times, which is far too much for an ISI.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import time
+from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import Any, Final
+
+from isiw.checks import number, text
+from isiw.devices.protocol import DeviceInfo
+from isiw.devices.transports.exchange import Exchange, described
+from isiw.devices.transports.lsl_markers import Markers
+from isiw.devices.transports.lsl_samples import LATE_S, LslChannel, SampleStream
+from isiw.devices.transports.reply import Reply
+from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError
+from isiw.trials import Channel, Stimulus, Sweep
+
+__all__ = ["LslChannel", "LslDevice"]
+
+_KEYS: Final = ("t_fired", "t_valve_ms", "t_hit_ms", "isi_sd_ms")
+_SEARCH_S: Final = 1.0  # in half a second liblsl finds only some of the streams
+_CLOCKS_S: Final = 0.05  # how far two clocks of the network may seem to be apart after their correction
+_BUFFER_S: Final = 10.0
+
+
+class LslDevice:
+    """Arms and fires by markers, and cuts the sweep out of streams. The hardware at the other end must time the ISI.
+
+    Args:
+        channels: where each channel of a sweep comes from, as a `LslChannel` or a table of its fields; "emg" is needed.
+        info: what the device is, as a `DeviceInfo` or a table of its fields; its channels are those above.
+        markers: the name of the stream of markers, which isiw sends.
+        echo: the name of the stream of echoes, which the other software sends.
+        before_ms: how much of a sweep comes before the pulse [ms].
+        after_ms: how much of it comes after the pulse [ms].
+        max_jitter_ms: how far a sample's timestamp may be from where the rate puts it [ms]; a longer gap is a fault, a
+            shorter one is not seen.
+        stage_timeout_s: how long connecting and arming may take [s].
+        stop_timeout_s: how long each attempt to disarm may take [s]; below the session's 5 s.
+
+    Raises:
+        ConfigError: pylsl is not installed.
+        InvalidValueError: no EMG, channels of one stream with different rates, or a time that is not positive.
+    """
+
+    def __init__(  # noqa: PLR0913 - the streams and the sweep, all keyword-only and most with a usual value
+        self,
+        *,
+        channels: Mapping[str, LslChannel | Mapping[str, Any]],
+        info: DeviceInfo | Mapping[str, Any],
+        markers: str = "isiw-markers",
+        echo: str = "isiw-echo",
+        before_ms: float = 600.0,
+        after_ms: float = 100.0,
+        max_jitter_ms: float = 1.0,
+        stage_timeout_s: float = 20.0,
+        stop_timeout_s: float = 4.0,
+    ) -> None:
+        self._lsl = _pylsl()
+        self._channels = {
+            name: each if isinstance(each, LslChannel) else LslChannel(**each) for name, each in channels.items()
+        }
+        units = {name: channel.unit for name, channel in self._channels.items()}
+        self._info = described(info, channels=units, address=f"the LSL stream {text('markers', markers)}")
+        self._rates_hz = _rates_hz(self._channels)
+        self._before_s = number("before_ms", before_ms, above=0) / 1e3
+        self._after_s = number("after_ms", after_ms, above=0) / 1e3
+        self._max_jitter_ms = number("max_jitter_ms", max_jitter_ms, above=0)
+        self._stage_timeout_s = number("stage_timeout_s", stage_timeout_s, above=0)
+        self._markers = Markers(self._lsl, markers, text("echo", echo))
+        self._exchange = Exchange(self._info.name, self._markers, _KEYS, stop_timeout_s)
+        self._streams: dict[str, SampleStream] = {}
+
+    def describe(self) -> DeviceInfo:
+        """What the device is."""
+        return self._info
+
+    def stage(self) -> None:
+        """Find the streams, wait until somebody listens to the markers, and have it arm.
+
+        Raises:
+            DeviceError: a stream that is there twice or has another rate, or it does not arm.
+            DeviceTimeoutError: a stream is missing, nobody listens, or no echo came.
+        """
+        end_s = time.monotonic() + self._stage_timeout_s
+        self._markers.open()
+        found = self._found(end_s)
+        self._streams = {name: self._opened(name, found[name], end_s) for name in self._rates_hz}
+        self._markers.listen(self._inlet(found[self._markers.echo], end_s))
+        self._markers.await_listener(_left_s(end_s))
+        self._exchange.arm(_left_s(end_s))
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Sweep:
+        """Have it fire by a marker, await its echo, and cut the sweep out of the streams."""
+        end_s = time.monotonic() + timeout_s
+        self._exchange.require_staged()
+        for stream in self._streams.values():
+            stream.require_live(self._lsl.local_clock, self._before_s)
+        asked_s = self._lsl.local_clock()
+        return self._exchange.deliver(stimulus, _left_s(end_s), partial(self._sweep, asked_s, end_s))
+
+    def stop(self) -> None:
+        """Have it disarm, and wait for its word; without a connection there is nobody to ask.
+
+        Raises:
+            DeviceError: it may still be armed.
+        """
+        if self._markers.connected:
+            self._exchange.disarm()
+
+    def unstage(self) -> None:
+        """Disarm, where that is not known to be done, and let go of the streams of samples."""
+        if self._exchange.may_be_armed:
+            self._exchange.disarm()
+        self._streams = {}
+
+    def _sweep(self, asked_s: float, end_s: float, reply: Reply) -> Sweep:
+        """The waveforms, with 0 at the pulse."""
+        fired_s = self._fired_s(asked_s, end_s, reply)
+        span_s = (fired_s - self._before_s, fired_s + self._after_s)
+        until_s = min(end_s, time.monotonic() + self._after_s + LATE_S)
+        cuts = {name: stream.cut(*span_s, until_s) for name, stream in self._streams.items()}
+        channels = {}
+        for name, channel in self._channels.items():
+            begin_s, values = cuts[channel.stream]
+            t0_ms = 1e3 * (begin_s - fired_s)
+            channels[name] = Channel(values[:, channel.column], channel.rate_hz, channel.unit, t0_ms)
+        return Sweep(
+            channels,
+            t_tms_ms=0.0,
+            t_valve_ms=reply.optional_number("t_valve_ms"),
+            t_hit_ms=reply.optional_number("t_hit_ms"),
+            isi_sd_ms=reply.optional_number("isi_sd_ms") or 0.0,
+        )
+
+    def _fired_s(self, asked_s: float, end_s: float, reply: Reply) -> float:
+        """When the pulse was, by the local LSL clock [s]: after it was asked for, and before now."""
+        fired_s = reply.number("t_fired") + self._markers.correction_s(_left_s(end_s))
+        if not asked_s - _CLOCKS_S <= fired_s <= self._lsl.local_clock() + _CLOCKS_S:
+            raise reply.broken(
+                "the pulse is not of this trial",
+                got=f"t_fired {fired_s - asked_s:+.3g} s after it was asked for",
+                remedy="t_fired is the time of the pulse by lsl_local_clock of the computer that sends the echo.",
+            )
+        return fired_s
+
+    def _found(self, end_s: float) -> dict[str, Any]:
+        """The streams by name, each there once."""
+        wanted = {*self._rates_hz, self._markers.echo}
+        query = " or ".join(f"name='{name}'" for name in sorted(wanted))
+        while True:
+            there = self._lsl.resolve_bypred(query, minimum=len(wanted) + 1, timeout=_SEARCH_S)
+            if wanted == {info.name() for info in there}:
+                _require_once(there)
+                return {info.name(): info for info in there}
+            if not _left_s(end_s):
+                missing = sorted(wanted - {info.name() for info in there})
+                raise DeviceTimeoutError(
+                    "streams are missing on the network",
+                    got=", ".join(missing),
+                    expected=f"each within {self._stage_timeout_s:g} s",
+                    remedy="Start what sends them. Between computers, let UDP and TCP ports 16571 to 16604 through.",
+                )
+
+    def _opened(self, name: str, info: Any, end_s: float) -> SampleStream:
+        """A stream of samples that is what it should be."""
+        rate_hz = self._rates_hz[name]
+        last = max(channel.column for channel in self._channels.values() if channel.stream == name)
+        if info.nominal_srate() != rate_hz or info.channel_count() <= last:
+            raise DeviceError(
+                f"the stream {name} is another than expected",
+                got=f"{info.channel_count()} channels at {info.nominal_srate():g} Hz",
+                expected=f"at least {last + 1} at {rate_hz:g} Hz",
+                remedy="Correct the channels of the configuration, or what the sender states.",
+            )
+        kept_s = self._before_s + self._after_s + _BUFFER_S
+        inlet = self._inlet(info, end_s)
+        return SampleStream(
+            inlet, name, rate_hz, self._max_jitter_ms, kept_s, (self._lsl.util.LostError, self._lsl.util.TimeoutError)
+        )
+
+    def _inlet(self, info: Any, end_s: float) -> Any:
+        """An open inlet that tells when its stream is lost, and knows how its clock differs."""
+        buffered_s = math.ceil(self._before_s + self._after_s + _BUFFER_S)
+        inlet = self._lsl.StreamInlet(info, max_buflen=buffered_s, recover=False)
+        try:
+            inlet.open_stream(_left_s(end_s))
+            inlet.time_correction(_left_s(end_s))
+        except (self._lsl.util.TimeoutError, self._lsl.util.LostError) as error:
+            raise DeviceTimeoutError(f"the stream {info.name()} cannot be opened", got=str(error)) from error
+        return inlet
+
+
+def _left_s(end_s: float) -> float:
+    """How long it is until then, by the monotonic clock [s]; at least 0."""
+    return max(0.0, end_s - time.monotonic())
+
+
+def _require_once(there: Iterable[Any]) -> None:
+    hosts: dict[str, list[str]] = {}
+    for info in there:
+        hosts.setdefault(info.name(), []).append(info.hostname())
+    for name, of in hosts.items():
+        if len(of) > 1:
+            raise DeviceError(
+                f"the stream {name} is there {len(of)} times",
+                got=f"from {', '.join(of)}",
+                remedy="Close what is left of an earlier run, or give the streams names of their own.",
+            )
+
+
+def _rates_hz(channels: Mapping[str, LslChannel]) -> dict[str, float]:
+    """The rate of each stream [Hz]."""
+    if "emg" not in channels:
+        raise InvalidValueError("a sweep needs its EMG", got=", ".join(channels), expected="a channel named emg")
+    rates_hz: dict[str, float] = {}
+    for channel in channels.values():
+        if "'" in channel.stream:
+            raise InvalidValueError("liblsl cannot look for a name with an apostrophe", got=channel.stream)
+        if rates_hz.setdefault(channel.stream, channel.rate_hz) != channel.rate_hz:
+            raise InvalidValueError(f"the stream {channel.stream} has two rates", got=channel.rate_hz)
+    return rates_hz
+
+
+def _pylsl() -> Any:
+    try:
+        return importlib.import_module("pylsl")
+    except (ImportError, RuntimeError) as error:  # the latter where liblsl itself is missing
+        raise ConfigError("pylsl is not installed", got=f"{error}", remedy='pip install "isiw[lsl]"') from error
