@@ -34,6 +34,7 @@ from .devices.robot.tapper import Tapper as Tapper
 from .devices.robot.tapper import TapperSettings as TapperSettings
 from .devices.simulated import SimulatedDevice as SimulatedDevice
 from .devices.simulated import SimulatedPerson as SimulatedPerson
+from .devices.transports.line import LineDevice as LineDevice
 from .log.reader import read_session as read_session
 from .session.loop import Session as Session
 from .session.recorder import Recorder as Recorder
