@@ -112,6 +112,7 @@ class PulsePeer:
         self._isi_us: int | None = None
         self._given_ms: float | None = None
         self._disarms_failed = 0
+        self._ordered: dict[str, list[Lie]] = {}
         self._before, self._held = b"", b""
         self._ended = threading.Event()
         self.armed = False
@@ -119,6 +120,16 @@ class PulsePeer:
         self.wrong_isis: dict[int, float] = {}
         self.happened: Counter[Lie] = Counter()
         self.heard: list[str] = []
+
+    def lie(self, verb: str, lie: Lie, times: int = 1) -> None:
+        """Let the next command meet a lie.
+
+        Args:
+            verb: the command, such as FIRE.
+            lie: the lie.
+            times: how many of these commands in a row.
+        """
+        self._ordered[verb] = [lie] * times
 
     @contextmanager
     def over_tcp(self) -> Iterator[str]:
@@ -184,14 +195,18 @@ class PulsePeer:
 
     def _drawn(self, verb: str) -> Lie | None:
         """What goes wrong this time; None where nothing does."""
-        possible = [lie for lie in self._lies if verb in _OF_VERB.get(lie, {verb})]
-        if not possible or self._rng.random() >= self._rate or (verb == "DISARM" and self._disarms_failed == 2):
-            self._disarms_failed = 0 if verb == "DISARM" else self._disarms_failed
-            return None
-        lie = possible[int(self._rng.integers(len(possible)))]
-        self._disarms_failed += verb == "DISARM"
-        self.happened[lie] += 1
+        lie = self._ordered[verb].pop() if self._ordered.get(verb) else self._drawn_at_random(verb)
+        if lie is not None:
+            self.happened[lie] += 1
         return lie
+
+    def _drawn_at_random(self, verb: str) -> Lie | None:
+        possible = [lie for lie in self._lies if verb in _OF_VERB.get(lie, {verb})]
+        lies = bool(possible) and self._rng.random() < self._rate
+        if verb == "DISARM":
+            lies = lies and self._disarms_failed < 2
+            self._disarms_failed = self._disarms_failed + 1 if lies else 0
+        return possible[int(self._rng.integers(len(possible)))] if lies else None
 
     def _done(self, verb: str, argument: str, lie: Lie | None) -> str:
         """Do what was commanded; the answer."""
