@@ -1,7 +1,7 @@
 """An instrument that is told what to do in lines of text, over a serial port or TCP; a table says in which words.
 
 A trial is: set the ISI, read it back, arm, fire, ask what came of it. What fails before the command to fire is sent
-gave nothing; what fails behind it may have fired. That command is sent once.
+gave nothing; what fails after it may have fired. That command is sent once.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class LineDevice:
         Raises:
             NotDelivered: it failed before the command to fire was sent.
             DeviceTimeoutError: no answer to that command in time.
-            DeviceError: anything else went wrong behind it; whether the pulse was given is not known.
+            DeviceError: anything else went wrong after it; whether the pulse was given is not known.
         """
         era, end_s = self._since_stop, time.monotonic() + timeout_s - min(_SPARE_S, 0.1 * timeout_s)
         require_staged(self._info.name, staged=self._staged)
