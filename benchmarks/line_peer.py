@@ -121,7 +121,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sessions", type=int, default=1000)
     parser.add_argument("--trials", type=int, default=8)
-    parser.add_argument("--rate", type=float, default=0.03, help="share of commands that meet a lie")
+    parser.add_argument("--rate", type=float, default=0.06, help="share of commands that meet a lie")
     parser.add_argument("--seed", type=int, default=0, help="the first session's")
     arguments = parser.parse_args()
     torch.set_num_threads(1)

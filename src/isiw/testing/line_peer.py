@@ -12,10 +12,10 @@ import socket
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from enum import StrEnum
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -26,7 +26,7 @@ __all__ = ["PEER_COMMANDS", "Lie", "PulsePeer"]
 
 _NUMBERED = r"(?P<sequence>\d+) "
 
-PEER_COMMANDS = {
+PEER_COMMANDS: Mapping[str, Any] = {
     "disarm": {"send": "{sequence} DISARM", "reply": _NUMBERED + "DISARMED"},
     "set": {"send": "{sequence} SET {isi_us}", "reply": _NUMBERED + "OK"},
     "read_back": {"send": "{sequence} GET", "reply": _NUMBERED + r"ISI (?P<isi_us>\S+)"},

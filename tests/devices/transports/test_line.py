@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import subprocess
 import sys
 import threading
 import time
@@ -324,6 +325,11 @@ def test_a_serial_port_belongs_to_one_at_a_time(peer: PulsePeer) -> None:
         with pytest.raises(DeviceError, match="lock"):
             made(at).stage()
         first.unstage()
+
+
+def test_the_library_of_serial_ports_is_loaded_only_where_one_is_opened() -> None:
+    used = "import sys, isiw; isiw.LineDevice, isiw.testing.PulsePeer; assert 'serial' not in sys.modules"
+    subprocess.run([sys.executable, "-c", used], check=True)  # noqa: S603
 
 
 def test_without_pyserial_a_serial_port_names_the_extra_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

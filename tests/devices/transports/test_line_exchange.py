@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import time
 import tracemalloc
+from contextlib import suppress
 
+import hypothesis
 import pytest
+from hypothesis import strategies as st
 
 from isiw.devices.transports.line_exchange import Line, LineSettings, RefusedError
 from isiw.devices.transports.line_table import Exchange
@@ -101,6 +104,16 @@ def test_bytes_that_are_no_text_are_told_as_they_are() -> None:
     asking, _ = line(b"\xff\x00{0}\n")
     with pytest.raises(DeviceTimeoutError, match=r"xff"):
         asking.ask(ASKED, timeout_s=0.05)
+
+
+@hypothesis.given(script=st.binary(max_size=60))
+@hypothesis.settings(max_examples=100)
+def test_whatever_bytes_come_the_answer_is_a_valid_one_or_an_error_of_the_device(script: bytes) -> None:
+    asking, _ = line(script, refusal=r"(?P<sequence>\d+) ERR (?P<reason>.*)")
+    with pytest.raises(DeviceError):
+        asking.ask(ASKED, timeout_s=0.002)
+    with suppress(DeviceError):
+        asking.ask(PLAIN, timeout_s=0.002)
 
 
 def test_a_connection_that_breaks_is_an_error_of_the_device() -> None:

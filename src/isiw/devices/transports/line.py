@@ -89,8 +89,7 @@ class LineDevice:
                 said = self._ask(era, status, end_s=time.monotonic() + self._limit_s(status))
             except RefusedError as error:
                 return Readiness(ready=False, reason=error.what)
-            state = {name: number_of(said, name) for name in ("coil_c", "intensity_pct_mso") if name in said}
-            return Readiness(**state)
+            return Readiness(coil_c=number_of(said, "coil_c"), intensity_pct_mso=number_of(said, "intensity_pct_mso"))
 
     def stage(self) -> None:
         """Open a connection, and have the instrument confirm that it is disarmed; each trial arms it.
@@ -185,8 +184,7 @@ class LineDevice:
             return self._measure(stimulus, isi_ms, max(0.0, end_s - time.monotonic()))
         if mep_mv is None:
             raise DeviceError("the instrument does not say which MEP it measured", got=dict(said))
-        background_uv = number_of(said, "background_rms_uv") if "background_rms_uv" in said else None
-        return Measurement(mep_mv, isi_ms, background_rms_uv=background_uv)
+        return Measurement(mep_mv, isi_ms, background_rms_uv=number_of(said, "background_rms_uv"))
 
     def _ask(
         self, era: object, exchange: Exchange, stimulus: Stimulus | None = None, *, end_s: float

@@ -259,14 +259,12 @@ def mep_mv_of(said: Mapping[str, str]) -> float | None:
 
 
 def _value(said: Mapping[str, str], units: Mapping[str, float]) -> float | None:
-    for name, unit in units.items():
-        if name in said:
-            return number_of(said, name) * unit
-    return None
+    values = ((number_of(said, name), unit) for name, unit in units.items())
+    return next((value * unit for value, unit in values if value is not None), None)
 
 
-def number_of(said: Mapping[str, str], name: str) -> float:
-    """A number that an answer says.
+def number_of(said: Mapping[str, str], name: str) -> float | None:
+    """A number that an answer says; None where it does not.
 
     Args:
         said: the answer by group.
@@ -275,6 +273,8 @@ def number_of(said: Mapping[str, str], name: str) -> float:
     Raises:
         InvalidValueError: it is no finite number.
     """
+    if name not in said:
+        return None
     try:
         return number(f"the instrument's {name}", float(said[name]))
     except ValueError as error:
