@@ -12,7 +12,7 @@ from isiw.config.run import RunConfig, load_config, session_for
 from isiw.devices.transports.line_table import LineCommands
 from isiw.testing import PulsePeer, check_ledger
 
-PAGE = (Path(__file__).parents[3] / "docs" / "lab" / "line.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[4] / "docs" / "lab" / "line.md").read_text(encoding="utf-8")
 CHEAP = '[strategy]\nname = "random"\nsettings = { max_trials = 4, particles = 100 }\n'
 
 
