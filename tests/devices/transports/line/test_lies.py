@@ -18,7 +18,8 @@ from scripted import SPACE, scripted_strategy
 FATAL = [Lie.SILENT_BEFORE, Lie.SILENT_AFTER, Lie.LATE, Lie.OTHER_NUMBER, Lie.CORRUPTS, Lie.ENDLESS, Lie.REFUSES]
 DROPS = [Lie.DROPS_BEFORE, Lie.DROPS_AFTER]
 BEFORE_FIRING = [("SET", Lie.SETS_ANOTHER), ("GET", Lie.NAN), ("GET", Lie.SILENT_BEFORE), ("GET", Lie.CORRUPTS)]
-BEFORE_FIRING += [(verb, lie) for verb in ("SET", "ARM") for lie in FATAL + DROPS]
+BEFORE_FIRING += [("SET", lie) for lie in (Lie.SILENT_AFTER, Lie.LATE, Lie.ENDLESS, Lie.REFUSES, Lie.DROPS_AFTER)]
+BEFORE_FIRING += [("ARM", lie) for lie in FATAL + DROPS]
 AFTER_FIRING = [("FIRE", lie) for lie in [*FATAL, *DROPS, Lie.NAN]]
 AFTER_FIRING += [("RESULT", lie) for lie in (Lie.SILENT_AFTER, Lie.CORRUPTS, Lie.REFUSES, Lie.DROPS_AFTER, Lie.NAN)]
 
@@ -43,6 +44,17 @@ def test_what_fails_before_firing_gave_nothing_and_the_next_trial_goes_well(
     assert peer.ledger == []
     assert isinstance(device.deliver(PAIR, TIMEOUT_S), Measurement)
     assert len(peer.ledger) == 1
+
+
+def test_after_a_missing_answer_the_next_trial_begins_over_a_fresh_connection_that_is_disarmed_first(
+    device: isiw.LineDevice, peer: PulsePeer
+) -> None:
+    peer.lie("SET", Lie.LATE)
+    with pytest.raises(NotDelivered):
+        device.deliver(PAIR, TIMEOUT_S)
+    so_far = len(peer.heard)
+    device.deliver(PAIR, TIMEOUT_S)
+    assert [line.split()[1] for line in peer.heard[so_far:]] == ["DISARM", "SET", "GET", "ARM", "FIRE", "RESULT"]
 
 
 @pytest.mark.parametrize(("verb", "lie"), AFTER_FIRING)

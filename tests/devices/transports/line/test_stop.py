@@ -5,12 +5,15 @@ from __future__ import annotations
 import socket
 import threading
 import time
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
 
 import isiw
 from devices.transports.line.parts import HASTY, PAIR, TIMEOUT_S, made, over, staged, unnumbered
+from isiw.devices.transports.line_exchange import Line
+from isiw.devices.transports.line_table import Exchange
 from isiw.errors import DeviceError, NotDelivered
 from isiw.testing import PEER_COMMANDS, Lie, PulsePeer
 from isiw.trials import Measurement, Stimulus
@@ -37,6 +40,24 @@ def test_stop_from_another_thread_interrupts_a_delivery_and_nothing_is_fired_aft
     assert isinstance(failed[0], NotDelivered)
     assert (peer.armed, peer.ledger) == (False, [])
     slow.unstage()
+
+
+def test_a_stop_between_arming_and_firing_lets_nothing_be_fired(
+    device: isiw.LineDevice, peer: PulsePeer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ask = Line.ask
+
+    def ask_and_stop(line: Line, exchange: Exchange, *args: Any, **keywords: Any) -> dict[str, str]:
+        said = ask(line, exchange, *args, **keywords)
+        if "ARM" in exchange.send.split():
+            device.stop()
+        return said
+
+    monkeypatch.setattr(Line, "ask", ask_and_stop)
+    with pytest.raises(NotDelivered, match="was stopped"):
+        device.deliver(PAIR, TIMEOUT_S)
+    assert not any("FIRE" in line for line in peer.heard)
+    assert not peer.armed
 
 
 def delivering(device: isiw.LineDevice) -> tuple[threading.Thread, list[BaseException]]:
@@ -98,6 +119,19 @@ def test_without_numbers_a_missing_answer_is_not_taken_from_what_comes_next(peer
         device.stop()
         assert not peer.armed
         assert isinstance(staged(device).deliver(PAIR, TIMEOUT_S), Measurement)
+        device.unstage()
+
+
+def test_without_numbers_a_late_answer_is_not_believed_to_be_the_one_to_disarm(peer: PulsePeer) -> None:
+    commands = {**unnumbered(PEER_COMMANDS), "disarm": {"send": "DISARM", "reply": "DISARMED|ARMED"}}
+    with peer.over_tcp() as at:
+        device = staged(made(at, commands, HASTY))
+        peer.lie("ARM", Lie.LATE)
+        with pytest.raises(NotDelivered):
+            device.deliver(PAIR, TIMEOUT_S)
+        peer.lie("DISARM", Lie.SILENT_BEFORE)
+        device.stop()
+        assert not peer.armed
         device.unstage()
 
 
