@@ -16,7 +16,7 @@ from typing import Any
 from isiw.checks import text
 from isiw.devices.protocol import Answer, DeviceInfo, Readiness, require_staged
 from isiw.devices.transports.line_connection import open_connection, require_address
-from isiw.devices.transports.line_exchange import Line, LineSettings, RefusedError
+from isiw.devices.transports.line_exchange import Line, LineSettings
 from isiw.devices.transports.line_table import Exchange, LineCommands, isi_ms_of, mep_mv_of, number_of
 from isiw.errors import DeviceError, InvalidValueError, IsiwError, LimitExceededError, NotDelivered, told
 from isiw.trials import Measurement, Stimulus
@@ -78,17 +78,14 @@ class LineDevice:
         """What the instrument says about its state; ready, where the table has no status.
 
         Raises:
-            NotDelivered: it does not answer.
+            NotDelivered: it is not, or does not answer.
         """
         if self._commands.status is None:
             return Readiness()
         with _nothing_given():
             era, status = self._since_stop, self._commands.status
             self._connect(era, math.inf)
-            try:
-                said = self._ask(era, status, end_s=time.monotonic() + self._limit_s(status))
-            except RefusedError as error:
-                return Readiness(ready=False, reason=error.what)
+            said = self._ask(era, status, end_s=time.monotonic() + self._limit_s(status))
             return Readiness(coil_c=number_of(said, "coil_c"), intensity_pct_mso=number_of(said, "intensity_pct_mso"))
 
     def stage(self) -> None:

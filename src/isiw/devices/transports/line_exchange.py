@@ -8,7 +8,7 @@ import re
 import secrets
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -17,11 +17,12 @@ from isiw.devices.transports.line_connection import Connection
 from isiw.devices.transports.line_table import Exchange, command_values
 from isiw.errors import DeviceError, DeviceTimeoutError
 
-__all__ = ["Line", "LineSettings", "RefusedError"]
+__all__ = ["Line", "LineSettings"]
 
 _T = TypeVar("_T")
 
 _LONGEST_LINE = 1000
+_MOST_READS = 5
 _MOST_TOLD = 5
 _LONGEST_TOLD = 80
 
@@ -61,10 +62,6 @@ class LineSettings:
         check_numbers(self, "isi_tolerance_ms", least=0)
 
 
-class RefusedError(DeviceError):
-    """The instrument answered that it will not."""
-
-
 class Line:
     """Commands and answers over one connection. Everything that fails is a `DeviceError`.
 
@@ -102,8 +99,8 @@ class Line:
 
         Raises:
             DeviceTimeoutError: no answer in time.
-            RefusedError: the instrument refuses.
-            DeviceError: the connection broke, the command cannot be written, or nobody waits any more.
+            DeviceError: the instrument refuses, the connection broke, the command cannot be written, or nobody waits
+                any more.
         """
         number = next(_sequence)
         try:
@@ -125,7 +122,7 @@ class Line:
         Raises:
             DeviceError: it is.
         """
-        for _ in range(_MOST_TOLD):  # an instrument that never stops sending must not hold this up
+        for _ in range(_MOST_READS):  # an instrument that never stops sending must not hold this up
             data = self._guarded(lambda: self._connection.receive(wait=False))
             if not data:
                 break
@@ -151,7 +148,7 @@ class Line:
         try:
             for line in self._lines_until(deadline_s, given_up):
                 said = exchange.match(line)
-                if said is not None and _answers(said, number):
+                if said is not None and (not exchange.numbered or _is(number, said.get("sequence"))):
                     return said
                 self._require_not_refused(line, number)
                 others.add(line)
@@ -164,10 +161,11 @@ class Line:
         )
 
     def _require_not_refused(self, line: str, number: int) -> None:
-        refused = re.fullmatch(self._refusal, line) if self._refusal else None
-        if refused is not None and _answers(refused.groupdict(), number):
+        found = re.fullmatch(self._refusal, line) if self._refusal else None
+        said = {} if found is None else found.groupdict()
+        if found is not None and ("sequence" not in said or _is(number, said["sequence"])):
             self.trusted = True
-            raise RefusedError(f"the instrument refuses: {(refused.groupdict().get('reason') or line)[:_LONGEST_TOLD]}")
+            raise DeviceError("the instrument refuses", got=(said.get("reason") or line)[:_LONGEST_TOLD])
 
     def _lines_until(self, deadline_s: float, given_up: Callable[[], bool]) -> Iterator[str]:
         """The lines that come until a moment."""
@@ -187,10 +185,9 @@ class Line:
             raise DeviceError(f"the connection to the instrument broke: {error}") from error
 
 
-def _answers(said: Mapping[str, str | None], number: int) -> bool:
-    """Whether an answer is one to the command of this number, or has none."""
-    stated = said.get("sequence")
-    return stated is None or (stated.isdecimal() and int(stated) == number)
+def _is(number: int, stated: str | None) -> bool:
+    """Whether an answer states the number of its command."""
+    return stated is not None and stated.isdecimal() and int(stated) == number
 
 
 class _Others:

@@ -52,9 +52,8 @@ def test_tms_alone_and_a_tap_alone_set_no_isi(device: isiw.LineDevice, peer: Pul
 def test_readiness_has_what_the_status_says(device: isiw.LineDevice, peer: PulsePeer) -> None:
     assert device.readiness() == isiw.Readiness(coil_c=25.0)
     peer.lie("STATUS", Lie.REFUSES)
-    state = device.readiness()
-    assert not state.ready
-    assert "does not want to" in state.reason
+    with pytest.raises(NotDelivered, match="does not want to"):
+        device.readiness()
 
 
 def without_mep() -> dict[str, Any]:

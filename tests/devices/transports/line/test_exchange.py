@@ -10,7 +10,7 @@ import hypothesis
 import pytest
 from hypothesis import strategies as st
 
-from isiw.devices.transports.line_exchange import Line, LineSettings, RefusedError
+from isiw.devices.transports.line_exchange import Line, LineSettings
 from isiw.devices.transports.line_table import Exchange
 from isiw.errors import DeviceError, DeviceTimeoutError
 
@@ -52,6 +52,11 @@ def test_an_answer_ends_by_a_line_feed_a_carriage_return_or_both(end: bytes) -> 
     assert line(b"{0} ISI 50" + end)[0].ask(ASKED, timeout_s=1.0)["isi_ms"] == "50"
 
 
+def test_an_answer_without_the_number_that_it_must_have_is_none() -> None:
+    optional = Exchange("{sequence} GET", r"(?:(?P<sequence>\d+) )?ISI (?P<isi_ms>\S+)")
+    assert line(b"ISI 40\n{0} ISI 50\n")[0].ask(optional, timeout_s=1.0)["isi_ms"] == "50"
+
+
 def test_a_command_ends_as_the_settings_say() -> None:
     asking, connection = line(b"ISI 50\n", line_end="\r\n")
     asking.ask(PLAIN, timeout_s=1.0)
@@ -82,7 +87,7 @@ def test_a_refusal_is_one_to_its_own_command() -> None:
     refusal = r"(?P<sequence>\d+) ERR (?P<reason>.*)"
     assert line(b"{-1} ERR hot\n{0} ISI 50\n", refusal=refusal)[0].ask(ASKED, timeout_s=1.0)["isi_ms"] == "50"
     asking, _ = line(b"{0} ERR too hot\n", refusal=refusal)
-    with pytest.raises(RefusedError, match="too hot"):
+    with pytest.raises(DeviceError, match="refuses; got 'too hot'"):
         asking.ask(ASKED, timeout_s=1.0)
     assert asking.trusted
 
