@@ -87,7 +87,9 @@ class _Wire(Protocol):
 class PulsePeer:
     """An instrument that lies at random, and knows what it really gave.
 
-    Firing uses up the arming. At most two answers to DISARM in a row are wrong. A new connection ends the one before.
+    Firing uses up the arming. At most two answers to DISARM in a row are wrong by chance. A new connection ends the one
+    before. Whether it is `armed`, the `ledger` of what it gave, the commands that it `heard` and the lies that `happened`
+    may be looked at, and `wrong_isis`: what it gave [ms] in trials where that was not the ISI that it held.
 
     Args:
         seed: seed of the lies.
@@ -213,7 +215,7 @@ class PulsePeer:
         if verb == "SET":
             return self._set(argument, lie)
         if verb in {"FIRE", "ALONE", "TAP"}:
-            return self._fired(verb, int(argument or -1), lie)
+            return self._fired(verb, int(argument) if argument.isdecimal() else -1, lie)
         if verb in {"ARM", "DISARM"}:
             self.armed = verb == "ARM"
             return f"{verb}ED"
