@@ -88,8 +88,8 @@ class PulsePeer:
     """An instrument that lies at random, and knows what it really gave.
 
     Firing uses up the arming. At most two answers to DISARM in a row are wrong by chance. A new connection ends the one
-    before. Whether it is `armed`, the `ledger` of what it gave, the commands that it `heard` and the lies that `happened`
-    may be looked at, and `wrong_isis`: what it gave [ms] in trials where that was not the ISI that it held.
+    before. Whether it is `armed`, the `ledger` of what it gave, the commands that it `heard` and the lies that
+    `happened` may be looked at, and `wrong_isis`: what it gave [ms] in trials where it held another ISI.
 
     Args:
         seed: seed of the lies.
