@@ -71,6 +71,15 @@ def test_a_function_of_the_lab_measures_where_the_instrument_does_not(peer: Puls
         device.unstage()
 
 
+def test_the_realised_isi_may_come_with_the_result(peer: PulsePeer) -> None:
+    silent = {"send": "{sequence} FIRE {trial}", "reply": r"(?P<sequence>\d+) FIRED .*"}
+    commands = {**PEER_COMMANDS, "fire": silent, "result": PEER_COMMANDS["read_back"]}
+    with peer.over_tcp() as at:
+        device = staged(made(at, commands, measure=lambda _, isi_ms, __: Measurement(0.2, isi_ms)))
+        assert device.deliver(PAIR, 5.0) == Measurement(0.2, 50.0)
+        device.unstage()
+
+
 @pytest.mark.parametrize(
     "error", [NotDelivered("no"), isiw.errors.LimitExceededError("no"), LogError("no"), KeyError()]
 )
