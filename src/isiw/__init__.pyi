@@ -35,6 +35,7 @@ from .devices.robot.tapper import TapperSettings as TapperSettings
 from .devices.simulated import SimulatedDevice as SimulatedDevice
 from .devices.simulated import SimulatedPerson as SimulatedPerson
 from .devices.transports.folder import FolderDevice as FolderDevice
+from .devices.transports.line import LineDevice as LineDevice
 from .devices.transports.lsl import LslChannel as LslChannel
 from .devices.transports.lsl import LslDevice as LslDevice
 from .log.reader import read_session as read_session

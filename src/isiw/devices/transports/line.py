@@ -1,0 +1,309 @@
+"""An instrument that is told what to do in lines of text, over a serial port or TCP; a table says in which words.
+
+A trial is: set the ISI, read it back, arm, fire, ask what came of it. What fails before the command to fire is sent
+gave nothing; what fails after it may have fired. That command is sent once.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from isiw.checks import text
+from isiw.devices.protocol import Answer, DeviceInfo, Readiness, require_staged
+from isiw.devices.transports.line_connection import open_connection, require_address
+from isiw.devices.transports.line_exchange import Line, LineSettings
+from isiw.devices.transports.line_table import Exchange, LineCommands, isi_ms_of, mep_mv_of, number_of
+from isiw.errors import DeviceError, InvalidValueError, IsiwError, LimitExceededError, NotDelivered, told
+from isiw.trials import Measurement, Stimulus
+
+__all__ = ["LineDevice"]
+
+_SPARE_S = 0.1
+_MOST_TRIES = 10
+
+
+class LineDevice:
+    """An instrument that exchanges lines of text. It times the ISI; nothing here does.
+
+    Args:
+        address: "COM3", "/dev/ttyUSB0" or "socket://192.168.0.20:5000"; a serial port needs the extra `isiw[serial]`.
+        info: what it is, as in `isiw.DeviceInfo`: at least name and reference.
+        commands: what it understands, as in `LineCommands`.
+        line: how lines are exchanged, as in `LineSettings`.
+        measure: returns the `Measurement` or `Sweep` of the stimulus that was just given, where the instrument measures
+            no MEP; takes the stimulus, the realised ISI as the instrument says it (None for a control trial) and the
+            time that is left [s].
+
+    Raises:
+        InvalidValueError: an incomplete address, a table that lacks something, or nobody or both measure the MEP.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        info: Mapping[str, Any],
+        commands: Mapping[str, Any] | LineCommands,
+        line: Mapping[str, Any] | LineSettings | None = None,
+        measure: Callable[[Stimulus, float | None, float], Answer] | None = None,
+    ) -> None:
+        require_address(text("address", address))
+        self._commands = commands if isinstance(commands, LineCommands) else LineCommands(**commands)
+        self._settings = line if isinstance(line, LineSettings) else LineSettings(**(line or {}))
+        self._info = DeviceInfo(address=address, tap_alone=self._commands.tap_alone is not None, **info)
+        self._measure = measure
+        self._require_measured()
+        self._line: Line | None = None
+        self._busy, self._stopping = threading.Lock(), threading.Lock()
+        self._since_stop = object()  # another one after each stop: what began before it sends nothing any more
+        self._staged = self._may_be_armed = False
+
+    def _require_measured(self) -> None:
+        measured = self._commands.all_measure if self._measure is None else not self._commands.some_measure
+        if not measured:
+            raise InvalidValueError(
+                "each MEP must be measured by the instrument or by `measure`, and by one of them only",
+                expected=r"(?P<mep_mv>[\d.]+) in the answers to fire and alone, or to result; or a function `measure`",
+            )
+
+    def describe(self) -> DeviceInfo:
+        """What the instrument is."""
+        return self._info
+
+    def readiness(self) -> Readiness:
+        """What the instrument says about its state; ready, where the table has no status.
+
+        Raises:
+            NotDelivered: it is not, or does not answer.
+        """
+        if self._commands.status is None:
+            return Readiness()
+        with _nothing_given():
+            era, status = self._since_stop, self._commands.status
+            self._connect(era, math.inf)
+            said = self._ask(era, status, end_s=time.monotonic() + self._limit_s(status))
+            return Readiness(coil_c=number_of(said, "coil_c"), intensity_pct_mso=number_of(said, "intensity_pct_mso"))
+
+    def stage(self) -> None:
+        """Open a connection, and have the instrument confirm that it is disarmed; each trial arms it.
+
+        Raises:
+            DeviceError: it cannot be reached, or does not confirm.
+        """
+        era = self._since_stop
+        self._close()
+        self._connect(era, math.inf)
+        with self._turn(era):
+            self._staged = True
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
+        """Set the ISI, read it back, arm, fire once, and report what came of it.
+
+        Args:
+            stimulus: what to deliver.
+            timeout_s: the longest the call may take [s].
+
+        Raises:
+            NotDelivered: it failed before the command to fire was sent.
+            DeviceTimeoutError: no answer to that command in time.
+            DeviceError: anything else went wrong after it; whether the pulse was given is not known.
+        """
+        era, end_s = self._since_stop, time.monotonic() + timeout_s - min(_SPARE_S, 0.1 * timeout_s)
+        require_staged(self._info.name, staged=self._staged)
+        command = self._firing(stimulus)
+        with _nothing_given():
+            self._connect(era, end_s)
+            self._prepare(era, stimulus, end_s)
+        said = self._ask(era, command, stimulus, end_s=end_s)
+        with _outcome_unknown():
+            return self._outcome(era, stimulus, said, end_s)
+
+    def stop(self) -> None:
+        """Disarm: over the connection that there is, or over a fresh one where that one fails.
+
+        Raises:
+            DeviceError: the instrument does not confirm that it is disarmed.
+        """
+        self._staged, self._since_stop = False, object()
+        with self._stopping:
+            if self._busy.acquire(timeout=self._settings.timeout_s):
+                try:
+                    if self._disarmed_over_this():
+                        return
+                finally:
+                    self._busy.release()
+            self._close()
+            self._line = self._opened()
+
+    def unstage(self) -> None:
+        """Disarm, and close the connection."""
+        try:
+            self.stop()
+        finally:
+            self._close()
+
+    def _firing(self, stimulus: Stimulus) -> Exchange:
+        if stimulus.isi_ms is not None:
+            return self._commands.fire
+        if not stimulus.tap_alone:
+            return self._commands.alone
+        if self._commands.tap_alone is None:
+            raise NotDelivered(f"{self._info.name} has no command for a tap alone")
+        return self._commands.tap_alone
+
+    def _prepare(self, era: object, stimulus: Stimulus, end_s: float) -> None:
+        """Everything of a trial but its firing."""
+        if stimulus.isi_ms is not None:
+            self._ask(era, self._commands.set, stimulus, end_s=end_s)
+            read_ms = isi_ms_of(self._ask(era, self._commands.read_back, stimulus, end_s=end_s))
+            if read_ms is None or abs(read_ms - stimulus.isi_ms) > self._settings.isi_tolerance_ms:
+                raise NotDelivered(
+                    "the instrument holds another ISI than it was set to",
+                    got=read_ms,
+                    expected=f"{stimulus.isi_ms:g} ms",
+                )
+        self._ask(era, self._commands.arm, stimulus, end_s=end_s)
+        if time.monotonic() >= end_s:
+            raise NotDelivered("no time is left to fire", remedy="Give the session a longer timeout_s.")
+
+    def _outcome(self, era: object, stimulus: Stimulus, said: Mapping[str, str], end_s: float) -> Answer:
+        """What came of a stimulus that was given."""
+        if self._commands.result is not None:
+            said = {**said, **self._ask(era, self._commands.result, stimulus, end_s=end_s)}
+        isi_ms, mep_mv = isi_ms_of(said), mep_mv_of(said)
+        if stimulus.isi_ms is not None and isi_ms is None:
+            raise DeviceError("the instrument does not say which ISI it gave", got=dict(said))
+        if self._measure is not None:
+            return self._measure(stimulus, isi_ms, max(0.0, end_s - time.monotonic()))
+        if mep_mv is None:
+            raise DeviceError("the instrument does not say which MEP it measured", got=dict(said))
+        return Measurement(mep_mv, isi_ms, background_rms_uv=number_of(said, "background_rms_uv"))
+
+    def _ask(
+        self, era: object, exchange: Exchange, stimulus: Stimulus | None = None, *, end_s: float
+    ) -> dict[str, str]:
+        """One exchange, unless the device was stopped since."""
+        with self._turn(era) as line:
+            if exchange is self._commands.arm:
+                self._may_be_armed = True
+            return line.ask(
+                exchange,
+                0 if stimulus is None else stimulus.trial,
+                None if stimulus is None else stimulus.isi_ms,
+                timeout_s=max(0.0, min(end_s - time.monotonic(), self._limit_s(exchange))),
+                given_up=lambda: self._since_stop is not era,
+            )
+
+    def _limit_s(self, exchange: Exchange) -> float:
+        """How long an answer may take at most [s]; what fires and measures has all the time that is left."""
+        if exchange.timeout_s is not None:
+            return exchange.timeout_s
+        patient = (*self._commands.firing, self._commands.result)
+        return math.inf if any(exchange is each for each in patient) else self._settings.timeout_s
+
+    @contextmanager
+    def _turn(self, era: object) -> Iterator[Line]:
+        """Within, the connection is ours; nothing is sent any more that began before a stop."""
+        with self._busy:
+            if self._since_stop is not era:
+                raise NotDelivered(f"{self._info.name} was stopped", remedy="Call stage() first.")
+            if self._line is None:
+                raise NotDelivered(f"{self._info.name} has no connection", remedy="Call stage() first.")
+            yield self._line
+
+    def _connect(self, era: object, end_s: float) -> None:
+        """See to it that there is a connection that can be trusted, while nothing is in flight."""
+        if self._stands():
+            return
+        self._close()
+        line = self._opened(end_s, lambda: self._since_stop is not era)
+        with self._busy:
+            if self._since_stop is era:
+                self._line = line
+                return
+        line.close()
+        raise NotDelivered(f"{self._info.name} was stopped", remedy="Call stage() first.")
+
+    def _stands(self) -> bool:
+        """Whether the connection that there is can be trusted, and did not break while nothing was in flight."""
+        with self._busy, suppress(DeviceError):
+            if self._line is not None and self._line.trusted:
+                self._line.drain()
+                return True
+        return False
+
+    def _opened(self, end_s: float = math.inf, given_up: Callable[[], bool] = lambda: False) -> Line:
+        """A fresh connection over which the instrument has confirmed that it is disarmed."""
+        end_s = min(end_s, time.monotonic() + self._settings.connect_s)
+        try:
+            connection = open_connection(self._info.address, self._settings.baud, self._settings.timeout_s)
+        except OSError as error:
+            raise DeviceError(f"the instrument cannot be reached: {error}", got=self._info.address) from error
+        line = Line(connection, self._settings, self._commands.refusal)
+        try:
+            self._disarm_until(line, end_s, given_up)
+        except BaseException:
+            line.close()
+            raise
+        self._may_be_armed = False
+        return line
+
+    def _disarm_until(self, line: Line, end_s: float, given_up: Callable[[], bool]) -> None:
+        """Send disarm until it is confirmed: a board whose port has just been opened may still be starting."""
+        disarm = self._commands.disarm
+        for tried in range(1, _MOST_TRIES + 1):
+            left_s = max(0.0, end_s - time.monotonic())
+            try:
+                line.ask(disarm, timeout_s=min(left_s, self._limit_s(disarm)), given_up=given_up)
+            except DeviceError as error:
+                if tried == _MOST_TRIES or given_up() or time.monotonic() >= end_s:
+                    raise DeviceError(
+                        f"the instrument does not confirm that it is disarmed: {error}",
+                        remedy="Whether it is armed is not known. See to it.",
+                    ) from error
+            else:
+                return
+
+    def _disarmed_over_this(self) -> bool:
+        """Whether the instrument confirms over the present connection that it is disarmed, or was never reached."""
+        line = self._line
+        if line is None:
+            return not self._may_be_armed
+        believable = line.trusted or self._commands.disarm.numbered
+        try:
+            line.ask(self._commands.disarm, timeout_s=self._limit_s(self._commands.disarm))
+        except DeviceError:
+            return False
+        self._may_be_armed = self._may_be_armed and not believable
+        return believable
+
+    def _close(self) -> None:
+        line, self._line = self._line, None
+        if line is not None:
+            line.close()
+
+
+@contextmanager
+def _nothing_given() -> Iterator[None]:
+    """Within, nothing has been fired yet: whatever fails, nothing was given."""
+    try:
+        yield
+    except NotDelivered:
+        raise
+    except IsiwError as error:
+        raise NotDelivered(f"nothing was given: {error}") from error
+
+
+@contextmanager
+def _outcome_unknown() -> Iterator[None]:
+    """Within, the command to fire has been sent: whatever fails, the pulse may have been given."""
+    try:
+        yield
+    except Exception as error:
+        if isinstance(error, DeviceError) and not isinstance(error, NotDelivered | LimitExceededError):
+            raise
+        raise DeviceError(f"the stimulus was given, and its outcome is not known: {told(error)}") from error

@@ -1,0 +1,231 @@
+"""One open connection to an instrument: a command out, the answer to it back, whatever else arrives."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import re
+import secrets
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TypeVar
+
+from isiw.checks import check_choice, check_numbers, check_texts, check_wholes
+from isiw.devices.transports.line_connection import Connection
+from isiw.devices.transports.line_table import Exchange, command_values
+from isiw.errors import DeviceError, DeviceTimeoutError
+
+__all__ = ["Line", "LineSettings"]
+
+_T = TypeVar("_T")
+
+_LONGEST_LINE = 1000
+_MOST_READS = 5
+_MOST_TOLD = 5
+_LONGEST_TOLD = 80
+
+_log = logging.getLogger(__name__)
+
+_sequence = itertools.count(secrets.randbelow(900_000) + 1)
+"""Numbers of commands. They begin anywhere, so that an answer to an earlier process is no answer to this one."""
+
+
+@dataclass(frozen=True)
+class LineSettings:
+    """How lines are exchanged.
+
+    Args:
+        baud: symbols a second of a serial port [1/s].
+        line_end: what ends a command. Answers may end by a line feed, a carriage return, or both.
+        timeout_s: how long the instrument may take to answer where nothing else is said, and to take a command [s].
+        connect_s: how long it may take from opening the connection until it says that it is disarmed [s]; boards that
+            start anew when their port is opened need a second or two. `stop` may need this and twice `timeout_s`.
+        isi_tolerance_ms: how far the ISI that is read back may be from the one that was set [ms].
+
+    Raises:
+        InvalidValueError: a time that is not positive, or another end of a line.
+    """
+
+    baud: int = 115_200
+    line_end: str = "\n"
+    timeout_s: float = 1.0
+    connect_s: float = 2.5
+    isi_tolerance_ms: float = 0.001
+
+    def __post_init__(self) -> None:
+        check_wholes(self, "baud", least=1)
+        check_texts(self, "line_end")
+        check_choice(self, "line_end", ("\n", "\r", "\r\n"))
+        check_numbers(self, "timeout_s", "connect_s", above=0)
+        check_numbers(self, "isi_tolerance_ms", least=0)
+
+
+class Line:
+    """Commands and answers over one connection. Everything that fails is a `DeviceError`.
+
+    Answers are told from what came late by their sequence number. Where an instrument has none, what has come before a
+    command is thrown away, and a connection whose last answer is missing is not `trusted` any more.
+
+    Args:
+        connection: the open connection.
+        settings: how lines end, and how long an answer may take.
+        refusal: what an answer looks like that refuses; empty where there is none.
+    """
+
+    def __init__(self, connection: Connection, settings: LineSettings, refusal: str) -> None:
+        self._connection, self._settings, self._refusal = connection, settings, refusal
+        self._incoming = _Lines()
+        self.trusted = True
+
+    def ask(
+        self,
+        exchange: Exchange,
+        trial: int = 0,
+        isi_ms: float | None = None,
+        *,
+        timeout_s: float,
+        given_up: Callable[[], bool] = lambda: False,
+    ) -> dict[str, str]:
+        """Send a command and wait for its answer; returns what the answer says by group.
+
+        Args:
+            exchange: the command.
+            trial: the trial's number.
+            isi_ms: the ISI [ms]; None where there is none.
+            timeout_s: how long the answer may take [s].
+            given_up: whether nobody waits any more.
+
+        Raises:
+            DeviceTimeoutError: no answer in time.
+            DeviceError: the instrument refuses, the connection broke, the command cannot be written, or nobody waits
+                any more.
+        """
+        number = next(_sequence)
+        try:
+            command = exchange.command(command_values(number, trial, isi_ms))
+        except ValueError as error:
+            raise DeviceError(f"the command cannot be written: {error}", got=isi_ms, expected=exchange.send) from error
+        if not exchange.numbered:
+            self.drain()
+        self.trusted = False
+        self._guarded(lambda: self._connection.send(f"{command}{self._settings.line_end}".encode("ascii")))
+        deadline_s = time.monotonic() + timeout_s
+        said = self._answer(command, exchange, number, deadline_s, given_up)
+        self.trusted = True
+        return said
+
+    def drain(self) -> None:
+        """Throw away what has come so far, and say so; raises where the connection is broken.
+
+        Raises:
+            DeviceError: it is.
+        """
+        for _ in range(_MOST_READS):  # an instrument that never stops sending must not hold this up
+            data = self._guarded(lambda: self._connection.receive(wait=False))
+            if not data:
+                break
+            self._incoming.add(data)
+        others = _Others()
+        while (line := self._incoming.next()) is not None:
+            others.add(line)
+        others.add(self._incoming.take_rest())
+        others.say("before a command")
+
+    def close(self) -> None:
+        """Close the connection; calling it again is harmless."""
+        self.trusted = False
+        try:
+            self._connection.close()
+        except OSError as error:
+            _log.warning("closing the connection failed: %s", error)
+
+    def _answer(
+        self, command: str, exchange: Exchange, number: int, deadline_s: float, given_up: Callable[[], bool]
+    ) -> dict[str, str]:
+        others = _Others()
+        try:
+            for line in self._lines_until(deadline_s, given_up):
+                said = exchange.match(line)
+                if said is not None and (not exchange.numbered or _is(number, said.get("sequence"))):
+                    return said
+                self._require_not_refused(line, number)
+                others.add(line)
+        finally:
+            others.say(f"while {command!r} was to be answered")
+        raise DeviceTimeoutError(
+            f"the instrument does not answer {command!r}",
+            got=list(others.last) or None,
+            expected=f"an answer that matches {exchange.reply}",
+        )
+
+    def _require_not_refused(self, line: str, number: int) -> None:
+        found = re.fullmatch(self._refusal, line) if self._refusal else None
+        said = {} if found is None else found.groupdict()
+        if found is not None and ("sequence" not in said or _is(number, said["sequence"])):
+            self.trusted = True
+            raise DeviceError("the instrument refuses", got=(said.get("reason") or line)[:_LONGEST_TOLD])
+
+    def _lines_until(self, deadline_s: float, given_up: Callable[[], bool]) -> Iterator[str]:
+        """The lines that come until a moment."""
+        while time.monotonic() < deadline_s:
+            while (line := self._incoming.next()) is not None:
+                yield line
+            if given_up():
+                raise DeviceError("the device was stopped while the instrument was busy")
+            self._incoming.add(self._guarded(self._connection.receive))
+
+    def _guarded(self, use: Callable[[], _T]) -> _T:
+        """What a connection does, where it still stands."""
+        try:
+            return use()
+        except OSError as error:
+            self.close()
+            raise DeviceError(f"the connection to the instrument broke: {error}") from error
+
+
+def _is(number: int, stated: str | None) -> bool:
+    """Whether an answer states the number of its command."""
+    return stated is not None and stated.isdecimal() and int(stated) == number
+
+
+class _Others:
+    """Lines that answer nothing: how many, and the last few of them."""
+
+    def __init__(self) -> None:
+        self.last: deque[str] = deque(maxlen=_MOST_TOLD)
+        self._count = 0
+
+    def add(self, line: str) -> None:
+        if line:
+            self._count += 1
+            self.last.append(line[:_LONGEST_TOLD])
+
+    def say(self, when: str) -> None:
+        if self._count:
+            _log.warning("thrown away %s: %d lines, last %s", when, self._count, list(self.last))
+
+
+class _Lines:
+    """Bytes in, lines out; what is longer than a line can be is cut, so that memory is bounded."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+        self._lines: deque[str] = deque()
+
+    def add(self, data: bytes) -> None:
+        *lines, rest = re.split(rb"[\r\n]", self._rest + data)
+        self._rest = rest[-_LONGEST_LINE:]
+        self._lines.extend(text for line in lines if (text := _text(line)))
+
+    def next(self) -> str | None:
+        return self._lines.popleft() if self._lines else None
+
+    def take_rest(self) -> str:
+        rest, self._rest = _text(self._rest), b""
+        return rest
+
+
+def _text(line: bytes) -> str:
+    return line[-_LONGEST_LINE:].decode("ascii", errors="backslashreplace").strip()

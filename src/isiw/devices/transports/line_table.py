@@ -1,0 +1,281 @@
+r"""The table of an instrument's commands: what is sent, and what the answer must look like.
+
+    set = { send = "{sequence} SET {isi_us}", reply = '(?P<sequence>\d+) OK' }
+
+`send` may hold the fields {sequence}, {trial}, and the ISI as {isi_ms}, {isi_us} or {isi_s}, with a format where one is
+needed: {isi_ms:.1f}. `reply` is a regular expression that the whole line must match; named groups hold what it says.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from string import Formatter
+from typing import Any, Final
+
+from isiw.checks import check_numbers, check_texts, number
+from isiw.errors import InvalidValueError
+
+__all__ = ["Exchange", "LineCommands", "command_values", "isi_ms_of", "mep_mv_of", "number_of"]
+
+_MS: Final = {"isi_ms": 1.0, "isi_us": 1e-3, "isi_s": 1e3}
+_MV: Final = {"mep_mv": 1.0, "mep_uv": 1e-3}
+_ISI, _MEP = frozenset(_MS), frozenset(_MV)
+_OUTCOME = _MEP | {"background_rms_uv"}
+_STATE = frozenset({"coil_c", "intensity_pct_mso"})
+_NONE: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Exchange:
+    r"""A command and the answer that it must get.
+
+    Args:
+        send: what is sent, without the end of the line: ASCII, with fields such as {sequence} and {isi_ms}.
+        reply: the regular expression that the whole answer must match, with groups such as (?P<sequence>\d+).
+        timeout_s: how long the answer may take [s]; None where the whole line's time holds, and for what fires and
+            measures, all the time that a delivery has.
+
+    Raises:
+        InvalidValueError: text that is no template or no pattern, or a sequence number in only one of the two.
+    """
+
+    send: str
+    reply: str
+    timeout_s: float | None = None
+
+    def __post_init__(self) -> None:
+        check_texts(self, "send", "reply")
+        check_numbers(self, "timeout_s", above=0, optional=True)
+        if not self.send.isascii() or not self.send.isprintable() or not self.send:
+            raise InvalidValueError("a command must be one line of ASCII", got=self.send)
+        self._require_pattern()
+        try:
+            self.command(command_values(1, 0, 1.5))
+        except (ValueError, KeyError, IndexError, AttributeError) as error:
+            raise InvalidValueError(
+                f"a command cannot be filled in: {error}",
+                got=self.send,
+                expected=f"fields among {', '.join('{' + name + '}' for name in command_values(1, 0, 1.5))}",
+                remedy="Write {{ and }} for braces that are sent as they are.",
+            ) from error
+        if ("sequence" in self.fields) != self.numbered:
+            raise InvalidValueError(
+                "a sequence number must be sent and answered, or neither",
+                got=f"{self.send} with the answer {self.reply}",
+                expected=r"{sequence} in the command and (?P<sequence>\d+) in the answer",
+            )
+
+    def _require_pattern(self) -> None:
+        try:
+            re.compile(self.reply)
+        except re.error as error:
+            raise InvalidValueError(f"an answer's pattern is invalid: {error}", got=self.reply) from error
+
+    @property
+    def fields(self) -> frozenset[str]:
+        """What is filled into the command."""
+        return frozenset(name for _, name, _, _ in Formatter().parse(self.send) if name is not None)
+
+    @property
+    def groups(self) -> frozenset[str]:
+        """What the answer says."""
+        return frozenset(re.compile(self.reply).groupindex)
+
+    @property
+    def numbered(self) -> bool:
+        """Whether the answer says which command it answers."""
+        return "sequence" in self.groups
+
+    def command(self, values: Mapping[str, float]) -> str:
+        """The command with its fields filled in."""
+        return self.send.format_map(values)
+
+    def match(self, line: str) -> dict[str, str] | None:
+        """What an answer says by group; None where the line is no answer to this command."""
+        found = re.fullmatch(self.reply, line)
+        return None if found is None else {name: said for name, said in found.groupdict().items() if said is not None}
+
+
+@dataclass(frozen=True)
+class LineCommands:
+    r"""What an instrument understands. Each is an `Exchange`, or a table with its arguments.
+
+    Args:
+        disarm: it cannot fire from here on; must work in any state.
+        set: sets the ISI, which the command must hold.
+        read_back: asks which ISI is set, which the answer must say.
+        arm: it may fire from here on.
+        fire: gives a pair of stimuli.
+        alone: gives the magnetic pulse without a tap, whatever ISI is set.
+        tap_alone: gives the tap without the pulse; None where it cannot.
+        result: asks what came of it: the realised ISI, if the answer to `fire` does not say it, and the MEP.
+        status: asks whether it is ready; the answer may say coil_c [°C] and intensity_pct_mso [% MSO].
+        refusal: what an answer looks like that refuses any command, with (?P<reason>.*) where it says why; empty where
+            it does not refuse in words. It holds (?P<sequence>\d+) where the answers do.
+
+    Raises:
+        InvalidValueError: a command without what it must hold, or an answer without what it must say.
+    """
+
+    disarm: Exchange
+    set: Exchange
+    read_back: Exchange
+    arm: Exchange
+    fire: Exchange
+    alone: Exchange
+    tap_alone: Exchange | None = None
+    result: Exchange | None = None
+    status: Exchange | None = None
+    refusal: str = ""
+
+    def __post_init__(self) -> None:
+        for name, value in list(self._given()):
+            if isinstance(value, Mapping):
+                object.__setattr__(self, name, Exchange(**value))
+        for name, exchange in self._given():
+            if not isinstance(exchange, Exchange):
+                raise InvalidValueError(
+                    f"the command {name} must be a table", got=exchange, expected='{ send = "…", reply = "…" }'
+                )
+            _require_known(name, exchange)
+        _require_one(_ISI, self.set.fields, "the command set must hold the ISI", "{isi_ms}, {isi_us} or {isi_s}")
+        _require_one(_ISI, self.read_back.groups, "the answer to read_back must say the ISI", r"(?P<isi_ms>[\d.]+)")
+        told = self.fire.groups | self._result_groups
+        _require_one(_ISI, told, "the answer to fire or result must say the realised ISI", r"(?P<isi_ms>[\d.]+)")
+        self._require_refusal()
+
+    def _given(self) -> Iterator[tuple[str, Any]]:
+        """The commands by name, as far as there are any."""
+        values = ((field.name, getattr(self, field.name)) for field in fields(self) if field.name != "refusal")
+        return ((name, value) for name, value in values if value is not None)
+
+    def _require_refusal(self) -> None:
+        try:
+            groups = re.compile(self.refusal).groupindex
+        except (re.error, TypeError) as error:
+            raise InvalidValueError(f"the pattern of a refusal is invalid: {error}", got=self.refusal) from error
+        if not groups.keys() <= {"sequence", "reason"}:
+            raise InvalidValueError(
+                "a refusal says something unknown", got=sorted(groups), expected="the groups sequence and reason"
+            )
+
+    @property
+    def _result_groups(self) -> frozenset[str]:
+        return _NONE if self.result is None else self.result.groups
+
+    @property
+    def firing(self) -> tuple[Exchange, ...]:
+        """The commands that give a stimulus."""
+        return tuple(each for each in (self.fire, self.alone, self.tap_alone) if each is not None)
+
+    @property
+    def some_measure(self) -> bool:
+        """Whether an answer says an MEP."""
+        return any(each.groups & _MEP for each in self.firing) or bool(self._result_groups & _MEP)
+
+    @property
+    def all_measure(self) -> bool:
+        """Whether the MEP of every kind of trial is said."""
+        return all((each.groups | self._result_groups) & _MEP for each in self.firing)
+
+
+_FIELDS: Final = {
+    "set": _ISI | {"trial"},
+    "fire": _ISI | {"trial"},
+    "alone": frozenset({"trial"}),
+    "tap_alone": frozenset({"trial"}),
+    "result": frozenset({"trial"}),
+}
+"""What a command may hold besides its sequence number."""
+
+_GROUPS: Final = {
+    "read_back": _ISI,
+    "fire": _ISI | _OUTCOME,
+    "alone": _OUTCOME,
+    "tap_alone": _OUTCOME,
+    "result": _ISI | _OUTCOME,
+    "status": _STATE,
+}
+"""What an answer may say besides its sequence number."""
+
+
+def _require_known(name: str, exchange: Exchange) -> None:
+    """Raise where a command holds, or its answer says, what has no meaning there."""
+    rules = (
+        ("command", exchange.fields, _FIELDS.get(name, _NONE)),
+        ("answer", exchange.groups, _GROUPS.get(name, _NONE)),
+    )
+    for part, there, known in rules:
+        unknown = there - known - {"sequence"}
+        if unknown:
+            raise InvalidValueError(
+                f"the {part} of {name} has something unknown",
+                got=", ".join(sorted(unknown)),
+                expected=f"among {', '.join(sorted(known | {'sequence'}))}",
+            )
+
+
+def _require_one(names: frozenset[str], there: frozenset[str], what: str, expected: str) -> None:
+    if len(names & there) != 1:
+        raise InvalidValueError(f"{what}, in one unit", got=sorted(names & there) or "none", expected=expected)
+
+
+def command_values(sequence: int, trial: int, isi_ms: float | None) -> dict[str, float]:
+    """What may be filled into a command.
+
+    Args:
+        sequence: its number.
+        trial: the trial's number.
+        isi_ms: the ISI [ms]; None where there is none.
+    """
+    isi = {} if isi_ms is None else {name: _plain(isi_ms / ms) for name, ms in _MS.items()}
+    return {"sequence": sequence, "trial": trial, **isi}
+
+
+def _plain(value: float) -> float:
+    """A number without the digits that only binary fractions have, and whole where it is."""
+    rounded = round(value, 9)
+    return int(rounded) if rounded == int(rounded) else rounded
+
+
+def isi_ms_of(said: Mapping[str, str]) -> float | None:
+    """The ISI that an answer says [ms]; None where it says none.
+
+    Raises:
+        InvalidValueError: it is no finite number.
+    """
+    return _value(said, _MS)
+
+
+def mep_mv_of(said: Mapping[str, str]) -> float | None:
+    """The MEP that an answer says [mV]; None where it says none.
+
+    Raises:
+        InvalidValueError: it is no finite number.
+    """
+    return _value(said, _MV)
+
+
+def _value(said: Mapping[str, str], units: Mapping[str, float]) -> float | None:
+    values = ((number_of(said, name), unit) for name, unit in units.items())
+    return next((value * unit for value, unit in values if value is not None), None)
+
+
+def number_of(said: Mapping[str, str], name: str) -> float | None:
+    """A number that an answer says; None where it does not.
+
+    Args:
+        said: the answer by group.
+        name: the group.
+
+    Raises:
+        InvalidValueError: it is no finite number.
+    """
+    if name not in said:
+        return None
+    try:
+        return number(f"the instrument's {name}", float(said[name]))
+    except ValueError as error:
+        raise InvalidValueError(f"the instrument's {name} is no finite number", got=said[name]) from error

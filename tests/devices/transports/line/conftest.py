@@ -1,0 +1,31 @@
+"""Peers and devices for the tests of the line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+import isiw
+from devices.transports.line.parts import HASTY, made, over, staged
+from isiw.testing import PulsePeer
+
+
+@pytest.fixture
+def peer() -> PulsePeer:
+    return PulsePeer()
+
+
+@pytest.fixture(params=["TCP", "pty"])
+def address(request: pytest.FixtureRequest, peer: PulsePeer) -> Iterator[str]:
+    with over(request.param, peer) as at:
+        yield at
+
+
+@pytest.fixture
+def device(peer: PulsePeer) -> Iterator[isiw.LineDevice]:
+    """One over TCP, staged."""
+    with peer.over_tcp() as at:
+        device = staged(made(at, line=HASTY))
+        yield device
+        device.unstage()
