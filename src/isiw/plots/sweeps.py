@@ -20,7 +20,7 @@ from isiw.types import BoolArray, FloatArray
 __all__ = ["sweeps_figure"]
 
 BEFORE_MS, AFTER_MS = 50.0, 80.0
-MOST_LABELS = 30
+MOST_LABELS, MOST_POINTS = 30, 100_000
 ROWS_OF_LARGEST = 2.0
 """As many rows the largest deflection is high; with many trials a sixteenth of them, so that it remains visible."""
 
@@ -94,8 +94,9 @@ def _draw_traces(
     axes: Axes, traces: Sequence[_Trace], chosen: BoolArray, rows_per_mv: float, colour: str, label: str
 ) -> None:
     most, width = _rows_of_largest(traces), 0.6 if len(traces) < 100 else 0.35
+    kept = slice(None, None, -(-sum(len(trace.times_ms) for trace in traces) // MOST_POINTS))
     lines = [
-        np.column_stack([trace.times_ms, row + np.clip(rows_per_mv * trace.emg_mv, -most, most)])
+        np.column_stack([trace.times_ms, row + np.clip(rows_per_mv * trace.emg_mv, -most, most)])[kept]
         for row, trace in enumerate(traces)
         if chosen[row]
     ]

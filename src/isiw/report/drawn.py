@@ -22,7 +22,8 @@ NEAR_MS: Final = (-60.0, 100.0)
 MOST_NEAR, MOST_WHOLE, MOST_ISIS = 1000, 300, 260
 """Points that are drawn of the EMG near the pulse, of a whole waveform, and of a profile."""
 
-_DIGITS: Final = 4
+FINE, COARSE = 4, 3
+"""Digits of the largest to which the EMG near the pulse and profiles, and whole waveforms, are rounded."""
 
 
 def drawn(record: SessionRecord) -> dict[str, Any]:
@@ -74,16 +75,16 @@ def _belief(estimate: Estimate) -> dict[str, Any]:
         "stop": estimate.stop,
         "reason": plain(estimate.reason),
         "isiMs": list(estimate.grid_ms[kept]),
-        **{name: _rounded(1e3 * np.asarray(values)[kept]) for name, values in bands.items()},
+        **{name: _rounded(1e3 * np.asarray(values)[kept], FINE) for name, values in bands.items()},
     }
 
 
 def _sweep(channels: dict[str, Channel], trial: Trial) -> list[dict[str, Any]]:
     """The waveforms of a trial: the EMG near the pulse first, then every channel as a whole."""
-    waves = [_wave(name, channel, MOST_WHOLE) for name, channel in sorted(channels.items())]
+    waves = [_wave(name, channel, MOST_WHOLE, COARSE) for name, channel in sorted(channels.items())]
     emg = channels.get("emg")
     near = None if emg is None or trial.t_tms_ms is None else _near(emg, trial.t_tms_ms)
-    return waves if near is None else [_wave("emg near the pulse", near, MOST_NEAR), *waves]
+    return waves if near is None else [_wave("emg near the pulse", near, MOST_NEAR, FINE), *waves]
 
 
 def _near(channel: Channel, pulse_ms: float) -> Channel | None:
@@ -94,14 +95,14 @@ def _near(channel: Channel, pulse_ms: float) -> Channel | None:
     return Channel(values, channel.rate_hz, channel.unit, t0_ms) if len(values) else None
 
 
-def _wave(name: str, channel: Channel, most: int) -> dict[str, Any]:
+def _wave(name: str, channel: Channel, most: int, digits: int) -> dict[str, Any]:
     values, samples = _thinned(channel.values, most)
     return {
         "name": plain(name),
         "unit": plain(channel.unit),
         "t0": round(channel.t0_ms, 3),
         "step": 1e3 * samples / channel.rate_hz,
-        "values": _rounded(values),
+        "values": _rounded(values, digits),
     }
 
 
@@ -117,11 +118,11 @@ def _thinned(values: FloatArray, most: int) -> tuple[FloatArray, float]:
     return pairs.ravel(), stretch / 2
 
 
-def _rounded(values: FloatArray) -> list[float | None]:
-    """To four digits of the largest; what is not finite is left open."""
+def _rounded(values: FloatArray, digits: int) -> list[float | None]:
+    """To so many digits of the largest; what is not finite is left open."""
     finite = np.isfinite(values)
     largest = float(np.abs(values[finite]).max(initial=0.0))
-    decimals = _DIGITS - math.ceil(math.log10(largest)) if largest > 0 else 0
+    decimals = digits - math.ceil(math.log10(largest)) if largest > 0 else 0
     rounded: list[float | None] = np.round(np.where(finite, values, 0.0), decimals).tolist()
     return [value if known else None for value, known in zip(rounded, finite.tolist(), strict=True)]
 
