@@ -26,7 +26,9 @@ class Evoked:
 
 def tapped(path: Path, trials: int = 6, subject: str = HOSTILE) -> SessionRecord:
     """A session at the simulated robot, with a note, an exclusion and a control trial."""
-    device = Tapper(lambda isi_ms: Evoked(0.05 + (isi_ms or 0.0) / 1e3), settings=TapperSettings(rate_hz=2000.0), seed=3)
+    device = Tapper(
+        lambda isi_ms: Evoked(0.05 + (isi_ms or 0.0) / 1e3), settings=TapperSettings(rate_hz=2000.0), seed=3
+    )
 
     def on_trial(update: SessionUpdate) -> None:
         if update.trial.index == 1:

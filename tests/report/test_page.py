@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from isiw.errors import ConfigError, InvalidValueError
@@ -34,9 +35,7 @@ def data_of(page: Page) -> Any:
     return next(json.loads(text) for text in page.of("script") if text.startswith('{"'))
 
 
-def test_the_page_begins_with_what_was_found_and_answers_the_first_questions(
-    page: Page, record: SessionRecord
-) -> None:
+def test_the_page_begins_with_what_was_found_and_answers_the_first_questions(page: Page, record: SessionRecord) -> None:
     assert page.of("h1") == [f"Session of {HOSTILE}"]
     for sentence in finding_sentences(record):
         assert sentence in page.words
@@ -122,7 +121,9 @@ def test_a_log_that_is_not_closed_says_up_to_which_trial_it_is_shown(record: Ses
 def test_a_verdict_after_the_last_estimate_is_said(tmp_path: Path) -> None:
     tapped(tmp_path / "s.mcap", subject="P07")
     exclude(tmp_path / "s.mcap", 4, "sneezed")
-    assert "Trials were judged anew after the last estimate" in Page(report_page(read_session(tmp_path / "s.mcap"))).words
+    assert (
+        "Trials were judged anew after the last estimate" in Page(report_page(read_session(tmp_path / "s.mcap"))).words
+    )
 
 
 @pytest.mark.parametrize("path", OLD_LOGS, ids=lambda path: path.name)
@@ -174,6 +175,6 @@ def many(record: SessionRecord, trials: int) -> SessionRecord:
         source = told[number % len(told)]
         history += [replace(source, index=number), record.estimates[-1].model_copy(update={"trial": number})]
         for name, channel in record.sweep(source.index).items():
-            samples = [*channel.values, *channel.values, *channel.values[: len(channel.values) // 2]]
+            samples = np.tile(channel.values, 3)[: 5 * len(channel.values) // 2]
             waveforms[number, name] = replace(channel, values=samples, rate_hz=5000.0)
     return replace(record, history=tuple(history), waveforms=waveforms)

@@ -68,9 +68,9 @@ def _traces(record: SessionRecord) -> list[_Trace]:
 def _trace(trial: Trial, emg: Channel | None) -> _Trace | None:
     if emg is None or trial.t_tms_ms is None or emg.unit not in EMG_UNITS_MV:
         return None
-    times_ms = emg.t0_ms + 1e3 * np.arange(len(emg.values)) / emg.rate_hz - trial.t_tms_ms
+    times_ms = emg.t0_ms + 1e3 * np.arange(len(emg.values), dtype=np.float64) / emg.rate_hz - trial.t_tms_ms
     near = (times_ms >= -BEFORE_MS) & (times_ms <= AFTER_MS) & np.isfinite(emg.values)
-    return _Trace(trial, times_ms[near], emg.values[near] * EMG_UNITS_MV[emg.unit])
+    return _Trace(trial, times_ms[near], emg.values[near] * EMG_UNITS_MV[emg.unit]) if near.any() else None
 
 
 def _largest_mv(traces: Sequence[_Trace], span_ms: tuple[float, float]) -> float:

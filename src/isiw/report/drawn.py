@@ -22,6 +22,8 @@ NEAR_MS: Final = (-60.0, 100.0)
 MOST_NEAR, MOST_WHOLE, MOST_ISIS = 1000, 300, 260
 """Points that are drawn of the EMG near the pulse, of a whole waveform, and of a profile."""
 
+_MOST_DECIMALS: Final = 12
+
 FINE, COARSE = 4, 3
 """Digits of the largest to which the EMG near the pulse and profiles, and whole waveforms, are rounded."""
 
@@ -67,14 +69,14 @@ def _belief(estimate: Estimate) -> dict[str, Any]:
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
     bands = {"profile": estimate.profile_mv, "low": estimate.band_low_mv, "high": estimate.band_high_mv}
     return {
-        "probability": estimate.probability,
+        "probability": _number(estimate.probability),
         "window": [list(segment) for segment in estimate.window.segments] if estimate.window else [],
-        "start": [_finite(edge) for edge in (estimate.start_low_ms, estimate.start_high_ms)],
-        "end": [_finite(edge) for edge in (estimate.end_low_ms, estimate.end_high_ms)],
-        "nextMs": estimate.next_isi_ms,
+        "start": [_edge(edge) for edge in (estimate.start_low_ms, estimate.start_high_ms)],
+        "end": [_edge(edge) for edge in (estimate.end_low_ms, estimate.end_high_ms)],
+        "nextMs": _number(estimate.next_isi_ms),
         "stop": estimate.stop,
         "reason": plain(estimate.reason),
-        "isiMs": list(estimate.grid_ms[kept]),
+        "isiMs": [_number(isi_ms) for isi_ms in estimate.grid_ms[kept]],
         **{name: _rounded(1e3 * np.asarray(values)[kept], FINE) for name, values in bands.items()},
     }
 
@@ -88,9 +90,9 @@ def _sweep(channels: dict[str, Channel], trial: Trial) -> list[dict[str, Any]]:
 
 
 def _near(channel: Channel, pulse_ms: float) -> Channel | None:
-    first, last = (round((pulse_ms + edge - channel.t0_ms) * channel.rate_hz / 1e3) for edge in NEAR_MS)
-    first = max(0, first)
-    values = channel.values[first : max(first, last)]
+    ends = (pulse_ms + np.asarray(NEAR_MS) - channel.t0_ms) * (channel.rate_hz / 1e3)
+    first, last = np.clip(np.round(ends), 0, len(channel.values)).astype(int).tolist()
+    values = channel.values[first:last]
     t0_ms = channel.t0_ms + 1e3 * first / channel.rate_hz
     return Channel(values, channel.rate_hz, channel.unit, t0_ms) if len(values) else None
 
@@ -101,7 +103,7 @@ def _wave(name: str, channel: Channel, most: int, digits: int) -> dict[str, Any]
         "name": plain(name),
         "unit": plain(channel.unit),
         "t0": round(channel.t0_ms, 3),
-        "step": 1e3 * samples / channel.rate_hz,
+        "step": _number(1e3 * samples / channel.rate_hz),
         "values": _rounded(values, digits),
     }
 
@@ -122,13 +124,18 @@ def _rounded(values: FloatArray, digits: int) -> list[float | None]:
     """To so many digits of the largest; what is not finite is left open."""
     finite = np.isfinite(values)
     largest = float(np.abs(values[finite]).max(initial=0.0))
-    decimals = digits - math.ceil(math.log10(largest)) if largest > 0 else 0
+    decimals = max(-_MOST_DECIMALS, min(_MOST_DECIMALS, digits - math.ceil(math.log10(largest)))) if largest > 0 else 0
     rounded: list[float | None] = np.round(np.where(finite, values, 0.0), decimals).tolist()
     return [value if known else None for value, known in zip(rounded, finite.tolist(), strict=True)]
 
 
-def _finite(edge_ms: float | None) -> float | str | None:
-    """An edge as JSON can hold it: one beyond the range is the range's end."""
+def _number(value: float | None) -> float | None:
+    """A number as JSON can hold it."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+def _edge(edge_ms: float | None) -> float | str | None:
+    """An edge as JSON can hold it; of one beyond the range, on which side."""
     if edge_ms is None or math.isnan(edge_ms):
         return None
     return edge_ms if math.isfinite(edge_ms) else "low" if edge_ms < 0 else "high"

@@ -65,7 +65,10 @@ def settings_facts(record: SessionRecord) -> list[Fact]:
     Args:
         record: the session.
     """
-    return [Fact(key, json.dumps(value, ensure_ascii=False)) for key, value in _flat(record.header.strategy.settings).items()]
+    return [
+        Fact(key, json.dumps(value, ensure_ascii=False))
+        for key, value in _flat(record.header.strategy.settings).items()
+    ]
 
 
 def _subject(record: SessionRecord) -> str:

@@ -29,7 +29,7 @@ class Counted(NamedTuple):
     """Something that was counted, and what it may be at most or at least."""
 
     what: str
-    count: str
+    found: str
     limit: str
 
 
