@@ -40,11 +40,12 @@ def test_timing_is_said_by_the_median_and_the_largest_error_and_what_it_cost(rec
     trials = [trial(0, isi_ms=51.0), trial(1, isi_ms=48.0), trial(2, isi_ms=54.0, t_hit_ms=1.0)]
     lost = [trial(3, isi_ms=63.0, reason=MistrialReason.ISI_OFF), trial(4, reason=MistrialReason.SATURATION)]
     _, said, detail = answer(with_history(record, [*trials, *lost]), "timing")
-    assert said == "off by 2.0 ms (median)"
+    assert said == "not in 1 of 5 trials"
     assert detail == (
-        "At most 4.0 ms off in a trial that counts; 10 ms are tolerated. "
-        "Lost for this: 1 ISI off by more than the tolerance."
+        "Trials that count are off by 2.0 ms (median), at most 4.0 ms; 10 ms are tolerated. "
+        "Rejected for this: 1 ISI off by more than the tolerance."
     )
+    assert answer(with_history(record, trials), "timing").answer == "yes"
 
 
 def test_a_device_that_only_repeats_what_was_wanted_is_not_taken_for_exact(record: SessionRecord) -> None:
@@ -56,12 +57,30 @@ def test_a_device_that_only_repeats_what_was_wanted_is_not_taken_for_exact(recor
 def test_a_muscle_that_was_never_at_rest_is_not_unknown(record: SessionRecord) -> None:
     trials = [trial(k, background_rms_uv=30.0 + k, reason=MistrialReason.BACKGROUND_ACTIVITY) for k in range(3)]
     _, said, detail = answer(with_history(record, trials), "at rest")
-    assert said == "31 µV RMS (median)"
-    assert detail == "EMG before the pulse: 10 µV are allowed. Lost for this: 3 background activity."
+    assert said == "not in 3 of 3 trials"
+    assert detail == (
+        "EMG before the pulse: 31 µV RMS (median), at most 32 µV; 10 µV are allowed. "
+        "Rejected for this: 3 background activity."
+    )
+
+
+def test_a_rest_that_is_known_of_some_trials_only_is_not_told_of_all(record: SessionRecord) -> None:
+    trials = [trial(0, background_rms_uv=1.0), trial(1)]
+    assert answer(with_history(record, trials), "at rest").answer == "yes, where it is known (1 of 2 trials)"
+
+
+def test_a_trial_that_an_operator_accepted_was_still_not_at_rest(record: SessionRecord) -> None:
+    tense = trial(0, background_rms_uv=30.0, reason=MistrialReason.BACKGROUND_ACTIVITY).accepted_anyway()
+    _, said, detail = answer(with_history(record, [tense, trial(1, background_rms_uv=1.0)]), "at rest")
+    assert said == "not in 1 of 2 trials"
+    assert detail.endswith("Rejected for this: 1 background activity, accepted by the operator.")
 
 
 def test_without_a_background_it_is_not_known(record: SessionRecord) -> None:
-    assert answer(record, "at rest")[1:] == ("not known", "The log has no background EMG. No trial was lost for this.")
+    assert answer(record, "at rest")[1:] == (
+        "not known",
+        "The log has no background EMG. No trial was rejected for this.",
+    )
 
 
 def test_why_it_stopped_is_the_last_decisions_reason(record: SessionRecord) -> None:
@@ -72,8 +91,9 @@ def test_a_session_that_broke_off_says_by_what(record: SessionRecord) -> None:
     going_on = [e.model_copy(update={"stop": False, "reason": "2 stimuli are left."}) if isinstance(e, Estimate) else e
                 for e in record.history]  # fmt: skip
     assert answer(with_history(record, going_on), "stop")[1:] == ("it has not stopped", "2 stimuli are left.")
+    doubt = Event(kind="doubt", trial=3, text="What is said twice is said once.")
     fault = Event(kind="fault", trial=3, text="Interrupted by the operator.")
-    assert answer(with_history(record, [*going_on, fault]), "stop")[1:] == (
+    assert answer(with_history(record, [*going_on, doubt, fault]), "stop")[1:] == (
         "it was interrupted", "Interrupted by the operator. 2 stimuli are left.",
     )  # fmt: skip
 

@@ -25,7 +25,7 @@ def course_figure(record: SessionRecord) -> Figure:
     figure = Figure(figsize=(7.2, 4.2), layout="constrained")
     timing, background = figure.subplots(2, 1, sharex=True)
     tidied(timing, background)
-    tolerance_ms = min(header.space.tolerance_ms, header.signals.isi_tolerance_ms or header.space.tolerance_ms)
+    tolerance_ms = header.signals.tolerance_ms(header.space)
     timing.axhline(0, color=FAINT, lw=0.8, ls=":")
     for limit_ms in (-tolerance_ms, tolerance_ms):
         timing.axhline(limit_ms, color=ORANGE, lw=1.2, ls=(0, (4, 3)), label="tolerance" if limit_ms > 0 else None)

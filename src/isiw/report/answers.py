@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, EventKind
 from isiw.report.words import counts_sentence
-from isiw.trials import MistrialReason, Trial
+from isiw.trials import MistrialReason
 
 __all__ = ["Answer", "answers"]
 
@@ -45,41 +45,53 @@ def _lost(record: SessionRecord) -> Answer:
 def _timing(record: SessionRecord) -> Answer:
     question = "Was the timing right?"
     errors_ms = [abs(trial.isi_error_ms) for trial in record.table.told if trial.isi_error_ms is not None]
-    lost = _count_lost(record, _OF_TIMING)
+    rejected = _rejected_for(record, _OF_TIMING)
+    is_timed = any(trial.t_hit_ms is not None or trial.t_tms_ms is not None for trial in record.table)
     if not errors_ms:
-        return Answer(question, "not known", f"No trial that counts has a realised ISI. {lost}")
-    if not any(errors_ms) and not any(_is_timed(trial) for trial in record.table):
         return Answer(
-            question,
-            "as the device says",
-            f"It reports every ISI as it was wanted, and no time of a pulse or a hit to check that by. {lost}",
+            question, _verdict(record, rejected, 0), f"No trial that counts has a realised ISI. {_listed(rejected)}"
         )
-    middle_ms, largest_ms = statistics.median(errors_ms), max(errors_ms)
-    tolerance_ms = record.header.signals.isi_tolerance_ms or record.header.space.tolerance_ms
-    detail = f"At most {largest_ms:.1f} ms off in a trial that counts; {tolerance_ms:g} ms are tolerated. {lost}"
-    return Answer(question, f"off by {middle_ms:.1f} ms (median)", detail)
-
-
-def _is_timed(trial: Trial) -> bool:
-    return trial.t_hit_ms is not None or trial.t_tms_ms is not None
+    if not any(errors_ms) and not is_timed:
+        detail = "It reports every ISI as it was wanted, and no time of a pulse or a hit to check that by."
+        return Answer(question, "as the device says", f"{detail} {_listed(rejected)}")
+    tolerance_ms = record.header.signals.tolerance_ms(record.header.space)
+    sizes = f"{statistics.median(errors_ms):.1f} ms (median), at most {max(errors_ms):.1f} ms"
+    detail = f"Trials that count are off by {sizes}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
+    pairs = sum(trial.commanded_isi_ms is None or trial.isi_ms is not None for trial in record.table)
+    return Answer(question, _verdict(record, rejected, pairs), detail)
 
 
 def _rest(record: SessionRecord) -> Answer:
     question, limit_uv = "Was the muscle at rest?", record.header.signals.background_uv
     levels_uv = [t.background_rms_uv for t in record.table if t.background_rms_uv is not None]
-    counting_uv = [t.background_rms_uv for t in record.table if t.counts and t.background_rms_uv is not None]
-    lost = _count_lost(record, frozenset({MistrialReason.BACKGROUND_ACTIVITY}))
+    rejected = _rejected_for(record, frozenset({MistrialReason.BACKGROUND_ACTIVITY}))
+    verdict = _verdict(record, rejected, len(levels_uv))
     if not levels_uv:
-        return Answer(question, "not known", f"The log has no background EMG. {lost}")
-    worst = f"at most {max(counting_uv):.2g} µV in a trial that counts, " if counting_uv else ""
-    detail = f"EMG before the pulse: {worst}{limit_uv:g} µV are allowed. {lost}"
-    return Answer(question, f"{statistics.median(levels_uv):.2g} µV RMS (median)", detail)
+        return Answer(question, verdict, f"The log has no background EMG. {_listed(rejected)}")
+    sizes = f"{statistics.median(levels_uv):.2g} µV RMS (median), at most {max(levels_uv):.2g} µV"
+    return Answer(question, verdict, f"EMG before the pulse: {sizes}; {limit_uv:g} µV are allowed. {_listed(rejected)}")
 
 
-def _count_lost(record: SessionRecord, reasons: frozenset[MistrialReason]) -> str:
-    counts = Counter(str(trial.reason) for trial in record.table if trial.reason in reasons)
-    listed = ", ".join(f"{count} {reason}" for reason, count in counts.items())
-    return f"Lost for this: {listed}." if counts else "No trial was lost for this."
+def _rejected_for(record: SessionRecord, reasons: frozenset[MistrialReason]) -> list[str]:
+    """Why trials were rejected, one entry each, for any of some reasons; those that an operator accepted too."""
+    lost = [str(trial.reason) for trial in record.table if trial.reason in reasons]
+    overruled = [f"{t.overruled}, accepted by the operator" for t in record.table if t.overruled in reasons]
+    return lost + overruled
+
+
+def _verdict(record: SessionRecord, rejected: list[str], known: int) -> str:
+    """Whether it was right in all trials, as far as is known."""
+    given = len(record.table)
+    if rejected:
+        return f"not in {len(rejected)} of {given} trials"
+    if not known:
+        return "not known"
+    return "yes" if known == given else f"yes, where it is known ({known} of {given} trials)"
+
+
+def _listed(rejected: list[str]) -> str:
+    listed = ", ".join(f"{count} {reason}" for reason, count in Counter(rejected).items())
+    return f"Rejected for this: {listed}." if rejected else "No trial was rejected for this."
 
 
 def _stopped(record: SessionRecord) -> Answer:
@@ -94,8 +106,9 @@ def _stopped(record: SessionRecord) -> Answer:
 
 
 def _ending(record: SessionRecord) -> str:
-    """What happened after the last estimate that can end a session, in the log's words."""
+    """What happened last after the last estimate that can end a session, in the log's words."""
     after = record.history
     if record.estimates:
         after = after[after.index(record.estimates[-1]) + 1 :]
-    return " ".join(entry.text for entry in after if isinstance(entry, Event) and entry.kind in _ENDING)
+    texts = [entry.text for entry in after if isinstance(entry, Event) and entry.kind in _ENDING]
+    return texts[-1] if texts else ""
