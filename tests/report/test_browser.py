@@ -82,6 +82,11 @@ def test_hostile_names_are_text(opened: Opened) -> None:
     assert opened.page.locator("main b, main img").count() == 0
 
 
+def test_no_button_sends_what_is_drawn_to_anybody(opened: Opened) -> None:
+    opened.page.locator("#belief").hover()
+    assert opened.page.locator(".modebar-btn").count() == 0
+
+
 def test_the_last_trial_is_shown_first_with_the_logs_numbers(opened: Opened, record: SessionRecord) -> None:
     last, estimate = record.table[-1], record.estimates[-1]
     assert opened.text("#told-trial").startswith(f"Trial {last.index} ({len(record.table)} of {len(record.table)})")

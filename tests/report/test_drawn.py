@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
-from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, drawn
+from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, TOO_FEW, drawn
 from isiw.trials import Channel
 from report.sessions import tapped
 
@@ -50,7 +51,7 @@ def test_the_emg_near_the_pulse_keeps_every_sample(record: SessionRecord) -> Non
 def test_what_is_not_finite_is_left_open_and_the_rest_is_json(record: SessionRecord) -> None:
     (wave,) = sweep(record, force=Channel(np.array([1.0, math.nan, math.inf, 2.0]), 1000.0, "N"))
     assert wave["values"] == [1.0, None, None, 2.0]
-    odd = {"probability": math.nan, "next_isi_ms": math.inf, "profile_mv": (math.nan,) * 3, "grid_ms": (math.nan, 0, 5)}
+    odd = {"next_isi_ms": math.inf, "profile_mv": (math.nan,) * 3, "grid_ms": (math.nan, 0, 5)}
     history = tuple(e.model_copy(update=odd) if isinstance(e, Estimate) else e for e in record.history)
     tiny = {key: Channel(np.full(9, 1e-300), 1e-306, "mV") for key in record.waveforms}
     text = json.dumps(drawn(replace(record, history=history, waveforms=tiny)), allow_nan=False)
@@ -60,6 +61,14 @@ def test_what_is_not_finite_is_left_open_and_the_rest_is_json(record: SessionRec
 def test_a_name_that_a_page_could_obey_is_plain(record: SessionRecord) -> None:
     (wave,) = sweep(record, **{"for\u202ece": Channel(np.ones(3), 1000.0, "N")})
     assert wave["name"] == "force"
+
+
+def test_a_belief_that_hardly_a_trial_bears_names_no_window(tmp_path: Path) -> None:
+    shown = drawn(tapped(tmp_path / "s.mcap", trials=6))["beliefs"]
+    assert (shown[0]["found"], shown[0]["window"]) == (TOO_FEW, [])
+    last = shown[max(shown)]
+    assert last["found"].startswith("The tap enhances the MEP at ISIs of")
+    assert last["found"].split("ISIs of ")[1].startswith(f"{last['window'][0][0]:g}–")
 
 
 def test_a_trial_without_waveforms_has_none(record: SessionRecord) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import statistics
 from collections import Counter
 from typing import Final, NamedTuple
 
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Event, EventKind
+from isiw.log.schema import Estimate, Event, EventKind
 from isiw.report.words import counts_sentence
 from isiw.trials import MistrialReason
 
@@ -57,8 +58,8 @@ def _timing(record: SessionRecord) -> Answer:
     tolerance_ms = record.header.signals.tolerance_ms(record.header.space)
     sizes = f"{statistics.median(errors_ms):.1f} ms (median), at most {max(errors_ms):.1f} ms"
     detail = f"Trials that count are off by {sizes}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
-    pairs = sum(trial.commanded_isi_ms is None or trial.isi_ms is not None for trial in record.table)
-    return Answer(question, _verdict(record, rejected, pairs), detail)
+    known = sum(trial.commanded_isi_ms is None or trial.isi_ms is not None for trial in record.table)
+    return Answer(question, _verdict(record, rejected, known), detail)
 
 
 def _rest(record: SessionRecord) -> Answer:
@@ -107,8 +108,5 @@ def _stopped(record: SessionRecord) -> Answer:
 
 def _ending(record: SessionRecord) -> str:
     """What happened last after the last estimate that can end a session, in the log's words."""
-    after = record.history
-    if record.estimates:
-        after = after[after.index(record.estimates[-1]) + 1 :]
-    texts = [entry.text for entry in after if isinstance(entry, Event) and entry.kind in _ENDING]
-    return texts[-1] if texts else ""
+    since = itertools.takewhile(lambda entry: not isinstance(entry, Estimate), reversed(record.history))
+    return next((entry.text for entry in since if isinstance(entry, Event) and entry.kind in _ENDING), "")

@@ -10,9 +10,11 @@ import numpy as np
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.report.tables import trial_row
+from isiw.report.words import finding_sentence
 from isiw.texts import plain
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
+from isiw.window import ENOUGH_PAIRS
 
 __all__ = ["drawn"]
 
@@ -21,6 +23,8 @@ NEAR_MS: Final = (-60.0, 100.0)
 
 MOST_NEAR, MOST_WHOLE, MOST_ISIS = 1000, 300, 260
 """Points that are drawn of the EMG near the pulse, of a whole waveform, and of a profile."""
+
+TOO_FEW: Final = "Too few trials counted to speak of a window: most of this is what was believed beforehand."
 
 _MOST_DECIMALS: Final = 12
 
@@ -35,7 +39,7 @@ def drawn(record: SessionRecord) -> dict[str, Any]:
         record: the session.
     """
     header = record.header
-    beliefs = {estimate.trial: _belief(estimate) for estimate in record.estimates}
+    beliefs = {estimate.trial: _belief(record, estimate) for estimate in record.estimates}
     return {
         "reference": header.space.reference,
         "range": [header.space.low_ms, header.space.high_ms],
@@ -65,12 +69,15 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
     }
 
 
-def _belief(estimate: Estimate) -> dict[str, Any]:
+def _belief(record: SessionRecord, estimate: Estimate) -> dict[str, Any]:
+    pairs = sum(trial.index <= estimate.trial and trial.isi_ms is not None for trial in record.table.told)
+    window = estimate.window if pairs >= ENOUGH_PAIRS else None
+    found = finding_sentence(estimate, record.header.space) if pairs >= ENOUGH_PAIRS else TOO_FEW
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
     bands = {"profile": estimate.profile_mv, "low": estimate.band_low_mv, "high": estimate.band_high_mv}
     return {
-        "probability": _number(estimate.probability),
-        "window": [list(segment) for segment in estimate.window.segments] if estimate.window else [],
+        "found": found,
+        "window": [list(segment) for segment in window.segments] if window else [],
         "start": [_edge(edge) for edge in (estimate.start_low_ms, estimate.start_high_ms)],
         "end": [_edge(edge) for edge in (estimate.end_low_ms, estimate.end_high_ms)],
         "nextMs": _number(estimate.next_isi_ms),

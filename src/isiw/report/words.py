@@ -19,6 +19,7 @@ __all__ = [
     "TRIAL_HEADINGS",
     "counts_sentence",
     "final_statement",
+    "finding_sentence",
     "finding_sentences",
     "fit_sentence",
     "is_judged_since",
@@ -83,7 +84,7 @@ def finding_sentences(record: SessionRecord) -> list[str]:
     if nothing is not None:
         return [nothing]
     said = [
-        _finding(estimate, space),
+        finding_sentence(estimate, space),
         _edges(estimate, space),
         contradiction(estimate.window, record.table.told) or "",
         _best_isi(estimate),
@@ -94,7 +95,13 @@ def finding_sentences(record: SessionRecord) -> list[str]:
     return [sentence for sentence in said if sentence]
 
 
-def _finding(estimate: Estimate, space: DesignSpace) -> str:
+def finding_sentence(estimate: Estimate, space: DesignSpace) -> str:
+    """Whether there is a window, and which.
+
+    Args:
+        estimate: what is believed.
+        space: says which event an ISI counts from.
+    """
     window, probability = estimate.window, estimate.probability
     chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
     if window is None:

@@ -5,7 +5,7 @@
   const trials = session.trials;
   const after = { impact: "after the impact", valve: "after the valve command" }[session.reference];
   const names = { counts: "trial", excluded: "excluded", mistrial: "mistrial" };
-  const options = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
+  const options = { displayModeBar: false, responsive: true }; // plotly's own buttons would upload what is drawn
   const element = (id) => document.getElementById(id);
   const slider = element("trial");
 
@@ -18,7 +18,7 @@
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: colour("ink"), size: 12 },
     margin: { l: 60, r: 12, t: 12, b: 44 }, hovermode: "closest", ...more,
   });
-  const ms = (value) => (value === null ? "–" : `${Math.round(value * 10) / 10} ms`);
+  const ms = (value) => `${Math.round(value * 10) / 10} ms`;
   const markup = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
 
   // ---- the belief after a trial
@@ -45,7 +45,8 @@
 
   // A mistrial is drawn where it was asked or came, at the lower edge.
   const placeMs = (trial) => (trial.kind === "mistrial" ? trial.isiMs ?? trial.askedMs : trial.isiMs);
-  const heightUv = (trial) => (trial.kind === "mistrial" ? lowestUv : trial.mepUv === null ? null : Math.max(trial.mepUv, lowestUv));
+  const measuredUv = (trial) => (trial.mepUv === null ? null : Math.max(trial.mepUv, lowestUv));
+  const heightUv = (trial) => (trial.kind === "mistrial" ? lowestUv : measuredUv(trial));
 
   function trialTrace(kind, number) {
     const symbol = { counts: "circle", excluded: "circle-open", mistrial: "x-thin-open" }[kind];
@@ -83,16 +84,22 @@
 
   function drawBelief(number) {
     const belief = session.beliefs[number];
+    const key = (name, style) => line([null], [null], name, style);
+    const found = belief && belief.window.length ? [
+      key("window", { width: 10, color: "rgba(60,150,220,0.3)" }),
+      key("90 % interval of its edges", { width: 6, color: colour("blue") }),
+    ] : [];
     const next = belief && belief.nextMs !== null
-      ? [line([null], [null], "asked next", { width: 1.5, dash: "dash", color: colour("orange") })] : [];
-    const traces = [...profileTraces(belief), ...Object.keys(names).map((kind) => trialTrace(kind, number)), ...next];
+      ? [key("asked next", { width: 1.5, dash: "dash", color: colour("orange") })] : [];
+    const points = Object.keys(names).map((kind) => trialTrace(kind, number));
+    const traces = [...profileTraces(belief), ...points, ...found, ...next];
     Plotly.react("belief", traces, layout({
       xaxis: axis(`ISI ${after} [ms]`, { range: session.range }),
       yaxis: axis("MEP [µV]", {
         type: "log", tickvals: ticksUv, range: [Math.log10(lowestUv * 0.9), Math.log10(largestUv)],
       }),
-      shapes: beliefShapes(belief), legend: { orientation: "h", y: 1.04, yanchor: "bottom" }, uirevision: "belief",
-      margin: { l: 60, r: 12, t: 40, b: 44 },
+      shapes: beliefShapes(belief), uirevision: "belief", margin: { l: 60, r: 12, t: 40, b: 44 },
+      legend: { orientation: "h", y: 1.04, yanchor: "bottom", traceorder: "normal" },
     }), options);
   }
 
@@ -159,19 +166,17 @@
       element("told-belief").textContent = "The log holds no estimate after this trial.";
       return;
     }
-    const found = belief.window.length
-      ? `Window ${belief.window.map(([low, high]) => `${low}–${high} ms`).join(" and ")}` : "No window";
-    const chance = belief.probability === null ? "" : ` (probability of a window: ${belief.probability.toFixed(2)})`;
-    element("told-belief").textContent = `Believed after it: ${found}${chance}. ${belief.reason}`;
+    element("told-belief").textContent = `Believed after it: ${belief.found} ${belief.reason}`;
   }
 
-  function tellNext(belief, position) {
+  function tellNext(belief) {
     const next = trials[position + 1];
     const fallback = next && session.fallbacks[next.number];
-    const text = !belief ? "" : belief.stop ? "Nothing was asked after it: the session stopped."
-      : belief.nextMs === null ? "Next came a control trial, or nothing."
-        : `Asked next: ${ms(belief.nextMs)}${fallback ? `, by a fallback: ${fallback}` : "."}`;
-    element("told-next").textContent = text;
+    const told = element("told-next");
+    if (!belief) told.textContent = "";
+    else if (belief.stop) told.textContent = "Nothing was asked after it: the session stopped.";
+    else if (belief.nextMs !== null) told.textContent = `Asked next: ${ms(belief.nextMs)}${fallback ? `, by a fallback: ${fallback}` : "."}`;
+    else told.textContent = next ? `Next came trial ${next.number}: ${next.asked}.` : "No ISI was asked after it.";
   }
 
   // ---- one chosen trial for all of it
@@ -189,7 +194,7 @@
     }
     tellTrial(trial);
     tellBelief(belief);
-    tellNext(belief, position);
+    tellNext(belief);
     drawBelief(trial.number);
     drawSweep(trial);
   }
