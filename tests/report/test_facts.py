@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,11 @@ def test_subject_date_device_limits_seed_and_version_come_first(record: SessionR
     assert facts["version"].startswith(f"isiw {record.header.isiw_version} (python ")
 
 
+def test_a_subject_of_several_lines_cannot_pass_for_other_facts(record: SessionRecord) -> None:
+    header = record.header.model_copy(update={"subject": "P07\nlimits:   none"})
+    assert first_facts(replace(record, header=header))[0].value.startswith("P07 limits: none, day 2")
+
+
 def test_the_rest_of_the_header_is_told_in_its_own_words(record: SessionRecord) -> None:
     facts = dict(further_facts(record))
     assert facts["visit"] == "day 2, operator MK, muscle FCR"
@@ -50,7 +56,7 @@ def test_the_rest_of_the_header_is_told_in_its_own_words(record: SessionRecord) 
 def test_settings_have_the_keys_of_a_configuration(record: SessionRecord) -> None:
     settings = {"max_trials": 9, "prior": {"noise": {"missing": 0.1}}, "acquisition": "gölden"}
     recipe = record.header.strategy.model_copy(update={"settings": settings})
-    object.__setattr__(record, "header", record.header.model_copy(update={"strategy": recipe}))
-    assert settings_facts(record) == [
+    header = record.header.model_copy(update={"strategy": recipe})
+    assert settings_facts(replace(record, header=header)) == [
         ("max_trials", "9"), ("prior.noise.missing", "0.1"), ("acquisition", '"gölden"'),
     ]  # fmt: skip

@@ -21,21 +21,22 @@ class Fact(NamedTuple):
 
 
 def first_facts(record: SessionRecord) -> list[Fact]:
-    """Subject, date, device, limits, strategy with its seed, and version.
+    """Subject, date, device, limits, strategy with its seed, and version, a line each whatever is in them.
 
     Args:
         record: the session.
     """
     header = record.header
     versions = ", ".join(f"{package} {version}" for package, version in header.versions.items())
-    return [
-        Fact("subject", _subject(record)),
-        Fact("date", header.created.replace("T", " ").replace("+00:00", " UTC")),
-        Fact("device", _device(record)),
-        Fact("limits", _limits(header.limits)),
-        Fact("strategy", f"{header.strategy.name or 'of own objects'}, seed {header.strategy.seed}"),
-        Fact("version", f"isiw {header.isiw_version}" + (f" ({versions})" if versions else "")),
-    ]
+    told = {
+        "subject": _subject(record),
+        "date": header.created.replace("T", " ").replace("+00:00", " UTC"),
+        "device": _device(record),
+        "limits": _limits(header.limits),
+        "strategy": f"{header.strategy.name or 'of own objects'}, seed {header.strategy.seed}",
+        "version": f"isiw {header.isiw_version}" + (f" ({versions})" if versions else ""),
+    }
+    return [Fact(name, " ".join(value.split())) for name, value in told.items()]
 
 
 def further_facts(record: SessionRecord) -> list[Fact]:
