@@ -188,6 +188,7 @@ def test_report_writes_a_page_beside_the_log_or_where_it_is_told(isiw: Command, 
     assert refused.exit_code == 1
     assert "--overwrite" in refused.output
     assert (tmp_path / "r.html").read_bytes() == b"precious"
+    assert isiw("report", log, "-o", log, "--overwrite").exit_code == 1
     assert isiw("report", log, "-o", "r.html", "--overwrite").exit_code == 0
     assert (tmp_path / "r.html").stat().st_size > 1_000_000
 

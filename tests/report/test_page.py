@@ -18,7 +18,12 @@ from isiw.window import Window
 from logs import cut_after
 from report.sessions import HOSTILE, Page, tapped
 
-OLD_LOGS = sorted((Path(__file__).parents[1] / "data" / "logs").glob("*.mcap*"))
+LOGS = Path(__file__).parents[1] / "data" / "logs"
+OLD_LOGS = [
+    "06ce820-default.mcap", "e31d040-killed.mcap.part", "e31d040-nr.mcap", "e31d040-pf.mcap", "e31d040-resumed.mcap",
+    "e31d040-waveforms.mcap", "adc1fc6-visit.mcap",
+]  # fmt: skip
+"""One of each kind: of the first schema, killed, without a posterior, resumed, with waveforms, of the newest schema."""
 
 
 @pytest.fixture(scope="module")
@@ -126,9 +131,9 @@ def test_a_verdict_after_the_last_estimate_is_said(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("path", OLD_LOGS, ids=lambda path: path.name)
-def test_logs_of_every_version_have_a_page(path: Path) -> None:
-    record = read_session(path)
+@pytest.mark.parametrize("name", OLD_LOGS)
+def test_logs_of_every_kind_have_a_page(name: str) -> None:
+    record = read_session(LOGS / name)
     page = Page(report_page(record))
     assert finding_sentences(record)[0] in page.words
     assert len(data_of(page)["trials"]) == len(record.table)
@@ -139,15 +144,13 @@ def test_a_session_without_a_trial_has_a_page(record: SessionRecord) -> None:
     assert "No trial has been completed." in Page(report_page(empty)).words
 
 
-def test_a_page_replaces_no_log_and_nothing_else_unasked(record: SessionRecord, tmp_path: Path) -> None:
+def test_a_page_replaces_nothing_unasked(record: SessionRecord, tmp_path: Path) -> None:
     (tmp_path / "r.html").write_text("precious")
     with pytest.raises(InvalidValueError, match="not overwritten unasked"):
         save_report(record, tmp_path / "r.html")
     assert (tmp_path / "r.html").read_text() == "precious"
     save_report(record, tmp_path / "r.html", overwrite=True)
     assert (tmp_path / "r.html").stat().st_size > 1_000_000
-    with pytest.raises(InvalidValueError, match="a log is never overwritten"):
-        save_report(record, record.path, overwrite=True)
 
 
 @pytest.mark.parametrize("library", ["plotly.offline", "jinja2"])

@@ -101,7 +101,7 @@ def counted_rows(record: SessionRecord) -> list[Counted]:
         Counted("of them with an unknown outcome", f"{len(record.unknown)}", ""),
         Counted("shortest time between two stimuli", "not known" if shortest_s is None else f"{shortest_s:.2f} s",
                 f"at least {limits.min_iti_s:g} s"),
-        Counted("ISIs delivered", asked_ms, f"{limits.low_ms:g}–{limits.high_ms:g} ms"),
+        Counted("ISIs asked", asked_ms, f"{limits.low_ms:g}–{limits.high_ms:g} ms"),
         Counted("most mistrials in a row", f"{_mistrials_in_a_row(record)}",
                 f"a pause after {limits.max_consecutive_mistrials}"),
         Counted("refused before delivery", f"{kinds['refused']}", ""),
