@@ -90,6 +90,11 @@ def test_a_mistrial_needs_a_reason_and_an_accepted_trial_has_none() -> None:
         Trial(0, Status.ACCEPTED, 10.0, reason=MistrialReason.NO_PULSE, mep_mv=0.1)
 
 
+def test_the_error_of_an_isi_is_realised_minus_commanded() -> None:
+    assert accepted(0).isi_error_ms == 1.0
+    assert mistrial(0).isi_error_ms is None
+
+
 def test_an_accepted_trial_needs_its_mep() -> None:
     with pytest.raises(InvalidValueError, match="needs its MEP"):
         Trial(0, Status.ACCEPTED, 10.0)

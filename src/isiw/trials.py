@@ -236,6 +236,13 @@ class Trial:
         """Whether it was TMS alone or a tap alone; of what nobody knows the outcome of, it may have been a pair."""
         return self.commanded_isi_ms is None and self.reason is not MistrialReason.OUTCOME_UNKNOWN
 
+    @property
+    def isi_error_ms(self) -> float | None:
+        """Realised minus commanded ISI [ms]; None where one of them is not known."""
+        if self.isi_ms is None or self.commanded_isi_ms is None:
+            return None
+        return self.isi_ms - self.commanded_isi_ms
+
     def accepted_anyway(self) -> Trial:
         """The same trial, accepted by an operator after looking at it."""
         return dataclasses.replace(self, status=Status.ACCEPTED, reason=None, overruled=self.reason)

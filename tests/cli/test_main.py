@@ -170,6 +170,38 @@ def test_show_lists_trials_and_repeats_the_statement(isiw: Command, log: Path) -
     assert "The budget of 3 stimuli is used up." in result.output
 
 
+def test_show_says_first_who_when_with_what_and_within_which_limits(isiw: Command, log: Path) -> None:
+    lines = isiw("show", log).output.splitlines()
+    assert [line.split(":")[0] for line in lines[:6]] == [
+        "subject", "date", "device", "limits", "strategy", "version",
+    ]  # fmt: skip
+    assert "default, seed 0" in lines[4]
+    assert f"isiw {__version__}" in lines[5]
+
+
+def test_report_writes_a_page_beside_the_log_or_where_it_is_told(isiw: Command, log: Path, tmp_path: Path) -> None:
+    assert isiw("report", log).output.endswith(f"{log.stem}.html\n")
+    assert "<title>Session of" in log.with_suffix(".html").read_text("utf-8")
+    assert isiw("report", log).output.endswith(f"{log.stem}_2.html\n")
+    (tmp_path / "r.html").write_bytes(b"precious")
+    refused = isiw("report", log, "-o", "r.html")
+    assert refused.exit_code == 1
+    assert "--overwrite" in refused.output
+    assert (tmp_path / "r.html").read_bytes() == b"precious"
+    assert isiw("report", log, "-o", log, "--overwrite").exit_code == 1
+    assert isiw("report", log, "-o", "r.html", "--overwrite").exit_code == 0
+    assert (tmp_path / "r.html").stat().st_size > 1_000_000
+
+
+def test_report_of_a_damaged_log_shows_what_is_left_and_exits_3(isiw: Command, log: Path) -> None:
+    whole = bytearray(log.read_bytes())
+    blocks = [at for at in range(len(whole)) if whole.startswith(b"\x04\x00\x00\x00zstd", at)]
+    whole[blocks[4] + 60] ^= 0xFF
+    log.write_bytes(whole)
+    assert isiw("report", log, "-o", "r.html").exit_code == 3
+    assert "The log is damaged." in Path("r.html").read_text("utf-8")
+
+
 def test_show_of_a_damaged_log_says_what_was_lost_and_exits_3(isiw: Command, log: Path) -> None:
     whole = bytearray(log.read_bytes())
     blocks = [at for at in range(len(whole)) if whole.startswith(b"\x04\x00\x00\x00zstd", at)]

@@ -35,7 +35,7 @@ _INTERRUPTED = "Interrupted: the device is stopped and the log is closed."
 
 Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
 Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **NO_DEFAULT)]
-Overwrite = Annotated[bool, typer.Option(help="Replace a picture that is there; a log never is.")]
+Overwrite = Annotated[bool, typer.Option(help="Replace a file that is there; a log never is.")]
 Seed = Annotated[int | None, typer.Option(help="Seed of the person, the trials and the strategy.", **NO_DEFAULT)]
 
 
@@ -155,9 +155,12 @@ def new_rig(
 
 @app.command("show")
 def show_log(log: Log) -> None:
-    """List a session's trials and say what was found; works on a damaged log, too."""
+    """Say who, when and with what, list the trials, and say what was found; works on a damaged log, too."""
     with errors_reported():
         record = isiw.read_session(log)
+        for fact in isiw.report.first_facts(record):
+            show(f"{fact.name + ':':10}{fact.value}")
+        show("")
         for row in (isiw.report.TRIAL_HEADINGS, *isiw.report.trial_rows(record)):
             show(isiw.session.aligned(row))
         for event in record.events:
@@ -181,8 +184,25 @@ def plot(
     with errors_reported():
         record = isiw.read_session(log)
         truth = isiw.config.true_window(record)
-        target = output or _picture_beside(Path(f"{record.path}".removesuffix(".part")))
+        target = output or _free_beside(record.path, ".png")
         show(f"picture: {isiw.plots.save_session_plot(record, target, truth=truth, overwrite=overwrite)}")
+        _exit_if_damaged(record.losses)
+
+
+@app.command()
+def report(
+    log: Log,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The page's file; by default beside the log.", **NO_DEFAULT)
+    ] = None,
+    overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
+) -> None:
+    """Write a page about a session: what was found and how, trial by trial, for any browser, without a network."""
+    with errors_reported():
+        record = isiw.read_session(log)
+        truth = isiw.config.true_window(record)
+        target = output or _free_beside(record.path, ".html")
+        show(f"report: {isiw.report.save_report(record, target, truth=truth, overwrite=overwrite)}")
         _exit_if_damaged(record.losses)
 
 
@@ -289,14 +309,15 @@ def _run_to_the_end(session: Session) -> None:
     show(f"\n{isiw.report.final_statement(record)}", style="bold")
     if isiw.config.has_truth(record):
         show(isiw.report.truth_sentence(record, truth))
-    picture = isiw.plots.save_session_plot(record, _picture_beside(result.log), truth=truth)
+    picture = isiw.plots.save_session_plot(record, _free_beside(result.log, ".png"), truth=truth)
     show(f"log:     {result.log}\npicture: {picture}")
 
 
-def _picture_beside(log: Path) -> Path:
-    """Where a session's picture goes that nobody gave a place: beside its log, under a name that is free."""
-    names = itertools.chain([log.stem], (f"{log.stem}_{number}" for number in itertools.count(2)))
-    return next(path for path in (log.with_name(f"{name}.png") for name in names) if not path.exists())
+def _free_beside(log: Path, suffix: str) -> Path:
+    """Where a file of a session goes that nobody gave a place: beside its log, under a name that is free."""
+    stem = Path(log.name.removesuffix(".part")).stem
+    names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
+    return next(path for path in (log.with_name(f"{name}{suffix}") for name in names) if not path.exists())
 
 
 def _exit_if_damaged(losses: Sequence[str]) -> None:

@@ -1,5 +1,5 @@
-"""A session in words, for people."""
+"""A session in words, and as a page, for people. What draws the page is loaded when a page is asked for."""
 
-from isiw.report.words import TRIAL_HEADINGS, final_statement, trial_rows, truth_sentence
+import lazy_loader
 
-__all__ = ["TRIAL_HEADINGS", "final_statement", "trial_rows", "truth_sentence"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -15,7 +15,17 @@ from isiw.session.progress import asked, outcome
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.window import Window
 
-__all__ = ["TRIAL_HEADINGS", "final_statement", "trial_rows", "truth_sentence"]
+__all__ = [
+    "TRIAL_HEADINGS",
+    "counts_sentence",
+    "final_statement",
+    "finding_sentence",
+    "finding_sentences",
+    "fit_sentence",
+    "is_judged_since",
+    "trial_rows",
+    "truth_sentence",
+]
 
 TRIAL_HEADINGS = ("trial", "asked", "outcome", "realised")
 """What `trial_rows` hold."""
@@ -41,7 +51,13 @@ def final_statement(record: SessionRecord) -> str:
     if not record.estimates:
         return "No trial has been completed."
     last = record.estimates[-1]
-    sentences = [*_findings(record, last), _counts(record), _fits(record), _unstated_hit_delay(record), last.reason]
+    sentences = [
+        *finding_sentences(record),
+        counts_sentence(record),
+        fit_sentence(record),
+        _unstated_hit_delay(record),
+        last.reason,
+    ]
     if record.end_lost:
         sentences.append(
             "The log's end is missing; go on with the number of pulses that the stimulator counted besides: "
@@ -49,19 +65,26 @@ def final_statement(record: SessionRecord) -> str:
         )
     elif not last.stop:
         sentences.append(f"The session is not over; go on with: isiw resume {record.path}")
-    if _excluded_since(record):
+    if is_judged_since(record):
         sentences.append(
             "Trials were judged anew after this estimate; resume the session to have it with what counts now."
         )
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def _findings(record: SessionRecord, estimate: Estimate) -> list[str]:
-    space, nothing = record.header.space, nothing_measured(record)
+def finding_sentences(record: SessionRecord) -> list[str]:
+    """Whether there is a window, which, and how sure that is.
+
+    Args:
+        record: the session.
+    """
+    if not record.estimates:
+        return ["No trial has been completed."]
+    space, nothing, estimate = record.header.space, nothing_measured(record), record.estimates[-1]
     if nothing is not None:
         return [nothing]
-    return [
-        _finding(estimate, space),
+    said = [
+        finding_sentence(estimate, space),
         _edges(estimate, space),
         contradiction(estimate.window, record.table.told) or "",
         _best_isi(estimate),
@@ -69,9 +92,16 @@ def _findings(record: SessionRecord, estimate: Estimate) -> list[str]:
         _expected_f1(estimate),
         _unusual(estimate),
     ]
+    return [sentence for sentence in said if sentence]
 
 
-def _finding(estimate: Estimate, space: DesignSpace) -> str:
+def finding_sentence(estimate: Estimate, space: DesignSpace) -> str:
+    """Whether there is a window, and which.
+
+    Args:
+        estimate: what is believed.
+        space: says which event an ISI counts from.
+    """
     window, probability = estimate.window, estimate.probability
     chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
     if window is None:
@@ -133,7 +163,12 @@ def _between(interval: tuple[float | None, float | None], space: DesignSpace) ->
     return f"between {low:.0f} and {high:.0f} ms"
 
 
-def _counts(record: SessionRecord) -> str:
+def counts_sentence(record: SessionRecord) -> str:
+    """How many stimuli were delivered, how many count, and why the others do not.
+
+    Args:
+        record: the session.
+    """
     mistrials = Counter(str(trial.reason) for trial in record.table if trial.reason is not None)
     excluded = sum(trial.excluded for trial in record.table)
     unknown = len(record.unknown)
@@ -157,7 +192,12 @@ def _controls(record: SessionRecord) -> str:
     return " and ".join(f"{count} of {kind}" for kind, count in sorted(kinds.items(), reverse=True))
 
 
-def _fits(record: SessionRecord) -> str:
+def fit_sentence(record: SessionRecord) -> str:
+    """In how many trials the fit had trouble; empty where it never had.
+
+    Args:
+        record: the session.
+    """
     troubled = len({event.trial for event in record.events if event.kind == "fit"})
     return f"The fit had trouble in {troubled} of {len(record.table)} trials; isiw show lists them." if troubled else ""
 
@@ -177,7 +217,12 @@ def _unstated_hit_delay(record: SessionRecord) -> str:
     )
 
 
-def _excluded_since(record: SessionRecord) -> bool:
+def is_judged_since(record: SessionRecord) -> bool:
+    """Whether trials were judged anew after the last estimate, so that it does not know of it.
+
+    Args:
+        record: the session, with an estimate.
+    """
     since = record.history[record.history.index(record.estimates[-1]) :]
     return any(isinstance(entry, Event) and entry.kind in VERDICTS for entry in since)
 

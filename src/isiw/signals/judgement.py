@@ -96,6 +96,10 @@ class SignalLimits:
         check_numbers(self, "full_scale_mv", "isi_tolerance_ms", above=0, optional=True)
         ascending("SignalLimits.mep_window_ms", self.mep_window_ms, least=0)
 
+    def tolerance_ms(self, space: DesignSpace) -> float:
+        """How far a realised ISI may be from the commanded one [ms]."""
+        return min(space.tolerance_ms, self.isi_tolerance_ms or math.inf)
+
 
 def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Trial:
     """Judge one sweep: the trial that it is, accepted or a mistrial. Its times are on the sweep's clock.
@@ -269,8 +273,7 @@ def wrong_isi(
     limits = limits or SignalLimits()
     if space.reference == "impact" and isi_ms < 0:
         return MistrialReason.TMS_BEFORE_IMPACT
-    tolerance = min(space.tolerance_ms, limits.isi_tolerance_ms or math.inf)
-    return MistrialReason.ISI_OFF if abs(isi_ms - commanded_isi_ms) > tolerance else None
+    return MistrialReason.ISI_OFF if abs(isi_ms - commanded_isi_ms) > limits.tolerance_ms(space) else None
 
 
 def _impact(sweep: Sweep) -> tuple[float | None, MistrialReason | None]:

@@ -1,0 +1,145 @@
+"""The picture of a session's sweeps: the EMG around the pulse, stacked by ISI, with the MEP window and the taps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from isiw.log.reader import SessionRecord
+from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, tidied
+from isiw.signals.judgement import EMG_UNITS_MV
+from isiw.trials import Channel, Trial
+from isiw.types import BoolArray, FloatArray
+
+__all__ = ["sweeps_figure"]
+
+BEFORE_MS, AFTER_MS = 50.0, 80.0
+MOST_LABELS, MOST_POINTS = 30, 100_000
+ROWS_OF_LARGEST = 2.0
+"""As many rows the largest deflection is high; with many trials a sixteenth of them, so that it remains visible."""
+
+
+class _Trace(NamedTuple):
+    """The EMG of a trial around its pulse."""
+
+    trial: Trial
+    times_ms: FloatArray
+    emg_mv: FloatArray
+
+
+def sweeps_figure(record: SessionRecord) -> Figure | None:
+    """The EMG of all trials that count, a row a trial, ISIs ascending, TMS alone lowest.
+
+    Args:
+        record: the session.
+
+    Returns:
+        The figure; None where the log has no EMG of a trial that counts.
+    """
+    traces = _traces(record)
+    if not traces:
+        return None
+    figure = Figure(figsize=(7.2, 1.6 + min(7.4, 0.26 * len(traces))), layout="constrained")
+    axes = figure.subplots()
+    largest_mv = _largest_mv(traces, record.header.signals.mep_window_ms)
+    axes.axvspan(*record.header.signals.mep_window_ms, color=GREEN, alpha=0.13, lw=0, label="MEP window")
+    axes.axvline(0, color=FAINT, lw=0.8, label="TMS pulse")
+    inside, rows_per_mv = _inside(record, traces), _rows_of_largest(traces) / largest_mv
+    _draw_traces(axes, traces, inside, rows_per_mv, BLUE, "EMG, ISI inside the window")
+    _draw_traces(axes, traces, ~inside, rows_per_mv, INK, "EMG, other trials")
+    _draw_hits(axes, traces)
+    _draw_scale(axes, (len(traces) - 1) / 2, _round_mv(largest_mv), rows_per_mv)
+    _finish(axes, traces)
+    figure.legend(loc="outside upper left", ncols=3, fontsize=7.5, frameon=False)
+    return figure
+
+
+def _traces(record: SessionRecord) -> list[_Trace]:
+    found = (_trace(trial, record.waveforms.get((trial.index, "emg"))) for trial in record.table.told)
+    return sorted((t for t in found if t is not None), key=lambda t: -math.inf if t[0].isi_ms is None else t[0].isi_ms)
+
+
+def _trace(trial: Trial, emg: Channel | None) -> _Trace | None:
+    if emg is None or trial.t_tms_ms is None or emg.unit not in EMG_UNITS_MV:
+        return None
+    times_ms = emg.t0_ms + 1e3 * np.arange(len(emg.values), dtype=np.float64) / emg.rate_hz - trial.t_tms_ms
+    near = (times_ms >= -BEFORE_MS) & (times_ms <= AFTER_MS) & np.isfinite(emg.values)
+    return _Trace(trial, times_ms[near], emg.values[near] * EMG_UNITS_MV[emg.unit]) if near.any() else None
+
+
+def _largest_mv(traces: Sequence[_Trace], span_ms: tuple[float, float]) -> float:
+    """The largest deflection in the MEP window, in either direction."""
+    found = (t.emg_mv[(t.times_ms >= span_ms[0]) & (t.times_ms <= span_ms[1])] for t in traces)
+    return max([1e-3, *(float(np.abs(emg_mv).max(initial=0.0)) for emg_mv in found)])
+
+
+def _inside(record: SessionRecord, traces: Sequence[_Trace]) -> BoolArray:
+    """Which traces lie in the window that was found."""
+    window = record.estimates[-1].window if record.estimates and record.rests_on_data else None
+    isis = [np.nan if trace.trial.isi_ms is None else trace.trial.isi_ms for trace in traces]
+    return np.zeros(len(traces), dtype=bool) if window is None else window.mask(isis)
+
+
+def _rows_of_largest(traces: Sequence[_Trace]) -> float:
+    return max(ROWS_OF_LARGEST, len(traces) / 16)
+
+
+def _draw_traces(
+    axes: Axes, traces: Sequence[_Trace], chosen: BoolArray, rows_per_mv: float, colour: str, label: str
+) -> None:
+    most, width = _rows_of_largest(traces), 0.6 if len(traces) < 100 else 0.35
+    kept = slice(None, None, -(-sum(len(trace.times_ms) for trace in traces) // MOST_POINTS))
+    lines = [
+        np.column_stack([trace.times_ms, row + np.clip(rows_per_mv * trace.emg_mv, -most, most)])[kept]
+        for row, trace in enumerate(traces)
+        if chosen[row]
+    ]
+    if lines:
+        axes.add_collection(LineCollection(lines, colors=colour, linewidths=width, label=label), autolim=False)
+
+
+def _draw_hits(axes: Axes, traces: Sequence[_Trace]) -> None:
+    hits = [(t.trial.t_hit_ms - t.trial.t_tms_ms, row) for row, t in enumerate(traces)
+            if t.trial.t_hit_ms is not None and t.trial.t_tms_ms is not None]  # fmt: skip
+    near = [(hit_ms, row) for hit_ms, row in hits if -BEFORE_MS <= hit_ms <= AFTER_MS]
+    if near:
+        axes.plot(
+            *zip(*near, strict=True),
+            "|",
+            ms=7 if len(near) < 100 else 4,
+            mew=1.6,
+            color=ORANGE,
+            label="hit of the hammer",
+        )
+
+
+def _draw_scale(axes: Axes, middle: float, bar_mv: float, rows_per_mv: float) -> None:
+    half = rows_per_mv * bar_mv / 2
+    axes.plot((AFTER_MS - 3,) * 2, (middle - half, middle + half), color=INK, lw=2, solid_capstyle="butt")
+    axes.text(AFTER_MS - 4.5, middle, f"{1e3 * bar_mv:g} µV", ha="right", va="center", fontsize=8, color=INK)
+
+
+def _finish(axes: Axes, traces: Sequence[_Trace]) -> None:
+    tidied(axes)
+    rows = range(0, len(traces), max(1, -(-len(traces) // MOST_LABELS)))
+    axes.set_yticks(list(rows), [_label(traces[row].trial) for row in rows])
+    axes.set_ylim(-_rows_of_largest(traces), len(traces) - 1 + _rows_of_largest(traces))
+    axes.set_xlim(-BEFORE_MS, AFTER_MS)
+    axes.set_xlabel("time after the TMS pulse [ms]", fontsize=9)
+    axes.set_ylabel("ISI [ms]", fontsize=9)
+
+
+def _label(trial: Trial) -> str:
+    return "TMS alone" if trial.isi_ms is None else f"{trial.isi_ms:.0f}"
+
+
+def _round_mv(size_mv: float) -> float:
+    """The largest of 1, 2, 5, 10 … that is no larger."""
+    power = 10.0 ** math.floor(math.log10(size_mv))
+    return max(power * step for step in (1, 2, 5) if power * step <= size_mv)

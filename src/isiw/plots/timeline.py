@@ -1,0 +1,75 @@
+"""The picture of a window on the time line of a pair of stimuli: valve command, hit, window, intervals, best ISI."""
+
+from __future__ import annotations
+
+import statistics
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import Estimate
+from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, tidied
+
+__all__ = ["timeline_figure"]
+
+_ORIGIN = {"impact": "hit of the hammer", "valve": "valve command"}
+_AXIS = {"impact": "time after the hit of the hammer [ms]", "valve": "time after the valve command [ms]"}
+
+
+def timeline_figure(record: SessionRecord) -> Figure:
+    """When, within a pair of stimuli, the pulse enhances the MEP.
+
+    Args:
+        record: the session.
+    """
+    space = record.header.space
+    figure = Figure(figsize=(7.2, 1.9), layout="constrained")
+    axes = figure.subplots()
+    tidied(axes)
+    axes.spines["left"].set_visible(False)
+    axes.set_yticks([])
+    events = {_ORIGIN[space.reference]: 0.0} | _other_event(record)
+    for name, place_ms in events.items():
+        axes.axvline(place_ms, ymax=0.72, color=ORANGE, lw=1.6)
+        axes.text(place_ms, 0.76, name, ha="center", va="bottom", fontsize=8, color=INK)
+    if record.estimates and record.rests_on_data:
+        _draw_window(axes, record.estimates[-1], (space.low_ms, space.high_ms))
+    low, high = min(space.low_ms, *events.values()), max(space.high_ms, *events.values())
+    margin = 0.06 * (high - low)
+    axes.axvspan(
+        space.low_ms, space.high_ms, ymin=0, ymax=0.05, color=FAINT, alpha=0.5, lw=0, label="ISIs that may be asked"
+    )
+    axes.set_xlim(low - margin, high + margin)
+    axes.set_ylim(0, 1)
+    axes.set_xlabel(_AXIS[space.reference], fontsize=9)
+    figure.legend(loc="outside lower left", ncols=4, fontsize=7.5, frameon=False)
+    return figure
+
+
+def _other_event(record: SessionRecord) -> dict[str, float]:
+    """The event that ISIs do not count from, where it usually came; empty where it was not measured."""
+    delays_ms = [t.t_hit_ms - t.t_valve_ms for t in record.table if t.t_hit_ms is not None and t.t_valve_ms is not None]
+    if not delays_ms:
+        return {}
+    median_ms = statistics.median(delays_ms)
+    if record.header.space.reference == "valve":
+        return {f"hit of the hammer\n{median_ms:.0f} ms (median)": median_ms}
+    return {f"valve command\n−{median_ms:.0f} ms (median)": -median_ms}
+
+
+def _draw_window(axes: Axes, estimate: Estimate, span_ms: tuple[float, float]) -> None:
+    segments = estimate.window.segments if estimate.window else ()
+    for number, (start, end) in enumerate(segments):
+        axes.axvspan(start, end, ymin=0.1, ymax=0.62, color=BLUE, alpha=0.3, lw=0, label=None if number else "window")
+    pairs = ((estimate.start_low_ms, estimate.start_high_ms), (estimate.end_low_ms, estimate.end_high_ms))
+    for number, pair in enumerate(pairs if segments else ()):
+        if None not in pair:
+            low, high = np.clip(np.asarray(pair, dtype=np.float64), *span_ms)
+            label = None if number else "90 % interval of its edges"
+            axes.plot((low, high), (0.36, 0.36), color=BLUE, lw=5, solid_capstyle="butt", label=label)
+    if segments and estimate.best_isi_ms:
+        best, low, high = estimate.best_isi_ms
+        axes.plot((low, high), (0.2, 0.2), color=GREEN, lw=1.5)
+        axes.plot(best, 0.2, "D", ms=5, color=GREEN, label="best ISI, 90 % interval")

@@ -1,0 +1,112 @@
+"""The questions that people ask of a session first, each with a short answer and what it rests on."""
+
+from __future__ import annotations
+
+import itertools
+import statistics
+from collections import Counter
+from typing import Final, NamedTuple
+
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import Estimate, Event, EventKind
+from isiw.report.words import counts_sentence
+from isiw.trials import MistrialReason
+
+__all__ = ["Answer", "answers"]
+
+_OF_TIMING: Final = frozenset(
+    {MistrialReason.NO_IMPACT, MistrialReason.NO_PULSE, MistrialReason.TMS_BEFORE_IMPACT, MistrialReason.ISI_OFF}
+)
+_ENDING: Final[frozenset[EventKind]] = frozenset({"limit", "fault", "pause", "doubt"})
+
+
+class Answer(NamedTuple):
+    """A question, its answer in a few words, and what that rests on."""
+
+    question: str
+    answer: str
+    detail: str
+
+
+def answers(record: SessionRecord) -> list[Answer]:
+    """Which trials were lost, whether timing was right, whether the muscle was at rest, and why the session stopped.
+
+    Args:
+        record: the session.
+    """
+    return [_lost(record), _timing(record), _rest(record), _stopped(record)]
+
+
+def _lost(record: SessionRecord) -> Answer:
+    given = len(record.table) + len(record.unknown)
+    counting = len(record.table.told)
+    return Answer("Which trials were lost, and why?", f"{counting} of {given} count", counts_sentence(record))
+
+
+def _timing(record: SessionRecord) -> Answer:
+    question = "Was the timing right?"
+    errors_ms = [abs(trial.isi_error_ms) for trial in record.table.told if trial.isi_error_ms is not None]
+    rejected = _rejected_for(record, _OF_TIMING)
+    is_timed = any(trial.t_hit_ms is not None or trial.t_tms_ms is not None for trial in record.table)
+    if not errors_ms:
+        return Answer(
+            question, _verdict(record, rejected, 0), f"No trial that counts has a realised ISI. {_listed(rejected)}"
+        )
+    if not any(errors_ms) and not is_timed:
+        detail = "It reports every ISI as it was wanted, and no time of a pulse or a hit to check that by."
+        return Answer(question, "as the device says", f"{detail} {_listed(rejected)}")
+    tolerance_ms = record.header.signals.tolerance_ms(record.header.space)
+    sizes = f"{statistics.median(errors_ms):.1f} ms (median), at most {max(errors_ms):.1f} ms"
+    detail = f"Trials that count are off by {sizes}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
+    known = sum(trial.commanded_isi_ms is None or trial.isi_ms is not None for trial in record.table)
+    return Answer(question, _verdict(record, rejected, known), detail)
+
+
+def _rest(record: SessionRecord) -> Answer:
+    question, limit_uv = "Was the muscle at rest?", record.header.signals.background_uv
+    levels_uv = [t.background_rms_uv for t in record.table if t.background_rms_uv is not None]
+    rejected = _rejected_for(record, frozenset({MistrialReason.BACKGROUND_ACTIVITY}))
+    verdict = _verdict(record, rejected, len(levels_uv))
+    if not levels_uv:
+        return Answer(question, verdict, f"The log has no background EMG. {_listed(rejected)}")
+    sizes = f"{statistics.median(levels_uv):.2g} µV RMS (median), at most {max(levels_uv):.2g} µV"
+    return Answer(question, verdict, f"EMG before the pulse: {sizes}; {limit_uv:g} µV are allowed. {_listed(rejected)}")
+
+
+def _rejected_for(record: SessionRecord, reasons: frozenset[MistrialReason]) -> list[str]:
+    """Why trials were rejected, one entry each, for any of some reasons; those that an operator accepted too."""
+    lost = [str(trial.reason) for trial in record.table if trial.reason in reasons]
+    overruled = [f"{t.overruled}, accepted by the operator" for t in record.table if t.overruled in reasons]
+    return lost + overruled
+
+
+def _verdict(record: SessionRecord, rejected: list[str], known: int) -> str:
+    """Whether it was right in all trials, as far as is known."""
+    given = len(record.table)
+    if rejected:
+        return f"not in {len(rejected)} of {given} trials"
+    if not known:
+        return "not known"
+    return "yes" if known == given else f"yes, where it is known ({known} of {given} trials)"
+
+
+def _listed(rejected: list[str]) -> str:
+    listed = ", ".join(f"{count} {reason}" for reason, count in Counter(rejected).items())
+    return f"Rejected for this: {listed}." if rejected else "No trial was rejected for this."
+
+
+def _stopped(record: SessionRecord) -> Answer:
+    question = "Why did it stop?"
+    decision, ending = record.decision, _ending(record)
+    if decision is None:
+        return Answer(question, "before the first estimate", ending)
+    if decision.stop:
+        return Answer(question, "it ended", f"{decision.reason} {ending}".strip())
+    answer = "it has not stopped" if not ending else "it was interrupted"
+    return Answer(question, answer, f"{ending} {decision.reason}".strip())
+
+
+def _ending(record: SessionRecord) -> str:
+    """What happened last after the last estimate that can end a session, in the log's words."""
+    since = itertools.takewhile(lambda entry: not isinstance(entry, Estimate), reversed(record.history))
+    return next((entry.text for entry in since if isinstance(entry, Event) and entry.kind in _ENDING), "")

@@ -1,0 +1,148 @@
+"""What a page draws in the browser: the beliefs, trials and sweeps of a log as plain numbers, rounded and thinned."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import Estimate
+from isiw.report.tables import trial_row
+from isiw.report.words import finding_sentence
+from isiw.texts import plain
+from isiw.trials import Channel, Trial
+from isiw.types import FloatArray
+from isiw.window import ENOUGH_PAIRS
+
+__all__ = ["drawn"]
+
+NEAR_MS: Final = (-60.0, 100.0)
+"""Around the pulse, where every sample of the EMG is drawn as long as there are not too many."""
+
+MOST_NEAR, MOST_WHOLE, MOST_ISIS = 1000, 300, 260
+"""Points that are drawn of the EMG near the pulse, of a whole waveform, and of a profile."""
+
+TOO_FEW: Final = "Too few trials counted to speak of a window: most of this is what was believed beforehand."
+
+_MOST_DECIMALS: Final = 12
+
+FINE, COARSE = 4, 3
+"""Digits of the largest to which the EMG near the pulse and profiles, and whole waveforms, are rounded."""
+
+
+def drawn(record: SessionRecord) -> dict[str, Any]:
+    """A session as numbers for the browser.
+
+    Args:
+        record: the session.
+    """
+    header = record.header
+    beliefs = {estimate.trial: _belief(record, estimate) for estimate in record.estimates}
+    return {
+        "reference": header.space.reference,
+        "range": [header.space.low_ms, header.space.high_ms],
+        "mepWindow": list(header.signals.mep_window_ms),
+        "acquisition": plain(str(header.strategy.settings.get("acquisition", ""))),
+        "trials": [_trial(record, trial) for trial in record.table],
+        "beliefs": beliefs,
+        "fallbacks": {e.trial: plain(e.text) for e in record.events if e.kind == "fallback" and e.trial is not None},
+    }
+
+
+def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
+    row = trial_row(trial)
+    return {
+        "number": trial.index,
+        "kind": "mistrial" if trial.reason is not None else "excluded" if trial.excluded else "counts",
+        "asked": row.asked,
+        "realised": row.realised,
+        "outcome": row.outcome,
+        "askedMs": trial.commanded_isi_ms,
+        "isiMs": trial.isi_ms,
+        "mepUv": None if trial.mep_mv is None else round(1e3 * trial.mep_mv, 2),
+        "tmsMs": trial.t_tms_ms,
+        "hitMs": trial.t_hit_ms,
+        "valveMs": trial.t_valve_ms,
+        "sweep": _sweep(record.sweep(trial.index), trial),
+    }
+
+
+def _belief(record: SessionRecord, estimate: Estimate) -> dict[str, Any]:
+    pairs = sum(trial.index <= estimate.trial and trial.isi_ms is not None for trial in record.table.told)
+    window = estimate.window if pairs >= ENOUGH_PAIRS else None
+    found = finding_sentence(estimate, record.header.space) if pairs >= ENOUGH_PAIRS else TOO_FEW
+    kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
+    bands = {"profile": estimate.profile_mv, "low": estimate.band_low_mv, "high": estimate.band_high_mv}
+    return {
+        "found": found,
+        "window": [list(segment) for segment in window.segments] if window else [],
+        "start": [_edge(edge) for edge in (estimate.start_low_ms, estimate.start_high_ms)],
+        "end": [_edge(edge) for edge in (estimate.end_low_ms, estimate.end_high_ms)],
+        "nextMs": _number(estimate.next_isi_ms),
+        "stop": estimate.stop,
+        "reason": plain(estimate.reason),
+        "isiMs": [_number(isi_ms) for isi_ms in estimate.grid_ms[kept]],
+        **{name: _rounded(1e3 * np.asarray(values)[kept], FINE) for name, values in bands.items()},
+    }
+
+
+def _sweep(channels: dict[str, Channel], trial: Trial) -> list[dict[str, Any]]:
+    """The waveforms of a trial: the EMG near the pulse first, then every channel as a whole."""
+    waves = [_wave(name, channel, MOST_WHOLE, COARSE) for name, channel in sorted(channels.items())]
+    emg = channels.get("emg")
+    near = None if emg is None or trial.t_tms_ms is None else _near(emg, trial.t_tms_ms)
+    return waves if near is None else [_wave("emg near the pulse", near, MOST_NEAR, FINE), *waves]
+
+
+def _near(channel: Channel, pulse_ms: float) -> Channel | None:
+    ends = (pulse_ms + np.asarray(NEAR_MS) - channel.t0_ms) * (channel.rate_hz / 1e3)
+    first, last = np.clip(np.round(ends), 0, len(channel.values)).astype(int).tolist()
+    values = channel.values[first:last]
+    t0_ms = channel.t0_ms + 1e3 * first / channel.rate_hz
+    return Channel(values, channel.rate_hz, channel.unit, t0_ms) if len(values) else None
+
+
+def _wave(name: str, channel: Channel, most: int, digits: int) -> dict[str, Any]:
+    values, samples = _thinned(channel.values, most)
+    return {
+        "name": plain(name),
+        "unit": plain(channel.unit),
+        "t0": round(channel.t0_ms, 3),
+        "step": _number(1e3 * samples / channel.rate_hz),
+        "values": _rounded(values, digits),
+    }
+
+
+def _thinned(values: FloatArray, most: int) -> tuple[FloatArray, float]:
+    """The smallest and the largest of each stretch of samples, so that no spike is lost, and samples per point."""
+    if len(values) <= most:
+        return values, 1.0
+    stretch = 2 * math.ceil(len(values) / most)
+    padded = np.pad(values, (0, -len(values) % stretch), mode="edge").reshape(-1, stretch)
+    low, high = padded.min(axis=1), padded.max(axis=1)
+    rising = padded.argmin(axis=1) <= padded.argmax(axis=1)
+    pairs = np.where(rising[:, None], np.stack([low, high], axis=1), np.stack([high, low], axis=1))
+    return pairs.ravel(), stretch / 2
+
+
+def _rounded(values: FloatArray, digits: int) -> list[float | None]:
+    """To so many digits of the largest; what is not finite is left open."""
+    finite = np.isfinite(values)
+    largest = float(np.abs(values[finite]).max(initial=0.0))
+    decimals = max(-_MOST_DECIMALS, min(_MOST_DECIMALS, digits - math.ceil(math.log10(largest)))) if largest > 0 else 0
+    rounded: list[float | None] = np.round(np.where(finite, values, 0.0), decimals).tolist()
+    return [value if known else None for value, known in zip(rounded, finite.tolist(), strict=True)]
+
+
+def _number(value: float | None) -> float | None:
+    """A number as JSON can hold it."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+def _edge(edge_ms: float | None) -> float | str | None:
+    """An edge as JSON can hold it; of one beyond the range, on which side."""
+    if edge_ms is None or math.isnan(edge_ms):
+        return None
+    return edge_ms if math.isfinite(edge_ms) else "low" if edge_ms < 0 else "high"

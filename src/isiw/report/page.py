@@ -1,0 +1,147 @@
+"""The report of a session: one page that needs no network, no server, and for reading it no JavaScript.
+
+The pictures that are read and printed are drawn by `isiw.plots`; what is moved and clicked is drawn by plotly in the
+browser, from the numbers of `isiw.report.drawn`.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import importlib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any, Final
+
+from isiw.errors import ConfigError
+from isiw.log.outputs import write_output
+from isiw.log.reader import SessionRecord
+from isiw.plots.course import course_figure
+from isiw.plots.inline import inline_svg
+from isiw.plots.session import session_figure
+from isiw.plots.sweeps import sweeps_figure
+from isiw.plots.timeline import timeline_figure
+from isiw.report.answers import answers
+from isiw.report.drawn import drawn
+from isiw.report.facts import first_facts, further_facts, settings_facts
+from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
+from isiw.report.words import finding_sentences, fit_sentence, is_judged_since
+from isiw.texts import plain
+from isiw.window import Window
+
+__all__ = ["report_page", "save_report"]
+
+_ASSETS: Final = resources.files("isiw.report") / "assets"
+
+
+def save_report(
+    record: SessionRecord, path: str | Path, *, truth: Window | None = None, overwrite: bool = False
+) -> Path:
+    """Write the report of a session into a file.
+
+    Args:
+        record: the session.
+        path: where to, such as `report.html`.
+        truth: the true window, where the person is simulated.
+        overwrite: whether to replace a file that is there; a log never is.
+
+    Raises:
+        ConfigError: plotly or jinja2 is not installed.
+        InvalidValueError: there is a file that is not to be replaced.
+    """
+    return write_output(path, report_page(record, truth=truth).encode(), overwrite=overwrite)
+
+
+def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
+    """The report of a session as a page of HTML.
+
+    Args:
+        record: the session.
+        truth: the true window, where the person is simulated.
+
+    Raises:
+        ConfigError: plotly or jinja2 is not installed.
+    """
+    jinja2, plotly = _library("jinja2"), _library("plotly.offline").get_plotlyjs()
+    scripts = [plotly, _asset("page.js")]
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(_asset),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        finalize=lambda value: plain(value) if type(value) is str else value,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    page: str = environment.get_template("page.html").render(
+        _contents(record),
+        pictures=_pictures(record, truth),
+        style=_asset("page.css"),
+        scripts=scripts,
+        hashes=" ".join(_hash(script) for script in scripts),
+    )
+    return page
+
+
+def _contents(record: SessionRecord) -> dict[str, Any]:
+    """What the page says, before it is laid out."""
+    return {
+        "subject": record.header.subject or "an unnamed subject",
+        "states": _states(record),
+        "losses": record.losses,
+        "findings": finding_sentences(record),
+        "fit": fit_sentence(record),
+        "answers": answers(record),
+        "facts": first_facts(record),
+        "further": further_facts(record),
+        "settings": settings_facts(record),
+        "lost": lost_rows(record),
+        "events": event_rows(record),
+        "counted": counted_rows(record),
+        "trials": [trial_row(trial) for trial in record.table],
+        "drawn": drawn(record),
+        "log": record.path.name,
+    }
+
+
+def _states(record: SessionRecord) -> list[str]:
+    """What a reader must know of the log before trusting the page."""
+    said = []
+    if record.end_lost:
+        said.append("The log's end is missing: more stimuli may have been delivered than are shown.")
+    elif not record.finished:
+        last = f"trial {record.table[-1].index}" if len(record.table) else "its beginning"
+        said.append(f"The log is not closed: the session is running, or was interrupted. It is shown up to {last}.")
+    if record.estimates and is_judged_since(record):
+        said.append("Trials were judged anew after the last estimate, which does not know of it; resume the session.")
+    return said
+
+
+def _pictures(record: SessionRecord, truth: Window | None) -> Mapping[str, str]:
+    """The pictures as SVG, none of which holds a text of the log."""
+    figures = {
+        "timeline": timeline_figure(record),
+        "session": session_figure(record, truth=truth),
+        "sweeps": sweeps_figure(record),
+        "course": course_figure(record),
+    }
+    return {name: inline_svg(figure, name) for name, figure in figures.items() if figure is not None}
+
+
+def _asset(name: str) -> str:
+    return (_ASSETS / name).read_text(encoding="utf-8")
+
+
+def _hash(script: str) -> str:
+    """What the page's policy knows a script by, so that no other is run."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+
+
+def _library(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        missing = name.partition(".")[0]
+        raise ConfigError(
+            f"{missing} is not installed", remedy='Install it with: pip install "isiw[report]"'
+        ) from error

@@ -1,0 +1,98 @@
+"""The pictures that only a report has: window on the time line, sweeps by ISI, timing and rest by trial."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from isiw.log.reader import SessionRecord
+from isiw.plots.course import course_figure
+from isiw.plots.inline import inline_svg
+from isiw.plots.sweeps import sweeps_figure
+from isiw.plots.timeline import timeline_figure
+from known import instance, known
+from report.sessions import tapped
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
+    return tapped(tmp_path_factory.mktemp("pictures") / "s.mcap")
+
+
+def legend(figure: Figure) -> set[str]:
+    return {text.get_text() for found in figure.legends for text in found.get_texts()}
+
+
+def line_of(axes: Axes, label: str) -> tuple[list[float], list[float]]:
+    (line,) = [line for line in axes.lines if line.get_label() == label]
+    return np.asarray(line.get_xdata()).tolist(), np.asarray(line.get_ydata()).tolist()
+
+
+def test_sweeps_are_stacked_by_isi_with_the_hits_before_the_pulse(record: SessionRecord) -> None:
+    figure = known(sweeps_figure(record))
+    (axes,) = figure.axes
+    told = sorted(record.table.told, key=lambda trial: -1 if trial.isi_ms is None else trial.isi_ms)
+    labels = [tick.get_text() for tick in axes.get_yticklabels()]
+    assert labels == ["TMS alone" if trial.isi_ms is None else f"{trial.isi_ms:.0f}" for trial in told]
+    collections = [instance(LineCollection, item) for item in axes.collections]
+    assert sum(len(collection.get_segments()) for collection in collections) == len(told)
+    hits = {round(hit_ms, 6) for hit_ms in line_of(axes, "hit of the hammer")[0]}
+    assert hits == {round(-isi, 6) for t in told if (isi := t.isi_ms) is not None and isi <= 50}
+    assert {"MEP window", "TMS pulse", "EMG, ISI inside the window", "EMG, other trials"} <= legend(figure)
+
+
+def test_without_emg_there_are_no_sweeps_to_draw(record: SessionRecord) -> None:
+    assert sweeps_figure(replace(record, waveforms={})) is None
+    unknown = {key: replace(channel, unit="counts") for key, channel in record.waveforms.items()}
+    assert sweeps_figure(replace(record, waveforms=unknown)) is None
+    blank = {key: replace(channel, values=channel.values * np.nan) for key, channel in record.waveforms.items()}
+    assert sweeps_figure(replace(record, waveforms=blank)) is None
+
+
+def test_timing_and_rest_are_those_of_the_log_beside_their_limits(record: SessionRecord) -> None:
+    timing, background = course_figure(record).axes
+    pairs = [trial for trial in record.table if trial.isi_ms is not None]
+    assert line_of(timing, "trial") == ([t.index for t in pairs], [t.isi_error_ms for t in pairs])
+    assert set(line_of(timing, "tolerance")[1]) == {10.0}
+    assert line_of(background, "trial")[1] == [trial.background_rms_uv for trial in record.table]
+    assert set(line_of(background, "limit, 10 µV")[1]) == {10.0}
+
+
+def test_what_was_not_recorded_is_said(record: SessionRecord) -> None:
+    empty = replace(record, history=())
+    assert [axes.texts[0].get_text() for axes in course_figure(empty).axes] == ["not recorded"] * 2
+
+
+def test_the_time_line_has_valve_hit_and_window(record: SessionRecord) -> None:
+    figure = timeline_figure(record)
+    (axes,) = figure.axes
+    median_ms = np.median([t.t_hit_ms - t.t_valve_ms for t in record.table if t.t_hit_ms and t.t_valve_ms])
+    assert [text.get_text() for text in axes.texts] == [
+        "hit of the hammer", f"valve command\n−{median_ms:.0f} ms (median)",
+    ]  # fmt: skip
+    assert {"window", "90 % interval of its edges", "ISIs that may be asked"} <= legend(figure)
+
+
+def test_the_best_isi_is_on_the_time_line(record: SessionRecord) -> None:
+    history: list[Any] = list(record.history)
+    history[-1] = history[-1].model_copy(update={"best_isi_ms": (60.0, 50.0, 70.0)})
+    figure = timeline_figure(replace(record, history=tuple(history)))
+    assert line_of(figure.axes[0], "best ISI, 90 % interval") == ([60.0], [0.2])
+
+
+def test_a_picture_in_a_page_has_the_pages_colours_and_names_of_its_own(record: SessionRecord) -> None:
+    one, other = (inline_svg(course_figure(record), name) for name in ("one", "other"))
+    assert one.startswith("<svg")
+    assert "#0072b2" not in one
+    assert "var(--blue)" in one
+    assert "<metadata" not in one
+    ids = [set(re.findall(r' id="([^"]+)"', svg)) for svg in (one, other)]
+    assert ids[0].isdisjoint(ids[1])
+    assert one == inline_svg(course_figure(record), "one")

@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from isiw.log.reader import SessionRecord, read_session
+from isiw.log.schema import Estimate, Event, Record
+from isiw.report.answers import Answer, answers
+from isiw.session.loop import Session
+from isiw.trials import MistrialReason, Status, Trial
+from scripted import ScriptedDevice, scripted_strategy
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
+    log = tmp_path_factory.mktemp("answers") / "s.mcap"
+    Session(ScriptedDevice(), scripted_strategy(4), log=log).run()
+    return read_session(log)
+
+
+def with_history(record: SessionRecord, history: Sequence[Record]) -> SessionRecord:
+    return replace(record, history=tuple(history))
+
+
+def trial(index: int, **values: Any) -> Trial:
+    told = {"isi_ms": 50.0, "mep_mv": 0.05} | values
+    status = Status.MISTRIAL if "reason" in values else Status.ACCEPTED
+    return Trial(index, status, 50.0, **told)
+
+
+def answer(record: SessionRecord, question: str) -> Answer:
+    return next(answer for answer in answers(record) if question in answer.question)
+
+
+def test_timing_is_said_by_the_median_and_the_largest_error_and_what_it_cost(record: SessionRecord) -> None:
+    trials = [trial(0, isi_ms=51.0), trial(1, isi_ms=48.0), trial(2, isi_ms=54.0, t_hit_ms=1.0)]
+    lost = [trial(3, isi_ms=63.0, reason=MistrialReason.ISI_OFF), trial(4, reason=MistrialReason.SATURATION)]
+    _, said, detail = answer(with_history(record, [*trials, *lost]), "timing")
+    assert said == "not in 1 of 5 trials"
+    assert detail == (
+        "Trials that count are off by 2.0 ms (median), at most 4.0 ms; 10 ms are tolerated. "
+        "Rejected for this: 1 ISI off by more than the tolerance."
+    )
+    assert answer(with_history(record, trials), "timing").answer == "yes"
+
+
+def test_a_device_that_only_repeats_what_was_wanted_is_not_taken_for_exact(record: SessionRecord) -> None:
+    _, said, detail = answer(record, "timing")
+    assert said == "as the device says"
+    assert "no time of a pulse or a hit to check that by" in detail
+
+
+def test_a_muscle_that_was_never_at_rest_is_not_unknown(record: SessionRecord) -> None:
+    trials = [trial(k, background_rms_uv=30.0 + k, reason=MistrialReason.BACKGROUND_ACTIVITY) for k in range(3)]
+    _, said, detail = answer(with_history(record, trials), "at rest")
+    assert said == "not in 3 of 3 trials"
+    assert detail == (
+        "EMG before the pulse: 31 µV RMS (median), at most 32 µV; 10 µV are allowed. "
+        "Rejected for this: 3 background activity."
+    )
+
+
+def test_a_rest_that_is_known_of_some_trials_only_is_not_told_of_all(record: SessionRecord) -> None:
+    trials = [trial(0, background_rms_uv=1.0), trial(1)]
+    assert answer(with_history(record, trials), "at rest").answer == "yes, where it is known (1 of 2 trials)"
+
+
+def test_a_trial_that_an_operator_accepted_was_still_not_at_rest(record: SessionRecord) -> None:
+    tense = trial(0, background_rms_uv=30.0, reason=MistrialReason.BACKGROUND_ACTIVITY).accepted_anyway()
+    _, said, detail = answer(with_history(record, [tense, trial(1, background_rms_uv=1.0)]), "at rest")
+    assert said == "not in 1 of 2 trials"
+    assert detail.endswith("Rejected for this: 1 background activity, accepted by the operator.")
+
+
+def test_without_a_background_it_is_not_known(record: SessionRecord) -> None:
+    assert answer(record, "at rest")[1:] == (
+        "not known",
+        "The log has no background EMG. No trial was rejected for this.",
+    )
+
+
+def test_why_it_stopped_is_the_last_decisions_reason(record: SessionRecord) -> None:
+    assert answer(record, "stop")[1:] == ("it ended", "The budget of 4 stimuli is used up.")
+
+
+def test_a_session_that_broke_off_says_by_what(record: SessionRecord) -> None:
+    going_on = [e.model_copy(update={"stop": False, "reason": "2 stimuli are left."}) if isinstance(e, Estimate) else e
+                for e in record.history]  # fmt: skip
+    assert answer(with_history(record, going_on), "stop")[1:] == ("it has not stopped", "2 stimuli are left.")
+    doubt = Event(kind="doubt", trial=3, text="What is said twice is said once.")
+    fault = Event(kind="fault", trial=3, text="Interrupted by the operator.")
+    assert answer(with_history(record, [*going_on, doubt, fault]), "stop")[1:] == (
+        "it was interrupted", "Interrupted by the operator. 2 stimuli are left.",
+    )  # fmt: skip
+
+
+def test_nothing_at_all_has_answers_too(record: SessionRecord) -> None:
+    assert [said for _, said, _ in answers(replace(record, history=(), delivered=0))] == [
+        "0 of 0 count", "not known", "not known", "before the first estimate",
+    ]  # fmt: skip
+
+
+def test_a_log_in_a_folder_is_not_named_with_its_path(record: SessionRecord) -> None:
+    assert str(Path(record.path).parent) not in " ".join(answer.detail for answer in answers(record))

@@ -1,0 +1,211 @@
+"""The page as a browser shows it; skipped where there is no Chromium."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, ViewportSize, sync_playwright
+
+from isiw.log.reader import SessionRecord
+from isiw.report.page import save_report
+from report.sessions import HOSTILE, tapped
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+SIZE: ViewportSize = {"width": 1000, "height": 900}
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page in")
+
+
+@dataclass
+class Opened:
+    """A page in a browser, what its console said, and what it asked the network for."""
+
+    page: Page
+    said: list[str] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+
+    def text(self, selector: str) -> str:
+        return self.page.locator(selector).inner_text()
+
+    def drawn(self, script: str) -> Any:
+        return self.page.evaluate(f"() => {script}")
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
+    return tapped(tmp_path_factory.mktemp("browser") / "s.mcap")
+
+
+@pytest.fixture(scope="module")
+def path(record: SessionRecord) -> Path:
+    return save_report(record, record.path.with_suffix(".html"))
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"], timeout=60_000)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def opened(browser: Any, path: Path) -> Iterator[Opened]:
+    page = browser.new_page(viewport=SIZE)
+    page.set_default_timeout(20_000)
+    opened = Opened(page)
+    page.on("console", lambda message: opened.said.append(message.text))
+    page.on("pageerror", lambda error: opened.said.append(str(error)))
+    page.on("request", lambda request: opened.asked.append(request.url))
+    page.goto(path.as_uri())
+    page.locator("#belief .main-svg").first.wait_for()
+    yield opened
+    page.close()
+
+
+@pytest.fixture(autouse=True)
+def quiet(opened: Opened) -> Iterator[None]:
+    """No test leaves an error in the console or asks the network for anything."""
+    yield
+    assert opened.said == []
+    assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
+
+
+def test_hostile_names_are_text(opened: Opened) -> None:
+    assert opened.text("h1") == f"Session of {HOSTILE}"
+    assert opened.page.title() == f"Session of {HOSTILE}"
+    assert opened.page.locator("main b, main img").count() == 0
+
+
+def test_no_button_sends_what_is_drawn_to_anybody(opened: Opened) -> None:
+    opened.page.locator("#belief").hover()
+    assert opened.page.locator(".modebar-btn").count() == 0
+
+
+def test_the_last_trial_is_shown_first_with_the_logs_numbers(opened: Opened, record: SessionRecord) -> None:
+    last, estimate = record.table[-1], record.estimates[-1]
+    assert opened.text("#told-trial").startswith(f"Trial {last.index} ({len(record.table)} of {len(record.table)})")
+    assert estimate.reason in opened.text("#told-belief")
+    shown = opened.drawn("document.getElementById('belief').data.find(trace => trace.name === 'trial')")
+    told = {trial.index: trial for trial in record.table.told if trial.isi_ms is not None}
+    assert dict(zip(shown["customdata"], shown["x"], strict=True)) == {n: t.isi_ms for n, t in told.items()}
+    assert shown["y"] == pytest.approx([1e3 * (trial.mep_mv or 0) for trial in told.values()], abs=0.01)
+
+
+def test_the_slider_moves_belief_words_and_sweep_by_keyboard(opened: Opened, record: SessionRecord) -> None:
+    before = opened.drawn("document.getElementById('belief').data.find(trace => trace.name === 'expected MEP').y")
+    opened.page.locator("#trial").focus()
+    opened.page.keyboard.press("Home")
+    first, estimate = record.table[0], record.estimates[0]
+    assert opened.text("#told-trial").startswith(f"Trial {first.index} (1 of {len(record.table)})")
+    assert estimate.reason in opened.text("#told-belief")
+    after = opened.drawn("document.getElementById('belief').data.find(trace => trace.name === 'expected MEP').y")
+    assert after == pytest.approx([1e3 * mv for mv in estimate.profile_mv], abs=0.01)
+    assert after != before
+    opened.page.keyboard.press("ArrowRight")
+    assert opened.text("#sweep-title") == f"The sweep of trial {record.table[1].index}"
+
+
+def test_what_is_asked_next_is_said_and_marked(opened: Opened, record: SessionRecord) -> None:
+    estimate = next(e for e in record.estimates if e.next_isi_ms is not None)
+    opened.page.locator(f".choose[data-trial='{estimate.trial}']").click()
+    assert opened.text("#told-next") == f"Asked next: {estimate.next_isi_ms:g} ms."
+    marks = opened.drawn("document.getElementById('belief').layout.shapes.filter(s => s.line.dash === 'dash')")
+    assert [shape["x0"] for shape in marks] == [estimate.next_isi_ms]
+
+
+def test_a_click_on_a_trial_shows_its_sweep(opened: Opened, record: SessionRecord) -> None:
+    wanted = [trial for trial in record.table.told if trial.isi_ms is not None][1]
+    points = "document.getElementById('belief').data.find(trace => trace.name === 'trial').customdata"
+    number = opened.drawn(f"{points}.indexOf({wanted.index})")
+    trace = opened.drawn("document.getElementById('belief').data.findIndex(trace => trace.name === 'trial')")
+    markers = opened.page.locator("#belief .scatterlayer .trace").nth(trace).locator(".point").nth(number)
+    markers.scroll_into_view_if_needed()
+    box = markers.bounding_box()
+    assert box is not None
+    opened.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    opened.page.locator("#belief .hovertext").filter(has_text=f"trial {wanted.index}").wait_for()
+    opened.page.mouse.down()
+    opened.page.mouse.up()
+    opened.page.get_by_text(f"The sweep of trial {wanted.index}", exact=True).wait_for()
+    emg = opened.drawn("document.getElementById('sweep').data[0]")
+    channel = record.waveforms[wanted.index, "emg"]
+    first = round((emg["x"][0] - channel.t0_ms) * channel.rate_hz / 1e3)
+    assert emg["y"] == pytest.approx(channel.values[first : first + len(emg["y"])].tolist(), abs=1e-3)
+    pulses = opened.drawn("document.getElementById('sweep').layout.shapes.filter(s => s.line.dash === 'solid')")
+    assert {shape["x0"] for shape in pulses} == {wanted.t_tms_ms}
+
+
+def test_a_trial_of_the_table_is_chosen_by_keyboard(opened: Opened, record: SessionRecord) -> None:
+    number = record.table[2].index
+    opened.page.locator(f".choose[data-trial='{number}']").focus()
+    opened.page.keyboard.press("Enter")
+    assert opened.text("#sweep-title") == f"The sweep of trial {number}"
+    assert opened.page.locator(".choose[aria-pressed='true']").inner_text() == str(number)
+
+
+def test_everything_that_can_be_used_is_reached_by_tab_and_has_a_name(opened: Opened) -> None:
+    named = "a, button, input, summary, [tabindex='0']"
+    nameless = opened.drawn(
+        f"[...document.querySelectorAll({named!r})].filter(e => !e.closest('.modebar') && !(e.innerText.trim() || "
+        "e.getAttribute('aria-label') || (e.labels && e.labels.length))).length"
+    )
+    assert nameless == 0
+    opened.page.locator("nav a").first.focus()
+    reached = set()
+    for _ in range(40):
+        opened.page.keyboard.press("Tab")
+        reached.add(opened.drawn("document.activeElement.id || document.activeElement.className"))
+    assert {"trial", "before", "after", "choose"} <= reached
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_words_stand_out_from_the_paper_in_light_and_dark(opened: Opened, scheme: Any) -> None:
+    opened.page.emulate_media(media="screen", color_scheme=scheme)
+    colours = {
+        name: opened.drawn(f"getComputedStyle(document.documentElement).getPropertyValue('--{name}').trim()")
+        for name in ("ink", "faint", "blue", "paper", "panel", "warn")
+    }
+    for words in ("ink", "faint"):
+        for ground in ("paper", "panel", "warn"):
+            assert contrast(colours[words], colours[ground]) >= 4.5
+    assert contrast(colours["blue"], colours["paper"]) >= 4.5
+
+
+def test_paper_has_the_pictures_and_the_tables_but_nothing_to_move(opened: Opened) -> None:
+    opened.page.emulate_media(media="print", color_scheme="dark")
+    assert not opened.page.locator("#explore").is_visible()
+    assert opened.page.locator("#window svg").first.is_visible()
+    assert opened.drawn("document.querySelector('#trials .scroll').scrollHeight") == opened.drawn(
+        "document.querySelector('#trials .scroll').clientHeight"
+    )
+    assert opened.drawn("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    sheets = re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", opened.page.pdf(prefer_css_page_size=True))
+    assert {(round(float(width)), round(float(height))) for width, height in sheets} == {(595, 842)}
+    opened.page.emulate_media(media="screen")
+
+
+def test_without_javascript_everything_but_the_moving_part_is_read(browser: Any, path: Path) -> None:
+    page = browser.new_context(java_script_enabled=False, viewport=SIZE).new_page()
+    page.goto(path.as_uri())
+    assert page.locator("#sweeps svg").is_visible()
+    assert not page.locator("#explore").is_visible()
+    assert "With JavaScript this page also shows" in page.locator("body").inner_text()
+    page.context.close()
+
+
+def contrast(one: str, other: str) -> float:
+    """As WCAG defines it."""
+    dark, light = sorted((luminance(one), luminance(other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return sum(weight * part for weight, part in zip((0.2126, 0.7152, 0.0722), linear, strict=True))

@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import Estimate
+from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, TOO_FEW, drawn
+from isiw.trials import Channel
+from report.sessions import tapped
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
+    return tapped(tmp_path_factory.mktemp("drawn") / "s.mcap", trials=2)
+
+
+def sweep(record: SessionRecord, **channels: Channel) -> list[dict[str, Any]]:
+    first = record.table[0].index
+    shown = replace(record, waveforms={(first, name): channel for name, channel in channels.items()})
+    waves: list[dict[str, Any]] = drawn(shown)["trials"][0]["sweep"]
+    return waves
+
+
+def test_no_spike_is_lost_however_few_points_are_drawn(record: SessionRecord) -> None:
+    values = np.zeros(50_000)
+    values[[12_345, 34_567]] = (5.0, -3.0)
+    (wave,) = sweep(record, force=Channel(values, 50_000.0, "N"))
+    assert len(wave["values"]) <= MOST_WHOLE
+    assert (max(wave["values"]), min(wave["values"])) == (5.0, -3.0)
+    assert wave["values"].index(5.0) * wave["step"] == pytest.approx(1e3 * 12_345 / 50_000, abs=wave["step"])
+    assert len(wave["values"]) * wave["step"] == pytest.approx(1000.0, rel=0.02)
+
+
+def test_the_emg_near_the_pulse_keeps_every_sample(record: SessionRecord) -> None:
+    emg = record.waveforms[record.table[0].index, "emg"]
+    near = sweep(record, emg=emg)[0]
+    assert near["step"] == 1e3 / emg.rate_hz
+    assert len(near["values"]) <= MOST_NEAR
+    first = round((near["t0"] - emg.t0_ms) * emg.rate_hz / 1e3)
+    shown = emg.values[first : first + len(near["values"])]
+    assert near["values"] == pytest.approx(shown.tolist(), abs=1e-3 * np.abs(shown).max())
+
+
+def test_what_is_not_finite_is_left_open_and_the_rest_is_json(record: SessionRecord) -> None:
+    (wave,) = sweep(record, force=Channel(np.array([1.0, math.nan, math.inf, 2.0]), 1000.0, "N"))
+    assert wave["values"] == [1.0, None, None, 2.0]
+    odd = {"next_isi_ms": math.inf, "profile_mv": (math.nan,) * 3, "grid_ms": (math.nan, 0, 5)}
+    history = tuple(e.model_copy(update=odd) if isinstance(e, Estimate) else e for e in record.history)
+    tiny = {key: Channel(np.full(9, 1e-300), 1e-306, "mV") for key in record.waveforms}
+    text = json.dumps(drawn(replace(record, history=history, waveforms=tiny)), allow_nan=False)
+    assert json.loads(text)["beliefs"]["0"]["end"][1] == "high"
+
+
+def test_a_name_that_a_page_could_obey_is_plain(record: SessionRecord) -> None:
+    (wave,) = sweep(record, **{"for\u202ece": Channel(np.ones(3), 1000.0, "N")})
+    assert wave["name"] == "force"
+
+
+def test_a_belief_that_hardly_a_trial_bears_names_no_window(tmp_path: Path) -> None:
+    shown = drawn(tapped(tmp_path / "s.mcap", trials=6))["beliefs"]
+    assert (shown[0]["found"], shown[0]["window"]) == (TOO_FEW, [])
+    last = shown[max(shown)]
+    assert last["found"].startswith("The tap enhances the MEP at ISIs of")
+    assert last["found"].split("ISIs of ")[1].startswith(f"{last['window'][0][0]:g}–")
+
+
+def test_a_trial_without_waveforms_has_none(record: SessionRecord) -> None:
+    assert sweep(record) == []
