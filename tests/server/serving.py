@@ -22,7 +22,7 @@ TOKEN = "a token for the tests"  # noqa: S105 - of the tests
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
 
 SPACE = {"low_ms": 0, "high_ms": 200, "reference": "impact"}
-SETTINGS = {"max_trials": 6, "particles": 50}
+SETTINGS = {"max_trials": 6, "particles": 10}
 PLAN: dict[str, Any] = {
     "id": "P07",
     "seed": 7,

@@ -170,13 +170,13 @@ def _form_as_json(kind: type[BaseModel], body: bytes) -> bytes:
         raise Refusal(400, "MalformedBody", f"the form cannot be read: {error}") from error
     if len(dict(pairs)) < len(pairs):
         raise Refusal(400, "MalformedBody", "a field of the form is there twice", got=sorted(name for name, _ in pairs))
-    values = {name: value if _is_text(kind, name) else _value(value) for name, value in pairs}
+    values = {name: value if _is_text(kind, name, value) else _value(value) for name, value in pairs}
     return json.dumps(values).encode(errors="replace")
 
 
-def _is_text(kind: type[BaseModel], name: str) -> bool:
+def _is_text(kind: type[BaseModel], name: str, value: str) -> bool:
     field = kind.model_fields.get(name)
-    return field is None or field.annotation in {str, str | None}
+    return field is None or field.annotation is str or (field.annotation == str | None and value != "")
 
 
 def _value(text: str) -> Any:

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from isiw.devices.limits import Limits
 from isiw.errors import IsiwError
@@ -301,6 +301,6 @@ class _NotOpenError(Exception):
     """The session is not open."""
 
 
-def _kept(request: CreateRequest) -> dict[str, Any]:
-    """A request as a log can keep it."""
-    return request.model_dump(mode="json", exclude_none=True)
+def _kept(request: CreateRequest) -> str:
+    """A request as a log can keep it: in TOML there is no null."""
+    return request.model_dump_json()
