@@ -39,6 +39,7 @@ def client_of(folder: Path, **rules: Any) -> Iterator[httpx.Client]:
     config = uvicorn.Config(make_app(folder, Rules(TOKEN, **rules)), http="h11", ws="none", log_level="critical")
     server = uvicorn.Server(config)
     with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         thread = threading.Thread(target=server.run, args=([listener],))
         thread.start()
         port = listener.getsockname()[1]

@@ -37,7 +37,9 @@ def make_app(folder: str | Path, rules: Rules) -> FastAPI:
         yield
         await run_in_threadpool(sessions.close_all)
 
-    app = FastAPI(title="isiw", version=isiw.__version__, lifespan=lifespan, docs_url=None, redoc_url=None)
+    app = FastAPI(
+        title="isiw", version=isiw.__version__, lifespan=lifespan, docs_url=None, redoc_url=None, redirect_slashes=False
+    )
     app.state.sessions = sessions
     app.include_router(router)
     app.add_middleware(Guard, rules=rules)

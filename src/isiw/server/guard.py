@@ -72,14 +72,17 @@ class Guard:
             await self._app(scope, receive, send)
             return
         headers = Headers(scope=scope)
+        as_200 = wants_200(scope["query_string"].decode("latin-1"))
+        try:
+            body = await self._body(headers, receive)
+        except Refusal as refusal:  # the rest of the body is not read
+            await answered(refusal, as_200=as_200, headers={"Connection": "close"})(scope, receive, send)
+            return
         try:
             self._require_host(headers)
             self._require_token(headers)
-            body = await self._body(headers, receive)
         except Refusal as refusal:
-            as_200 = wants_200(scope["query_string"].decode("latin-1"))
-            # What is left of the body is not read.
-            await answered(refusal, as_200=as_200, headers={"Connection": "close"})(scope, receive, send)
+            await answered(refusal, as_200=as_200)(scope, receive, send)
             return
         first: Message = {"type": "http.request", "body": body, "more_body": False}
         await self._app(scope, _beginning_with(first, receive), send)

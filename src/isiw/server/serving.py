@@ -100,7 +100,7 @@ def serve(settings: ServerSettings, ready: Callable[[str], None]) -> None:
             app,
             http="h11",
             ws="none",
-            log_level="warning",
+            log_level="error",
             access_log=False,
             server_header=False,
             proxy_headers=False,
@@ -117,10 +117,14 @@ def serve(settings: ServerSettings, ready: Callable[[str], None]) -> None:
 def _listening(settings: ServerSettings) -> socket.socket:
     family = socket.AF_INET6 if settings.address.version == 6 else socket.AF_INET
     try:
-        return socket.create_server((str(settings.address), settings.port), family=family, backlog=_MOST_CONNECTIONS)
+        listener = socket.create_server(
+            (str(settings.address), settings.port), family=family, backlog=_MOST_CONNECTIONS
+        )
     except OSError as error:
         raise ConfigError(
             f"the server cannot listen: {error.strerror}",
             got=f"{settings.host}, port {settings.port}",
             remedy="Choose another port; 0 takes any that is free.",
         ) from error
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # or each answer waits 40 ms for the one before
+    return listener
