@@ -33,6 +33,8 @@ import isiw
 TOKEN = "a token for benchmarks"  # noqa: S105 - of no real server
 PLAN = {"space": {"low_ms": 0, "high_ms": 200, "reference": "impact"}, "limits": {"min_iti_s": 0.0}}
 
+DELIVERY_S = 0.005
+
 SERVING = """
 import os, sys, signal
 import isiw, torch
@@ -176,7 +178,7 @@ def killed(folder: Path, number: int, chance: random.Random) -> str:
         killer.start()
         sessions = 0
         while not done.is_set():
-            rig.run(served, f"s{sessions}", "even" if sessions % 2 else "pf")
+            rig.run(served, f"s{sessions}", "pf" if sessions % 4 else "even")
             sessions += 1
         killer.join()
     compared = Counter[str]()
@@ -194,7 +196,7 @@ def killed(folder: Path, number: int, chance: random.Random) -> str:
 
 def _kill(served: Served, number: int, chance: random.Random, done: threading.Event) -> None:
     for _ in range(number):
-        time.sleep(chance.uniform(0.0, 0.6))
+        time.sleep(chance.uniform(0.05, 1.2))
         os.kill(served.child, signal.SIGKILL)
         served.next_child()
     done.set()
@@ -222,6 +224,7 @@ class _Rig:
                 if (name, trial) in self.delivered:
                     sys.exit(f"{name}: trial {trial} would be delivered twice")
                 self.delivered[name, trial] = (answer["isi_ms"] + 0.25, 0.1 + trial / 1e3)
+                time.sleep(DELIVERY_S)
                 told = dict(zip(("isi_ms", "mep_mv"), self.delivered[name, trial], strict=True))
                 answer = self._post(client, f"/sessions/{name}/tell", {"trial": trial, **told})
                 self.answers[name, trial] = "accepted" if answer["ok"] else answer["error"]["type"]

@@ -28,7 +28,7 @@ app = typer.Typer(
 )
 app.add_typer(prior.app, name="prior")
 app.add_typer(study.app, name="study")
-app.command()(serve.serve)
+app.add_typer(serve.app)
 new = typer.Typer(help="Write a starting point of your own.", no_args_is_help=True)
 app.add_typer(new, name="new")
 

@@ -11,11 +11,14 @@ import typer
 import isiw
 from isiw.cli.console import NO_DEFAULT, errors_reported, show
 
-__all__ = ["serve"]
+__all__ = ["app"]
+
+app = typer.Typer()
 
 TOKEN = "ISIW_TOKEN"  # noqa: S105 - the variable's name
 
 
+@app.command()
 def serve(
     folder: Annotated[Path, typer.Argument(help="Where the logs are; made where it is missing.", **NO_DEFAULT)],
     host: Annotated[str, typer.Option(help="The address to listen at; another than this needs TLS.")] = "127.0.0.1",
