@@ -89,17 +89,16 @@ def mep_mv(isi_ms: float) -> float:
 
 
 @contextmanager
-def server(folder: Path, port: int = 0) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def server(folder: Path, *options: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """A server in a process of its own, killed in the end, and its address."""
-    command = [sys.executable, "-m", "isiw.cli.main", "serve", str(folder), "--port", str(port)]
-    script = f"from isiw.cli import app; app({command[3:]!r})"
+    script = f"from isiw.cli import app; app({['serve', str(folder), '--port', '0', *options]!r})"
     environment = os.environ | {"ISIW_TOKEN": TOKEN}
     with subprocess.Popen(  # noqa: S603 - our own command
         [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, env=environment
     ) as process:
         try:
             first = known(process.stdout).readline()
-            assert "http://127.0.0.1:" in first, first
+            assert "://127.0.0.1:" in first, first
             yield process, first.rsplit(maxsplit=1)[-1]
         finally:
             process.kill()

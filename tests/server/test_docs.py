@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from isiw.log.reader import read_session
-from server.serving import TOKEN, server
+from server.serving import TOKEN, client_of
 
 PAGE = Path(__file__).parents[2] / "docs" / "lab" / "server.md"
 
@@ -21,8 +21,8 @@ def test_the_loop_with_curl_runs_as_it_stands_there(tmp_path: Path) -> None:
     (script,) = (
         block for block in re.findall(r"```sh\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL) if "curl" in block
     )
-    with server(tmp_path) as (_, url):
-        environment = os.environ | {"ISIW_URL": url, "ISIW_TOKEN": TOKEN}
+    with client_of(tmp_path) as client:
+        environment = os.environ | {"ISIW_URL": str(client.base_url), "ISIW_TOKEN": TOKEN}
         ran = subprocess.run(  # noqa: S603 - our own script
             [shutil.which("bash") or "", "-c", script],
             env=environment,

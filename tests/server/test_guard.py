@@ -104,6 +104,19 @@ def test_a_slow_body_is_refused_in_time(client: httpx.Client) -> None:
             pass
 
 
+def test_a_body_that_is_cut_off_is_not_taken_for_a_whole_one(client: httpx.Client) -> None:
+    session = created(client, "cut")
+    done(client.post(f"{session}/ask"))
+    with socket.create_connection(("127.0.0.1", client.base_url.port or 0), timeout=5) as connection:
+        head = f"POST {session}/tell HTTP/1.1\r\nHost: localhost\r\nAuthorization: {BEARER['Authorization']}\r\n"
+        form = (
+            "Content-Type: application/x-www-form-urlencoded\r\nContent-Length: 29\r\n\r\ntrial=0&isi_ms=60&mep_mv=0.1"
+        )
+        connection.sendall(f"{head}{form}".encode())  # of 0.12
+    time.sleep(0.1)
+    assert done(client.get(session))["trials"] == 0
+
+
 def test_a_request_that_is_no_http_is_refused(client: httpx.Client) -> None:
     with socket.create_connection(("127.0.0.1", client.base_url.port or 0), timeout=5) as connection:
         connection.sendall(b"\x00\xff nonsense\r\n\r\n")

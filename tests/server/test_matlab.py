@@ -7,10 +7,11 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import httpx
 import pytest
 
 from isiw.log.reader import read_session
-from server.serving import TOKEN, server
+from server.serving import TOKEN, client_of
 
 CLIENT = Path(__file__).parents[2] / "clients" / "matlab"
 OCTAVE = shutil.which("octave-cli") or ""
@@ -18,10 +19,10 @@ OCTAVE = shutil.which("octave-cli") or ""
 pytestmark = pytest.mark.skipif(not OCTAVE, reason="needs GNU Octave (octave-cli)")
 
 
-def octave(url: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+def octave(client: httpx.Client, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(  # noqa: S603 - our own script
         [OCTAVE, "--quiet", "--path", str(CLIENT), *arguments],
-        env=os.environ | {"ISIW_URL": url, "ISIW_TOKEN": TOKEN},
+        env=os.environ | {"ISIW_URL": str(client.base_url), "ISIW_TOKEN": TOKEN},
         capture_output=True,
         text=True,
         check=False,
@@ -32,8 +33,8 @@ def octave(url: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 def test_the_example_of_forty_lines_runs_and_its_log_has_what_the_rig_delivered(tmp_path: Path) -> None:
     script = (CLIENT / "example.m").read_text("utf-8")
     assert len([line for line in script.splitlines() if line.strip()]) <= 40
-    with server(tmp_path) as (_, url):
-        ran = octave(url, str(CLIENT / "example.m"))
+    with client_of(tmp_path) as client:
+        ran = octave(client, str(CLIENT / "example.m"))
     assert ran.returncode == 0, ran.stderr
     rows = [line.split() for line in ran.stdout.splitlines() if line[0].isdecimal()]
     delivered = [(int(trial), float(isi_ms), float(mep_mv)) for trial, isi_ms, mep_mv, hit in rows if hit == "1"]
@@ -63,8 +64,8 @@ disp(lab.trials);
 
 def test_what_is_refused_is_an_error_in_words_and_can_be_put_right(tmp_path: Path) -> None:
     (tmp_path / "refused.m").write_text(REFUSED)
-    with server(tmp_path / "sessions") as (_, url):
-        ran = octave(url, str(tmp_path / "refused.m"))
+    with client_of(tmp_path / "sessions") as client:
+        ran = octave(client, str(tmp_path / "refused.m"))
     assert ran.returncode == 0, ran.stderr
     first, second, words, trials = ran.stdout.splitlines()
     assert (first, second, trials.strip()) == ("isiw:Unauthorized", "isiw:NoSuchSession", "2")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
+import ssl
 import subprocess
 import sys
 import threading
@@ -18,6 +20,8 @@ from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.reader import read_session
 from isiw.server import ServerSettings
 from server.serving import BEARER, client_of, created, done, refused, server, told
+
+OPENSSL = shutil.which("openssl") or ""
 
 
 def client_at(url: str) -> httpx.Client:
@@ -111,6 +115,21 @@ def test_others_may_ask_only_with_tls(tmp_path: Path) -> None:
     with pytest.raises(InvalidValueError, match="port"):
         ServerSettings(tmp_path, port=70_000)
     assert len({ServerSettings(tmp_path).token for _ in range(3)}) == 3
+
+
+@pytest.mark.skipif(not OPENSSL, reason="needs openssl, to make a certificate")
+def test_with_a_certificate_it_is_served_by_tls_alone(tmp_path: Path) -> None:
+    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
+    command = [OPENSSL, "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1", "-subj", "/CN=isiw"]
+    files = ["-keyout", str(key), "-out", str(certificate), "-addext", "subjectAltName=IP:127.0.0.1"]
+    subprocess.run([*command, *files], check=True, capture_output=True)  # noqa: S603 - our own command
+    with server(tmp_path / "logs", "--certificate", str(certificate), "--key", str(key)) as (_, url):
+        assert url.startswith("https://")
+        context = ssl.create_default_context(cafile=str(certificate))
+        with httpx.Client(base_url=url, headers=BEARER, verify=context) as client:
+            told(client, created(client), 1)
+        with pytest.raises(httpx.TransportError):
+            httpx.get(url.replace("https", "http"))
 
 
 def test_the_command_says_what_is_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -96,8 +96,8 @@ class DrivenSession:
             subject=self.subject,
             trials=len(trials),
             told=len(trials.told),
-            open_trial=asked and asked.trial,
-            open_isi_ms=asked and asked.isi_ms,
+            open_trial=None if asked is None else asked.trial,
+            open_isi_ms=None if asked is None else asked.isi_ms,
             wait_s=self.recorder.wait_s(),
             stop=decision.stop,
             reason=decision.reason,
@@ -110,6 +110,25 @@ class DrivenSession:
     def estimate(self) -> EstimateAnswer:
         """What is believed about the window now."""
         return EstimateAnswer.of(Estimate.of(0, self.recorder.estimate(), self.recorder.decision(), None))
+
+    def require_no_wait(self, most_s: float) -> None:
+        """Raise where the next stimulus is not allowed soon.
+
+        Args:
+            most_s: how long may be waited [s].
+
+        Raises:
+            Refusal: it takes longer.
+        """
+        wait_s = self.recorder.wait_s()
+        if wait_s > most_s:
+            raise Refusal(
+                429,
+                "TooEarly",
+                f"the next stimulus is allowed in {wait_s:.1f} s",
+                remedy="Wait so long and send it again. Nothing was asked for.",
+                retry_s=wait_s,
+            )
 
     def ask(self, request: AskRequest) -> AskAnswer:
         """The next ISI; that of an open trial only to who names the trial, as it may have been delivered.
@@ -139,12 +158,13 @@ class DrivenSession:
         """What came of a trial; told again it is answered as at first.
 
         Raises:
-            Refusal: the trial has another outcome, or was not asked for.
+            Refusal: the trial has another outcome, or was not asked for, or TMS alone would come too early.
             InvalidValueError: a value that cannot be.
         """
         if request.trial in self._outcomes:
             return self._known(request.trial, _told(request), f"isi_ms={request.isi_ms} mep_mv={request.mep_mv}")
         self._require_next(request.trial, asked=request.isi_ms is not None)
+        self.require_no_wait(0.0)  # TMS alone is begun by telling it
         self.recorder.tell(
             request.isi_ms,
             request.mep_mv,

@@ -122,6 +122,8 @@ class Guard:
         body = bytearray()
         while True:
             message = await receive()
+            if message["type"] != "http.request":
+                raise Refusal(400, "Incomplete", "the connection ended before the body did")
             body += message.get("body", b"")
             if len(body) > self._rules.most_bytes:
                 raise self._too_large()

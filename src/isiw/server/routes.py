@@ -27,7 +27,6 @@ from isiw.server.answers import (
     TrialsAnswer,
 )
 from isiw.server.driven import DrivenSession
-from isiw.server.refusals import Refusal
 from isiw.server.requests import (
     NAME,
     AskRequest,
@@ -121,8 +120,6 @@ async def ask(folder: Folder, name: Name, body: Annotated[AskRequest, Depends(bo
 @router.post("/sessions/{id}/tell", responses=_errors(400, 404, 409, 415, 429), response_model=TrialAnswer)
 def tell(folder: Folder, name: Name, body: Annotated[TellRequest, Depends(body_of(TellRequest))]) -> Response:
     """What came of a trial. Safe to repeat."""
-    if body.isi_ms is None:  # TMS alone is begun by telling it
-        _require_no_wait(folder.opened(name), 0.0)
     with folder.driving(name) as session:
         return _json(session.tell(body))
 
@@ -238,17 +235,5 @@ async def _patient(session: DrivenSession, most_s: float) -> None:
     """Wait until the next stimulus is allowed, without holding a thread."""
     end_s = time.monotonic() + most_s
     while (wait_s := session.recorder.wait_s()) > 0:
-        _require_no_wait(session, end_s - time.monotonic())
+        session.require_no_wait(end_s - time.monotonic())
         await asyncio.sleep(wait_s)
-
-
-def _require_no_wait(session: DrivenSession, most_s: float) -> None:
-    wait_s = session.recorder.wait_s()
-    if wait_s > most_s:
-        raise Refusal(
-            429,
-            "TooEarly",
-            f"the next stimulus is allowed in {wait_s:.1f} s",
-            remedy="Wait so long and ask again. Nothing was asked for.",
-            retry_s=wait_s,
-        )

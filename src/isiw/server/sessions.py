@@ -267,7 +267,11 @@ class Sessions:
         return self._take(DrivenSession(name, header.subject, recorder, doubts, record))
 
     def _take(self, session: DrivenSession) -> SessionAnswer:
-        stands = session.stands()
+        try:
+            stands = session.stands()
+        except BaseException:
+            session.recorder.close()
+            raise
         with self._lock:
             self._open[session.name] = session
         return stands
