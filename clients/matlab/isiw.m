@@ -26,6 +26,7 @@ classdef isiw < handle
     token
     attempts = 10     % of a call that is not answered
     noted = 0
+    asked = []        % the trial that was asked for and has no outcome
   end
 
   methods
@@ -46,6 +47,7 @@ classdef isiw < handle
       end
       this.id = char(id);
       this.take(this.post('/sessions', pairs));
+      this.asked = [];
     end
 
     function resume(this, id, lost_pulses)
@@ -55,13 +57,19 @@ classdef isiw < handle
       end
       this.id = char(id);
       this.take(this.post(this.path('resume'), {'lost_pulses', number(lost_pulses)}));
+      this.asked = [];
     end
 
     function [trial, isi_ms] = ask(this)
       % The next trial's number and its ISI [ms], which is on disk as about to be delivered.
+      if ~isempty(this.asked)
+        error('isiw:TrialOpen', ['trial %d was asked for and has no outcome; it may have been delivered. ' ...
+              'Tell it, or call mistrial(%d, ''outcome unknown'').'], this.asked, this.asked);
+      end
       answer = this.post(this.path('ask'), {'trial', number(this.trials)});
       trial = answer.trial;
       isi_ms = answer.isi_ms;
+      this.asked = trial;
     end
 
     function tell(this, trial, isi_ms, mep_mv)
@@ -116,6 +124,9 @@ classdef isiw < handle
     end
 
     function conclude(this, answer)
+      if isequal(this.asked, answer.trial)
+        this.asked = [];
+      end
       this.trials = max(this.trials, answer.trial + 1);
       this.stop = answer.stop;
       this.reason = answer.stop_reason;

@@ -10,7 +10,7 @@ import httpx
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.errors import LogError
+from isiw.errors import InvalidValueError, LogError
 from isiw.log.reader import read_session
 from isiw.session.journal import Journal
 from isiw.strategy.catalogue import make_strategy
@@ -234,6 +234,22 @@ def test_what_breaks_a_log_closes_its_session(
     monkeypatch.undo()
     refused(client.post(f"{session}/ask"), 409, "NotOpen")
     assert done(client.post(f"{session}/resume"))["open"] is True
+
+
+def test_a_trial_that_was_logged_and_could_not_be_learnt_closes_its_session(
+    client: httpx.Client, session: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refusing(*_: object) -> None:
+        raise InvalidValueError("not to be learnt")
+
+    isi_ms = done(client.post(f"{session}/ask"))["isi_ms"]
+    outcome = {"trial": 0, "isi_ms": isi_ms, "mep_mv": 0.1}
+    monkeypatch.setattr("isiw.session.recorder.learn", refusing)
+    refused(client.post(f"{session}/tell", json=outcome), 422, "InvalidValueError")
+    monkeypatch.undo()
+    refused(client.post(f"{session}/tell", json=outcome), 409, "NotOpen")
+    done(client.post(f"{session}/resume"))
+    assert done(client.post(f"{session}/tell", json=outcome))["mep_mv"] == 0.1
 
 
 def test_what_nobody_foresaw_is_an_answer_in_words(

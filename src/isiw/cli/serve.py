@@ -31,7 +31,7 @@ def serve(
     key: Annotated[Path | None, typer.Option(help="Its key (PEM).", **NO_DEFAULT)] = None,
 ) -> None:
     """Serve sessions over HTTP to MATLAB, LabVIEW or any other software of this computer."""
-    with errors_reported("The server has ended; every log is closed."):
+    with errors_reported("The server has ended; its sessions go on once they are resumed."):
         given = token_file.read_text(encoding="utf-8").strip() if token_file else os.environ.get(TOKEN)
         settings = isiw.server.ServerSettings(
             folder, host, port, certificate=certificate, key=key, **({} if given is None else {"token": given})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,7 +22,8 @@ __all__ = ["DrivenSession", "not_open"]
 BUSY_S: Final = 5.0
 """How long a call waits for the one before it."""
 
-_KEYED: Final = re.compile(r" \(key ([A-Za-z0-9_-]{1,64})\)$")
+_HARMLESS: Final = (Refusal, InvalidValueError, LimitExceededError)
+"""What changes nothing, unless a trial was logged and not concluded."""
 
 
 class DrivenSession:
@@ -53,7 +53,7 @@ class DrivenSession:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Within, no other call drives the session. What fails in another way than by a wrong value closes it.
+        """Within, no other call drives the session. What fails otherwise than by a wrong value or a limit closes it.
 
         Raises:
             Refusal: it is busy, or was closed.
@@ -63,11 +63,10 @@ class DrivenSession:
         try:
             self._require_open()
             yield
-        except (Refusal, InvalidValueError, LimitExceededError):
-            raise
         except BaseException as error:
-            self.closed = True
-            self.recorder.__exit__(type(error), error, error.__traceback__)
+            if not (isinstance(error, _HARMLESS) and len(self.recorder.trials) == len(self._outcomes)):
+                self.closed = True
+                self.recorder.__exit__(type(error), error, error.__traceback__)
             raise
         finally:
             self._lock.release()
@@ -193,7 +192,9 @@ class DrivenSession:
 
     def note(self, request: NoteRequest) -> None:
         """Log a remark; with a key that was used before, nothing."""
-        self._note_once(f"{request.text} (key {request.key})" if request.key else request.text, once=bool(request.key))
+        mark = f" (key {request.key})" if request.key else ""
+        if not (mark and any(note.endswith(mark) for note in self._notes)):
+            self._note(f"{request.text}{mark}")
 
     def exclude(self, request: ExcludeRequest) -> None:
         """Let a trial not count; one that is excluded already stays so.
@@ -234,8 +235,9 @@ class DrivenSession:
         if told == _recorded(trial):
             return self._outcomes[number]
         late = trial.reason is MistrialReason.OUTCOME_UNKNOWN
-        if late:
-            self._note_once(f"An outcome of trial {number} came too late and is not used: {words}", once=True)
+        text = f"An outcome of trial {number} came too late and is not used: {words}"
+        if late and text not in self._notes:
+            self._note(text)
         raise Refusal(
             409,
             "Late" if late else "OtherOutcome",
@@ -246,10 +248,7 @@ class DrivenSession:
             field="trial",
         )
 
-    def _note_once(self, text: str, *, once: bool) -> None:
-        key = _KEYED.search(text)
-        if once and any(note == text or (key and note.endswith(key.group())) for note in self._notes):
-            return
+    def _note(self, text: str) -> None:
         self.recorder.note(text)
         self._notes.add(text)
 

@@ -217,7 +217,7 @@ class Sessions:
         """Within, nobody else opens a session of this name."""
         with self._lock:
             if name in self._opening or name in self._open:
-                raise Refusal(409, "Exists", "the session is open, or is being opened", got=name, field="id")
+                raise Refusal(409, "Busy", "the session is being opened", got=name, retry_s=1.0)
             if len(self._open) + len(self._opening) >= MOST_OPEN:
                 raise Refusal(
                     409, "TooManyOpen", "too many sessions are open", expected=f"at most {MOST_OPEN}",
