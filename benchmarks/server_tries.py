@@ -14,6 +14,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -59,13 +60,12 @@ class Served:
     """
 
     def __init__(self, folder: Path) -> None:
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            self.port = free.getsockname()[1]
+        self.port = _free_port()
         self.url, self.headers = f"http://127.0.0.1:{self.port}", {"Authorization": f"Bearer {TOKEN}"}
         self.context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # never used, but slow to make for each request
         command = [sys.executable, "-c", SERVING, str(folder), str(self.port), TOKEN]
         self._parent = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)  # noqa: S603 - our own script
-        self.child = self.next_child()
+        self.child, self.kills = self.next_child(), 0
 
     def next_child(self) -> int:
         """The process that serves, once it does."""
@@ -86,6 +86,14 @@ class Served:
         self._parent.kill()
         os.kill(self.child, signal.SIGKILL)
         self._parent.wait()
+
+
+def _free_port() -> int:
+    """A port that no outgoing connection is given while nobody listens, unlike those that port 0 stands for."""
+    for port in range(21_000, 32_000):
+        with suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            return port
+    sys.exit("no port is free")
 
 
 def fuzzed(served: Served, requests: int, chance: random.Random) -> tuple[float, float, Counter[str]]:
@@ -178,9 +186,11 @@ def killed(folder: Path, number: int, chance: random.Random) -> str:
         killer.start()
         sessions = 0
         while not done.is_set():
-            rig.run(served, f"s{sessions}", "pf" if sessions % 4 else "even")
+            rig.run(served, f"s{sessions}", "nr" if sessions % 2 else "pf")
             sessions += 1
         killer.join()
+        if served.kills < number:
+            sys.exit(f"the server ended by itself after {served.kills} kills")
     compared = Counter[str]()
     for session in range(sessions):
         compared += rig.compared(folder, f"s{session}")
@@ -195,11 +205,14 @@ def killed(folder: Path, number: int, chance: random.Random) -> str:
 
 
 def _kill(served: Served, number: int, chance: random.Random, done: threading.Event) -> None:
-    for _ in range(number):
-        time.sleep(chance.uniform(0.05, 1.2))
-        os.kill(served.child, signal.SIGKILL)
-        served.next_child()
-    done.set()
+    try:
+        for _ in range(number):
+            time.sleep(chance.uniform(0.05, 1.2))
+            os.kill(served.child, signal.SIGKILL)
+            served.next_child()
+            served.kills += 1
+    finally:
+        done.set()
 
 
 class _Rig:
