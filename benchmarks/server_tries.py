@@ -86,11 +86,13 @@ class Served:
         self._parent.kill()
         os.kill(self.child, signal.SIGKILL)
         self._parent.wait()
+        if self._parent.stdout:
+            self._parent.stdout.close()
 
 
 def _free_port() -> int:
     """A port that no outgoing connection is given while nobody listens, unlike those that port 0 stands for."""
-    for port in range(21_000, 32_000):
+    for port in range(21_000 + 7 * os.getpid() % 10_000, 32_000):
         with suppress(OSError), socket.create_server(("127.0.0.1", port)):
             return port
     sys.exit("no port is free")

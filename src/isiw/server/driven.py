@@ -133,7 +133,7 @@ class DrivenSession:
         """The next ISI; that of an open trial only to who names the trial, as it may have been delivered.
 
         Raises:
-            Refusal: a trial is open, or another one comes next.
+            Refusal: a trial is open, or another one comes next, or it is too early.
             LimitExceededError: a limit is reached.
         """
         asked, comes_next = self.recorder.asked, len(self.recorder.trials)
@@ -150,6 +150,7 @@ class DrivenSession:
             raise Refusal(
                 409, "WrongTrial", "another trial comes next", got=request.trial, expected=f"trial {comes_next}"
             )
+        self.require_no_wait(request.wait_s)  # another client may have been faster
         isi_ms = self.recorder.ask(request.deadline_s)
         return AskAnswer(trial=comes_next, isi_ms=isi_ms, again=asked is not None)
 
