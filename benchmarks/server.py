@@ -134,7 +134,8 @@ def fuzz(folder: Path, requests: int) -> None:
     print(
         f"## Malformed requests\n\n{requests} requests, seed 0: bytes that are no HTTP, wrong bodies, names, numbers,"
     )
-    print("methods and tokens. The open session's log and state stayed as they were.\n")
+    print("methods and tokens. The open session's log and state stayed as they were.")
+    print("Those with status 200 ask for the list of sessions, and have a body that is not looked at.\n")
     print(f"- answers: {', '.join(f'{count} × {status}' for status, count in sorted(answers.items()))}")
     print(f"- resident memory: {before:.0f} MB after the first tenth, {after:.0f} MB at the end\n")
 
