@@ -60,7 +60,7 @@ class Served:
     """
 
     def __init__(self, folder: Path) -> None:
-        self.port = _free_port()
+        self.folder, self.port = folder, _free_port()
         self.url, self.headers = f"http://127.0.0.1:{self.port}", {"Authorization": f"Bearer {TOKEN}"}
         self.context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # never used, but slow to make for each request
         command = [sys.executable, "-c", SERVING, str(folder), str(self.port), TOKEN]
@@ -111,15 +111,16 @@ def fuzzed(served: Served, requests: int, chance: random.Random) -> tuple[float,
     with served.client() as client:
         client.post("/sessions", json={"id": "kept", **PLAN, "strategy": {"name": "pf"}}).raise_for_status()
         client.post("/sessions/kept/ask").raise_for_status()
-        before = client.get("/sessions/kept").json(), client.get("/sessions/kept/trials").json()
+        log = served.folder / "kept.mcap.part"
+        before = client.get("/sessions/kept").json(), log.read_bytes()
         for number in range(requests):
             answers[_malformed(served, client, chance)] += 1
             if number in {requests // 10, requests - 1}:
                 memory.append(psutil.Process(served.child).memory_info().rss / 1e6)
-        after = client.get("/sessions/kept").json(), client.get("/sessions/kept/trials").json()
+        after = client.get("/sessions/kept").json(), log.read_bytes()
         names = [session["id"] for session in client.get("/sessions").json()["sessions"]]
     if after != before or names != ["kept"] or any(status.startswith("5") for status in answers):
-        sys.exit(f"the session has changed, or the server failed: {before} {after} {names} {answers}")
+        sys.exit(f"the session has changed, or the server failed: {before[0]} {after[0]} {names} {answers}")
     return memory[0], memory[-1], answers
 
 
