@@ -10,6 +10,7 @@ from . import priors as priors
 from . import repeatability as repeatability
 from . import report as report
 from . import response_counts as response_counts
+from . import server as server
 from . import session as session
 from . import signals as signals
 from . import strategy as strategy

@@ -12,6 +12,7 @@ Every message says what is wrong, what was got, what was expected, and the way o
     │   ├── NotDelivered                  a stimulus that the device refused before firing; it may be tried again
     │   ├── DeviceTimeoutError            no answer within the time allowed
     │   └── StillArmedError               a device that cannot be disarmed
+    ├── RequestError                      a request that the server refuses
     ├── StudyError                        a study that cannot be run, continued or read
     └── LogError                          a log that cannot be written or read
         └── DamagedLogError               a log that ends too early or fails its checksums
@@ -31,6 +32,7 @@ __all__ = [
     "NotDelivered",
     "OtherVersionsWarning",
     "OutOfSpaceError",
+    "RequestError",
     "StillArmedError",
     "StrategyError",
     "StudyError",
@@ -95,6 +97,10 @@ class DeviceTimeoutError(DeviceError):
 
 class StillArmedError(DeviceError):
     """A device that could not be disarmed, however often it was tried."""
+
+
+class RequestError(IsiwError):
+    """A request that the server refuses."""
 
 
 class StudyError(IsiwError):

@@ -133,6 +133,29 @@ def test_three_mistrials_in_a_row_are_a_warning(log: Path) -> None:
             session.mistrial(MistrialReason.NO_IMPACT)
 
 
+def test_doubts_go_to_who_wants_them_in_place_of_a_warning(log: Path) -> None:
+    doubts: list[str] = []
+    with open_session(scripted_strategy(9), log, on_doubt=doubts.append) as session:
+        for _ in range(3):
+            session.ask()
+            session.mistrial(MistrialReason.NO_IMPACT)
+    assert len(doubts) == 1
+    with open_session(scripted_strategy(9), log, resume=True, on_doubt=doubts.append) as session:
+        for mep_mv in (8.0, 6.0, 12.0):
+            session.tell(session.ask(), mep_mv)
+    assert "in µV" in doubts[1]
+
+
+def test_it_says_what_is_open_and_how_long_the_next_ask_would_wait(log: Path, space: DesignSpace) -> None:
+    limits = Limits.of_space(space, min_iti_s=7.0)
+    with open_session(scripted_strategy(9), log, limits=limits, clock=VirtualClock()) as session:
+        assert (session.asked, session.wait_s()) == (None, 7.0)
+        isi_ms = session.ask()
+        assert (known(session.asked).isi_ms, session.wait_s()) == (isi_ms, 0.0)
+        session.tell(isi_ms, 0.02)
+        assert (session.asked, session.wait_s()) == (None, 7.0)
+
+
 def test_nothing_can_be_told_that_was_not_asked(log: Path) -> None:
     with open_session(scripted_strategy(3), log) as session:
         with pytest.raises(InvalidValueError, match="nothing was asked"):

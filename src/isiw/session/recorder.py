@@ -49,6 +49,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     protocol: VisitProtocol | None = None,
     config: Mapping[str, Any] | None = None,
     lost_pulses: int | None = None,
+    on_doubt: Callable[[str], None] | None = None,
 ) -> Recorder:
     """Open a session whose loop is your own: ask it for ISIs, and tell it what came of them.
 
@@ -67,6 +68,8 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
             default. Control trials are the loop's own: `tell(None, …)` is TMS alone.
         config: anything that should be kept in the log, as TOML values.
         lost_pulses: as for `isiw.resume`: needed where the end of the log is missing.
+        on_doubt: called with what looks like a slip in what was told, or like a rig that needs somebody to look; by
+            default a warning.
 
     Raises:
         DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
@@ -104,7 +107,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     )
     clock = clock or MonotonicClock()
     if not (resume and (path.exists() or part_of(path).exists())):
-        return Recorder(strategy, LogWriter.create(path, header), header, clock)
+        return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
     salvaged = salvage(path)
     record = with_lost_pulses(read_salvaged(salvaged), lost_pulses)
     replayed = replay(record, strategy)
@@ -121,7 +124,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         writer.append(trial)
     writer.append(resumption(record, replayed))
     writer.sync()
-    return Recorder(replayed.strategy, writer, header, clock, replayed.trials, ages)
+    return Recorder(replayed.strategy, writer, header, clock, replayed.trials, ages, on_doubt)
 
 
 def _without_controls(protocol: VisitProtocol) -> VisitProtocol:
@@ -145,6 +148,7 @@ class Recorder(Judging):
         clock: tells the time, and waits.
         trials: what was delivered before; the strategy has learned it.
         earlier_s: how long ago each of these was [s].
+        on_doubt: as for `open_session`.
     """
 
     def __init__(
@@ -155,9 +159,10 @@ class Recorder(Judging):
         clock: Clock,
         trials: TrialTable | None = None,
         earlier_s: Sequence[float] = (),
+        on_doubt: Callable[[str], None] | None = None,
     ) -> None:
         self.strategy, self._journal, self._space = strategy, Journal(trials), strategy.space
-        self._log, self._clock = log, clock
+        self._log, self._clock, self._on_doubt = log, clock, on_doubt
         self._limits, self._protocol, self._seed = header.limits, header.protocol, header.seed
         self._open = ExitStack()
         self._open.enter_context(self._journal.writing(log))
@@ -166,6 +171,17 @@ class Recorder(Judging):
         self._made_s = now_s
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
         self._doubted: set[DoubtKind] = set()
+
+    @property
+    def asked(self) -> Stimulus | None:
+        """What was asked and has no outcome yet; None where nothing is open."""
+        return self._asked
+
+    def wait_s(self) -> float:
+        """How long `ask` would wait now until limits and protocol allow the next stimulus [s]."""
+        if self._asked is not None:
+            return 0.0
+        return max(0.0, self._earliest_s(len(self.trials)) - self._clock.now_s())
 
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], the same until its outcome; on disk as about to be delivered before this returns.
@@ -331,4 +347,7 @@ class Recorder(Judging):
 
     def _warn(self, text: str) -> None:
         self._event("doubt", text)
-        warnings.warn(text, ImplausibleDataWarning, stacklevel=3)
+        if self._on_doubt is not None:
+            self._on_doubt(text)
+        else:
+            warnings.warn(text, ImplausibleDataWarning, stacklevel=3)

@@ -1,0 +1,177 @@
+classdef isiw < handle
+% ISIW  Ask an isiw server which inter-stimulus interval comes next, and tell it what came of it.
+%
+%   lab = isiw('http://127.0.0.1:8473', token);
+%   lab.create('P07', struct('seed', 7));      % or lab.resume('P07'), to go on with a session
+%   while ~lab.stop
+%       [trial, isi_ms] = lab.ask();           % waits until the next stimulus is allowed
+%       ...                                    % your hardware delivers the pair at isi_ms
+%       lab.tell(trial, realised_ms, mep_mv);  % or lab.mistrial(trial, 'no impact')
+%   end
+%   lab.close();
+%
+% Every call can be repeated without doubling anything, so one whose answer is lost is repeated here. Where it is
+% refused, an error says why and what to do. For MATLAB from R2019b on, and GNU Octave from 7 on.
+
+  properties (SetAccess = private)
+    id = '';          % the session
+    trials = 0;       % how many have an outcome: the next one has this number
+    stop = false;     % whether to stop now
+    reason = '';      % why, or why not
+    doubts = {};      % what looked like a slip in the last trial that was told
+  end
+
+  properties (Access = private)
+    url
+    token
+    attempts = 10     % of a call that is not answered
+    noted = 0
+    asked = []        % the trial that was asked for and has no outcome
+  end
+
+  methods
+    function this = isiw(url, token)
+      % The server's address, and the token that it prints when it starts.
+      this.url = regexprep(char(url), '/+$', '');
+      this.token = char(token);
+    end
+
+    function create(this, id, plan)
+      % Begin a session. PLAN may have the fields seed, visit, space, strategy, limits and protocol, as a configuration.
+      if nargin < 3
+        plan = struct();
+      end
+      pairs = {'id', char(id)};
+      for name = fieldnames(plan)'
+        pairs(end + 1:end + 2) = {name{1}, jsonencode(plan.(name{1}))};
+      end
+      this.id = char(id);
+      this.take(this.post('/sessions', pairs));
+      this.asked = [];
+    end
+
+    function resume(this, id, lost_pulses)
+      % Go on with a session. A trial that was asked for and has no outcome becomes a mistrial.
+      if nargin < 3
+        lost_pulses = [];
+      end
+      this.id = char(id);
+      this.take(this.post(this.path('resume'), {'lost_pulses', number(lost_pulses)}));
+      this.asked = [];
+    end
+
+    function [trial, isi_ms] = ask(this)
+      % The next trial's number and its ISI [ms], which is on disk as about to be delivered.
+      if ~isempty(this.asked)
+        error('isiw:TrialOpen', ['trial %d was asked for and has no outcome; it may have been delivered. ' ...
+              'Tell it, or call mistrial(%d, ''outcome unknown'').'], this.asked, this.asked);
+      end
+      answer = this.post(this.path('ask'), {'trial', number(this.trials)});
+      trial = answer.trial;
+      isi_ms = answer.isi_ms;
+      this.asked = trial;
+    end
+
+    function tell(this, trial, isi_ms, mep_mv)
+      % The realised ISI [ms] ([] for TMS alone, as the trial lab.trials) and the MEP from peak to peak [mV].
+      pairs = {'trial', number(trial), 'isi_ms', number(isi_ms), 'mep_mv', number(mep_mv)};
+      this.conclude(this.post(this.path('tell'), pairs));
+    end
+
+    function mistrial(this, trial, reason)
+      % A trial was lost: it counts as a stimulus, and nothing is learnt from it.
+      this.conclude(this.post(this.path('mistrial'), {'trial', number(trial), 'reason', char(reason)}));
+    end
+
+    function note(this, text)
+      % A remark for the log.
+      this.noted = this.noted + 1;
+      key = sprintf('%s-%d', datestr(now, 'yyyymmddTHHMMSSFFF'), this.noted);
+      this.post(this.path('note'), {'text', char(text), 'key', key});
+    end
+
+    function exclude(this, trial, reason)
+      % A trial shall not count; nothing is erased.
+      this.take(this.post(this.path('exclude'), {'trial', number(trial), 'reason', char(reason)}));
+    end
+
+    function answer = estimate(this)
+      % What is believed about the window.
+      answer = this.call(@() webread([this.url this.path('estimate') '?errors=200'], this.options()));
+    end
+
+    function close(this)
+      % Close the session: its log is complete.
+      this.take(this.post(this.path('close'), {'close', '1'}));
+    end
+  end
+
+  methods (Access = private)
+    function whole = path(this, verb)
+      whole = ['/sessions/' this.id '/' verb];
+    end
+
+    function made = options(this)
+      % Made for each call, as Octave's webwrite changes those that it is given.
+      made = weboptions('Timeout', 60, 'ContentType', 'text', ...
+                        'HeaderFields', {'Authorization', ['Bearer ' this.token]});
+    end
+
+    function take(this, answer)
+      this.trials = answer.trials;
+      this.stop = answer.stop;
+      this.reason = answer.reason;
+    end
+
+    function conclude(this, answer)
+      if isequal(this.asked, answer.trial)
+        this.asked = [];
+      end
+      this.trials = max(this.trials, answer.trial + 1);
+      this.stop = answer.stop;
+      this.reason = answer.stop_reason;
+      this.doubts = answer.doubts;
+      if ~isempty(answer.doubts)
+        warning('isiw:Doubt', '%s', strjoin(cellstr(answer.doubts), ' '));
+      end
+    end
+
+    function answer = post(this, path, pairs)
+      answer = this.call(@() webwrite([this.url path '?errors=200'], pairs{:}, this.options()));
+    end
+
+    function answer = call(this, send)
+      % Send until it is answered; wait where the server says how long.
+      attempt = 1;
+      while true
+        try
+          text = send();
+        catch problem
+          if attempt >= this.attempts
+            rethrow(problem);
+          end
+          pause(0.2 * attempt);
+          attempt = attempt + 1;
+          continue
+        end
+        answer = jsondecode(text);
+        if answer.ok
+          return
+        end
+        if isempty(answer.error.retry_s)
+          error(['isiw:' answer.error.type], '%s', answer.error.message);
+        end
+        pause(answer.error.retry_s);
+      end
+    end
+  end
+end
+
+function text = number(value)
+  % A number with all its digits; none is an empty text.
+  if isempty(value)
+    text = '';
+  else
+    text = sprintf('%.17g', value);
+  end
+end

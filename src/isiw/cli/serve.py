@@ -1,0 +1,44 @@
+"""The command that serves sessions to a lab's own software."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import isiw
+from isiw.cli.console import NO_DEFAULT, errors_reported, show
+
+__all__ = ["app"]
+
+app = typer.Typer()
+
+TOKEN = "ISIW_TOKEN"  # noqa: S105 - the variable's name
+
+
+@app.command()
+def serve(
+    folder: Annotated[Path, typer.Argument(help="Where the logs are; made where it is missing.", **NO_DEFAULT)],
+    host: Annotated[str, typer.Option(help="The address to listen at; another than this needs TLS.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="The port; 0 for any that is free.")] = 8473,
+    token_file: Annotated[
+        Path | None,
+        typer.Option(help=f"The token's file; by default {TOKEN} in the environment, or a random token.", **NO_DEFAULT),
+    ] = None,
+    certificate: Annotated[Path | None, typer.Option(help="A TLS certificate (PEM).", **NO_DEFAULT)] = None,
+    key: Annotated[Path | None, typer.Option(help="Its key (PEM).", **NO_DEFAULT)] = None,
+) -> None:
+    """Serve sessions over HTTP to MATLAB, LabVIEW or any other software of this computer."""
+    with errors_reported("The server has ended; its sessions go on once they are resumed."):
+        given = token_file.read_text(encoding="utf-8").strip() if token_file else os.environ.get(TOKEN)
+        settings = isiw.server.ServerSettings(
+            folder, host, port, certificate=certificate, key=key, **({} if given is None else {"token": given})
+        )
+
+        def ready(url: str) -> None:
+            show(f"isiw serves the sessions of {folder} at {url}", style="bold")
+            show("token: as given" if given is not None else f"token: {settings.token}")
+
+        isiw.server.serve(settings, ready)

@@ -1,0 +1,186 @@
+"""What is answered: each a JSON object, whose `ok` says whether it was done."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from isiw.log.schema import Estimate, Number, Numbers
+from isiw.strategy.stopping import StopDecision
+from isiw.trials import MistrialReason, Status, Trial
+
+__all__ = [
+    "AskAnswer",
+    "DecisionAnswer",
+    "Error",
+    "ErrorAnswer",
+    "EstimateAnswer",
+    "OkAnswer",
+    "SessionAnswer",
+    "SessionsAnswer",
+    "TrialAnswer",
+    "TrialRow",
+    "TrialsAnswer",
+]
+
+
+class _Answer(BaseModel):
+    model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings")
+
+
+class OkAnswer(_Answer):
+    """It was done."""
+
+    ok: Literal[True] = True
+
+
+class Error(_Answer):
+    """What is wrong, and the way out."""
+
+    type: str = Field(description="What kind of error, for software.")
+    status: int = Field(description="The HTTP status, also where the answer has another one by errors=200.")
+    message: str = Field(description="All of it in words, for people.")
+    got: str | None = None
+    expected: str | None = None
+    remedy: str | None = None
+    field: str | None = Field(default=None, description="The field of the request that it is about.")
+    retry_s: float | None = Field(default=None, description="After which time the same request will be answered [s].")
+
+
+class ErrorAnswer(_Answer):
+    """It was not done."""
+
+    ok: Literal[False] = False
+    error: Error
+
+
+class DecisionAnswer(OkAnswer):
+    """Whether to stop now, and why."""
+
+    stop: bool
+    reason: str
+
+    @classmethod
+    def of(cls, decision: StopDecision) -> Self:
+        """The answer of a decision."""
+        return cls(stop=decision.stop, reason=decision.reason)
+
+
+class SessionAnswer(OkAnswer):
+    """How a session stands."""
+
+    id: str
+    open: bool = Field(description="Whether it can be asked; otherwise it has to be resumed.")
+    subject: str
+    trials: int = Field(description="How many have an outcome; the next one has this number.")
+    told: int = Field(description="How many of these count.")
+    open_trial: int | None = Field(default=None, description="The trial that was asked for and has no outcome.")
+    open_isi_ms: float | None = Field(default=None, description="Its ISI [ms].")
+    wait_s: float = Field(default=0.0, description="How long until the next stimulus is allowed [s].")
+    stop: bool
+    reason: str = Field(description="Why to stop, or to go on.")
+
+
+class SessionEntry(BaseModel):
+    """A session of the folder."""
+
+    id: str
+    open: bool
+
+
+class SessionsAnswer(OkAnswer):
+    """The sessions of the folder."""
+
+    sessions: list[SessionEntry]
+
+
+class AskAnswer(OkAnswer):
+    """What to deliver next. It is on disk as about to be delivered."""
+
+    trial: int = Field(description="Its number, for tell or mistrial.")
+    isi_ms: float = Field(description="The ISI to deliver [ms].")
+    again: bool = Field(description="Whether it was answered before: deliver it only if it was not delivered yet.")
+
+
+class TrialAnswer(OkAnswer):
+    """What was recorded of a trial, and whether to stop after it; told again, the same."""
+
+    trial: int
+    status: Status
+    reason: MistrialReason | None = None
+    isi_ms: float | None = None
+    mep_mv: float | None = None
+    stop: bool
+    stop_reason: str
+    doubts: list[str] = Field(default_factory=list, description="What looks like a slip, or like a rig in trouble.")
+
+    @classmethod
+    def of(cls, trial: Trial, decision: StopDecision, doubts: list[str]) -> Self:
+        """The answer about a trial.
+
+        Args:
+            trial: the trial.
+            decision: whether to stop after it.
+            doubts: what looked like a slip.
+        """
+        return cls(
+            trial=trial.index,
+            status=trial.status,
+            reason=trial.reason,
+            isi_ms=trial.isi_ms,
+            mep_mv=trial.mep_mv,
+            stop=decision.stop,
+            stop_reason=decision.reason,
+            doubts=doubts,
+        )
+
+
+class TrialRow(BaseModel):
+    """A trial as it counts now."""
+
+    trial: int
+    status: Status
+    reason: MistrialReason | None
+    commanded_isi_ms: float | None
+    isi_ms: float | None
+    mep_mv: float | None
+    excluded: bool
+
+    @classmethod
+    def of(cls, trial: Trial) -> Self:
+        """The row of a trial."""
+        names = ("status", "reason", "commanded_isi_ms", "isi_ms", "mep_mv", "excluded")
+        return cls(trial=trial.index, **{name: getattr(trial, name) for name in names})
+
+
+class TrialsAnswer(OkAnswer):
+    """All trials of a session."""
+
+    trials: list[TrialRow]
+
+
+class EstimateAnswer(OkAnswer):
+    """What is believed about the window; the names are those of the log's `/estimate`."""
+
+    text: str = Field(description="In words.")
+    probability: float | None = Field(description="That there is a window.")
+    segments_ms: list[float] = Field(description="The reported window: starts and ends in turn; empty where none.")
+    start_ms: Number | None
+    start_low_ms: Number | None
+    start_high_ms: Number | None
+    end_ms: Number | None
+    end_low_ms: Number | None
+    end_high_ms: Number | None
+    expected_f1: float | None
+    best_isi_ms: list[float]
+    hypotheses: dict[str, float]
+    grid_ms: list[float]
+    profile_mv: Numbers
+    band_low_mv: Numbers
+    band_high_mv: Numbers
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> Self:
+        """The answer of an estimate as a log has it."""
+        return cls.model_validate({"text": str(estimate), **estimate.model_dump()})

@@ -1,0 +1,305 @@
+"""One open session as clients drive it: a call at a time, and what is told again is not a second trial."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from isiw.errors import InvalidValueError, LimitExceededError
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import Estimate
+from isiw.server.answers import AskAnswer, EstimateAnswer, SessionAnswer, TrialAnswer, TrialRow
+from isiw.server.refusals import Refusal
+from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, NoteRequest, TellRequest
+from isiw.session.recorder import Recorder
+from isiw.strategy.stopping import StopDecision
+from isiw.trials import MistrialReason, Status, Trial
+
+__all__ = ["DrivenSession", "not_open"]
+
+BUSY_S: Final = 5.0
+"""How long a call waits for the one before it."""
+
+_HARMLESS: Final = (Refusal, InvalidValueError, LimitExceededError)
+"""What changes nothing, unless a trial was logged and not concluded."""
+
+
+class DrivenSession:
+    """An open session; every call is made within `alone`.
+
+    Args:
+        name: its id.
+        subject: the person's code.
+        recorder: the session.
+        doubts: what its recorder doubts is put in here.
+        record: its log, where it goes on.
+    """
+
+    def __init__(
+        self, name: str, subject: str, recorder: Recorder, doubts: list[str], record: SessionRecord | None = None
+    ) -> None:
+        self.name, self.subject, self.recorder = name, subject, recorder
+        self.closed = False
+        self._doubts, self._lock = doubts, threading.Lock()
+        self._outcomes = {} if record is None else _outcomes(record)
+        self._outcomes |= {  # those that became mistrials on resuming
+            trial.index: TrialAnswer.of(trial, recorder.decision(), [])
+            for trial in recorder.trials
+            if trial.index not in self._outcomes
+        }
+        self._notes = set() if record is None else {event.text for event in record.events if event.kind == "note"}
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Within, no other call drives the session. What fails otherwise than by a wrong value or a limit closes it.
+
+        Raises:
+            Refusal: it is busy, or was closed.
+        """
+        if not self._lock.acquire(timeout=BUSY_S):
+            raise Refusal(409, "Busy", "the session is busy with another call", got=self.name, retry_s=1.0)
+        try:
+            self._require_open()
+            yield
+        except BaseException as error:
+            if not (isinstance(error, _HARMLESS) and len(self.recorder.trials) == len(self._outcomes)):
+                self.closed = True
+                self.recorder.__exit__(type(error), error, error.__traceback__)
+            raise
+        finally:
+            self._lock.release()
+
+    def _require_open(self) -> None:
+        if self.closed:
+            raise not_open(self.name)
+
+    def close(self) -> SessionAnswer:
+        """Close its log; how it stands then."""
+        stands = self.stands()
+        self.closed = True
+        self.recorder.close()
+        return stands.model_copy(update={"open": False})
+
+    def outcomes_after(self, trial: int) -> list[TrialAnswer]:
+        """What came of the trials after one, in order."""
+        return [self._outcomes[number] for number in sorted(self._outcomes.copy()) if number > trial]
+
+    def stands(self) -> SessionAnswer:
+        """How it stands."""
+        asked, trials, decision = self.recorder.asked, self.recorder.trials, self.recorder.decision()
+        return SessionAnswer(
+            id=self.name,
+            open=True,
+            subject=self.subject,
+            trials=len(trials),
+            told=len(trials.told),
+            open_trial=None if asked is None else asked.trial,
+            open_isi_ms=None if asked is None else asked.isi_ms,
+            wait_s=self.recorder.wait_s(),
+            stop=decision.stop,
+            reason=decision.reason,
+        )
+
+    def trials(self) -> list[TrialRow]:
+        """All trials, as they count now."""
+        return [TrialRow.of(trial) for trial in self.recorder.trials]
+
+    def estimate(self) -> EstimateAnswer:
+        """What is believed about the window now."""
+        return EstimateAnswer.of(Estimate.of(0, self.recorder.estimate(), self.recorder.decision(), None))
+
+    def require_no_wait(self, most_s: float) -> None:
+        """Raise where the next stimulus is not allowed soon.
+
+        Args:
+            most_s: how long may be waited [s].
+
+        Raises:
+            Refusal: it takes longer.
+        """
+        wait_s = self.recorder.wait_s()
+        if wait_s > most_s:
+            raise Refusal(
+                429,
+                "TooEarly",
+                f"the next stimulus is allowed in {wait_s:.1f} s",
+                remedy="Wait so long and send it again. Nothing was asked for.",
+                retry_s=wait_s,
+            )
+
+    def ask(self, request: AskRequest) -> AskAnswer:
+        """The next ISI; that of an open trial only to who names the trial, as it may have been delivered.
+
+        Raises:
+            Refusal: a trial is open, or another one comes next, or it is too early.
+            LimitExceededError: a limit is reached.
+        """
+        asked, comes_next = self.recorder.asked, len(self.recorder.trials)
+        if asked is not None and request.trial is None:
+            raise Refusal(
+                409,
+                "TrialOpen",
+                f"trial {asked.trial} was asked for and has no outcome; it may have been delivered",
+                got=asked.isi_ms,
+                remedy="Tell its outcome, or make it a mistrial. Only where the answer of ask was lost, ask again with "
+                f"trial={asked.trial}.",
+            )
+        if request.trial not in {None, comes_next}:
+            raise Refusal(
+                409, "WrongTrial", "another trial comes next", got=request.trial, expected=f"trial {comes_next}"
+            )
+        self.require_no_wait(request.wait_s)  # another client may have been faster
+        isi_ms = self.recorder.ask(request.deadline_s)
+        return AskAnswer(trial=comes_next, isi_ms=isi_ms, again=asked is not None)
+
+    def tell(self, request: TellRequest) -> TrialAnswer:
+        """What came of a trial; told again it is answered as at first.
+
+        Raises:
+            Refusal: the trial has another outcome, or was not asked for, or TMS alone would come too early.
+            InvalidValueError: a value that cannot be.
+        """
+        if request.trial in self._outcomes:
+            return self._known(request.trial, _told(request), f"isi_ms={request.isi_ms} mep_mv={request.mep_mv}")
+        self._require_next(request.trial, asked=request.isi_ms is not None)
+        self.require_no_wait(0.0)  # TMS alone is begun by telling it
+        self.recorder.tell(
+            request.isi_ms,
+            request.mep_mv,
+            isi_sd_ms=request.isi_sd_ms,
+            background_rms_uv=request.background_rms_uv,
+        )
+        return self._concluded()
+
+    def mistrial(self, request: MistrialRequest) -> TrialAnswer:
+        """That a trial is lost; told again it is answered as at first.
+
+        Raises:
+            Refusal: the trial has another outcome, or was not asked for.
+        """
+        if request.trial in self._outcomes:
+            return self._known(request.trial, (_reason(request.reason),), f"mistrial, {request.reason}")
+        self._require_next(request.trial, asked=True)
+        self.recorder.mistrial(request.reason)
+        return self._concluded()
+
+    def give_up(self) -> None:
+        """Make an open trial a mistrial: nobody knows what came of it."""
+        if self.recorder.asked is not None:
+            self.recorder.mistrial(MistrialReason.OUTCOME_UNKNOWN)
+            self._concluded()
+
+    def note(self, request: NoteRequest) -> None:
+        """Log a remark; with a key that was used before, nothing."""
+        mark = f" (key {request.key})" if request.key else ""
+        if not (mark and any(note.endswith(mark) for note in self._notes)):
+            self._note(f"{request.text}{mark}")
+
+    def exclude(self, request: ExcludeRequest) -> None:
+        """Let a trial not count; one that is excluded already stays so.
+
+        Raises:
+            InvalidValueError: no trial that counts has this number.
+        """
+        if not any(trial.index == request.trial and trial.excluded for trial in self.recorder.trials):
+            self.recorder.exclude(request.trial, request.reason)
+
+    def include(self, trial: int) -> None:
+        """Let a trial count again; one that counts already does so.
+
+        Raises:
+            InvalidValueError: no such trial, or a mistrial.
+        """
+        if not any(known.index == trial and known.counts for known in self.recorder.trials):
+            self.recorder.include(trial)
+
+    def _require_next(self, trial: int, *, asked: bool) -> None:
+        """Raise where a trial cannot have an outcome, as it was not asked for."""
+        stimulus, comes_next = self.recorder.asked, len(self.recorder.trials)
+        if trial == comes_next and (stimulus is not None or not asked):
+            return
+        raise Refusal(
+            409,
+            "NotAsked",
+            f"trial {trial} was not asked for",
+            got=trial,
+            expected=f"trial {comes_next}{'' if stimulus else ', once it was asked for'}",
+            remedy="Call ask, deliver, and then tell.",
+            field="trial",
+        )
+
+    def _known(self, number: int, told: tuple[object, ...], words: str) -> TrialAnswer:
+        """The first answer about a trial, to who tells it again."""
+        trial = self.recorder.trials[number]
+        if told == _recorded(trial):
+            return self._outcomes[number]
+        late = trial.reason is MistrialReason.OUTCOME_UNKNOWN
+        text = f"An outcome of trial {number} came too late and is not used: {words}"
+        if late and text not in self._notes:
+            self._note(text)
+        raise Refusal(
+            409,
+            "Late" if late else "OtherOutcome",
+            f"trial {number} has another outcome already",
+            got=words,
+            expected=f"what is recorded: {_in_words(trial)}",
+            remedy="It stays as it is." + (" What came too late is in the log as a note." if late else ""),
+            field="trial",
+        )
+
+    def _note(self, text: str) -> None:
+        self.recorder.note(text)
+        self._notes.add(text)
+
+    def _concluded(self) -> TrialAnswer:
+        doubts = self._doubts.copy()
+        self._doubts.clear()
+        answer = TrialAnswer.of(self.recorder.trials[-1], self.recorder.decision(), doubts)
+        self._outcomes[answer.trial] = answer
+        return answer
+
+
+def not_open(name: str) -> Refusal:
+    """That a session cannot be driven."""
+    return Refusal(409, "NotOpen", "the session is not open", got=name, remedy="Resume it: /sessions/ID/resume.")
+
+
+def _outcomes(record: SessionRecord) -> dict[int, TrialAnswer]:
+    """What was answered about the trials of a log when they were told."""
+    decisions: dict[int, StopDecision] = {}
+    for estimate in record.estimates:  # the first of a trial; later ones are of verdicts
+        decisions.setdefault(estimate.trial, estimate.decision)
+    going_on = StopDecision(stop=False, reason="")
+    doubts = [event for event in record.events if event.kind == "doubt"]
+    return {
+        trial.index: TrialAnswer.of(
+            trial,
+            decisions.get(trial.index, going_on),
+            [event.text for event in doubts if event.trial == trial.index],
+        )
+        for trial in record.table
+    }
+
+
+def _told(request: TellRequest) -> tuple[object, ...]:
+    return request.isi_ms, request.mep_mv, request.isi_sd_ms, request.background_rms_uv
+
+
+def _recorded(trial: Trial) -> tuple[object, ...]:
+    """What was told about a trial."""
+    if trial.status is Status.MISTRIAL:
+        return (trial.reason,)
+    return trial.isi_ms, trial.mep_mv, trial.isi_sd_ms, trial.background_rms_uv
+
+
+def _reason(text: str) -> MistrialReason:
+    """The reason under which a mistrial is recorded."""
+    return next((each for each in MistrialReason if each == text), MistrialReason.REJECTED)
+
+
+def _in_words(trial: Trial) -> str:
+    if trial.status is Status.MISTRIAL:
+        return f"mistrial, {trial.reason}"
+    return f"isi_ms={trial.isi_ms} mep_mv={trial.mep_mv}"

@@ -1,0 +1,206 @@
+"""What a client may send: each call's fields, from JSON or from a form."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Awaitable, Callable
+from typing import Annotated, Any, Final, TypeVar
+from urllib.parse import parse_qsl
+
+from fastapi import Request
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
+
+from isiw.config.run import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig
+from isiw.errors import IsiwError
+from isiw.log.schema import MOST_TRIALS
+from isiw.server.refusals import Refusal
+from isiw.visit import VisitProtocol
+
+__all__ = [
+    "FORM",
+    "JSON",
+    "NAME",
+    "AskRequest",
+    "CreateRequest",
+    "ExcludeRequest",
+    "IncludeRequest",
+    "MistrialRequest",
+    "NoteRequest",
+    "ResumeRequest",
+    "TellRequest",
+    "body_of",
+]
+
+FORM: Final = "application/x-www-form-urlencoded"
+JSON: Final = "application/json"
+
+NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
+"""What a session may be called: never a path."""
+
+MOST_FIELDS: Final = 50
+MOST_WAIT_S: Final = 30.0
+
+TrialNumber = Annotated[int, Field(ge=0, lt=MOST_TRIALS)]
+Text = Annotated[str, Field(max_length=10_000)]
+
+_Kind = TypeVar("_Kind", bound=BaseModel)
+
+
+class _Request(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class CreateRequest(_Request):
+    """A new session: its id, and the sections of a configuration file, as for `isiw run`."""
+
+    id: str = Field(pattern=NAME, description="Letters, digits, - and _; the log is ID.mcap.")
+    seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of the strategy.")
+    visit: VisitConfig = VisitConfig()
+    space: SpaceConfig = SpaceConfig()
+    strategy: StrategyConfig = StrategyConfig()
+    limits: LimitsConfig = LimitsConfig()
+    protocol: VisitProtocol = VisitProtocol()
+
+
+class ResumeRequest(_Request):
+    """Going on with a session from its log."""
+
+    lost_pulses: int | None = Field(
+        default=None,
+        ge=0,
+        lt=MOST_TRIALS,
+        description="Needed where the log's end is missing: how many stimuli were given that are not in it.",
+    )
+
+
+class AskRequest(_Request):
+    """Which trial is asked for, and how long the answer may take."""
+
+    trial: TrialNumber | None = Field(
+        default=None,
+        description="The number of the trial that comes next. Named again, it is a retry, and answered as before.",
+    )
+    wait_s: float = Field(
+        default=10.0, ge=0.0, le=MOST_WAIT_S, description="How long to wait here for the inter-trial interval [s]."
+    )
+    deadline_s: float = Field(
+        default=10.0, ge=0.0, le=60.0, description="After this time [s] the next ISI is an evenly spaced one."
+    )
+
+
+class TellRequest(_Request):
+    """What came of a trial."""
+
+    trial: TrialNumber = Field(description="Its number, as ask has answered it.")
+    isi_ms: float | None = Field(
+        description="The realised ISI [ms]; null for TMS alone, which is told without being asked, as the trial that "
+        "comes next."
+    )
+    mep_mv: float = Field(description="Peak-to-peak amplitude [mV]; 0 is below the detection limit.")
+    isi_sd_ms: float = Field(default=0.0, description="SD of the realised ISI [ms]; 0 where it was measured.")
+    background_rms_uv: float | None = Field(default=None, description="EMG before the pulse [µV RMS], where known.")
+
+
+class MistrialRequest(_Request):
+    """That a trial is lost."""
+
+    trial: TrialNumber = Field(description="Its number, as ask has answered it.")
+    reason: Text = Field(
+        default="rejected", description="A reason that isiw knows, such as no impact; any other becomes a note."
+    )
+
+
+class NoteRequest(_Request):
+    """A remark for the log."""
+
+    text: Text
+    key: str | None = Field(
+        default=None,
+        pattern=r"^[A-Za-z0-9_-]{1,64}$",
+        description="Of the client's choice: a note with the same key is logged once only.",
+    )
+
+
+class ExcludeRequest(_Request):
+    """Which trial shall not count, and why."""
+
+    trial: TrialNumber
+    reason: Text = ""
+
+
+class IncludeRequest(_Request):
+    """Which trial counts again."""
+
+    trial: TrialNumber
+
+
+def body_of(kind: type[_Kind]) -> Callable[[Request], Awaitable[_Kind]]:
+    """A dependency of a route: its body as a request of this kind.
+
+    Args:
+        kind: the kind of request.
+    """
+
+    async def body(request: Request) -> _Kind:
+        return _read(kind, request.headers.get("content-type", ""), await request.body())
+
+    return body
+
+
+def _read(kind: type[_Kind], content_type: str, body: bytes) -> _Kind:
+    media_type = content_type.partition(";")[0].strip().lower()
+    if media_type == FORM:
+        body = _form_as_json(kind, body)
+    elif body and media_type != JSON:
+        raise Refusal(
+            415, "UnsupportedMediaType", "the body is of an unknown type", got=media_type, expected=f"{JSON} or {FORM}"
+        )
+    try:
+        return kind.model_validate_json(body or b"{}", strict=True)
+    except ValidationError as error:
+        raise _refused(error.errors()[0]) from error
+
+
+def _form_as_json(kind: type[BaseModel], body: bytes) -> bytes:
+    """A form as JSON: texts as they are, all other fields as JSON has them; an empty one is null."""
+    try:
+        pairs = parse_qsl(body.decode(), keep_blank_values=True, errors="strict", max_num_fields=MOST_FIELDS)
+    except ValueError as error:
+        raise Refusal(400, "MalformedBody", f"the form cannot be read: {error}") from error
+    if len(dict(pairs)) < len(pairs):
+        raise Refusal(400, "MalformedBody", "a field of the form is there twice", got=sorted(name for name, _ in pairs))
+    values = {name: value if _is_text(kind, name, value) else _value(value) for name, value in pairs}
+    return json.dumps(values).encode(errors="replace")
+
+
+def _is_text(kind: type[BaseModel], name: str, value: str) -> bool:
+    field = kind.model_fields.get(name)
+    return field is None or field.annotation is str or (field.annotation == str | None and value != "")
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text) if text else None
+    except (ValueError, RecursionError):
+        return text
+
+
+def _refused(error: ErrorDetails) -> Refusal:
+    """What is wrong with a body, by the name of its field."""
+    field = ".".join(map(str, error["loc"])) or None
+    own = error.get("ctx", {}).get("error")
+    if isinstance(own, IsiwError):
+        return Refusal(
+            422, type(own).__name__, own.what, got=own.got, expected=own.expected, remedy=own.remedy, field=field
+        )
+    if error["type"] == "json_invalid":
+        return Refusal(400, "MalformedBody", "the body is no JSON", expected=error["msg"])
+    return Refusal(
+        422,
+        "InvalidValueError",
+        f"the field {field} cannot be used" if field else "the body cannot be used",
+        got=None if error["type"] == "missing" else error["input"],
+        expected=error["msg"],
+        field=field,
+    )

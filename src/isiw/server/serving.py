@@ -1,0 +1,130 @@
+"""Serving a folder of sessions: to this computer alone, unless a certificate makes it safe for others to ask."""
+
+from __future__ import annotations
+
+import ipaddress
+import secrets
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+import uvicorn
+
+from isiw.checks import check_texts, check_wholes
+from isiw.errors import ConfigError
+from isiw.server.app import make_app
+from isiw.server.guard import LOOPBACK, Rules
+
+__all__ = ["ServerSettings", "serve"]
+
+PORT: Final = 8473
+
+_MOST_CONNECTIONS: Final = 200
+_LEAVING_S: Final = 2
+
+
+def _new_token() -> str:
+    return secrets.token_urlsafe(32)
+
+
+@dataclass(frozen=True)
+class ServerSettings:
+    """Where and how a folder of sessions is served.
+
+    Args:
+        folder: where the logs are.
+        host: the address to listen at, or localhost.
+        port: the port; 0 for any that is free.
+        token: what every request must carry; by default a random one.
+        certificate: the file of a TLS certificate, needed for any other address than this computer's own.
+        key: the file of its key.
+
+    Raises:
+        ConfigError: another address without certificate and key, or a host that is no address.
+        InvalidValueError: no port, or a token that cannot be used.
+    """
+
+    folder: Path
+    host: str = "127.0.0.1"
+    port: int = PORT
+    token: str = field(default_factory=_new_token, repr=False)
+    certificate: Path | None = None
+    key: Path | None = None
+
+    def __post_init__(self) -> None:
+        check_texts(self, "host")
+        check_wholes(self, "port", least=0, most=65535)
+        if (self.certificate is None) != (self.key is None):
+            raise ConfigError("a certificate and its key belong together", remedy="Give both files, or neither.")
+        if not self.address.is_loopback and self.certificate is None:
+            raise ConfigError(
+                "other computers may reach the server only with TLS",
+                got=self.host,
+                remedy="Give a certificate and its key, or leave the host out: 127.0.0.1.",
+            )
+        self.rules()
+
+    @property
+    def address(self) -> ipaddress.IPv4Address | ipaddress.IPv6Address:
+        """The address to listen at."""
+        try:
+            return ipaddress.ip_address("127.0.0.1" if self.host == "localhost" else self.host)
+        except ValueError as error:
+            raise ConfigError(
+                "the host is no address", got=self.host, expected="an IP address of this computer, or localhost"
+            ) from error
+
+    def rules(self) -> Rules:
+        """What is let through: under this computer's own names, and the address and names by which others ask."""
+        others = {self.host, socket.gethostname().lower(), socket.getfqdn().lower()}
+        return Rules(self.token, hosts=LOOPBACK if self.address.is_loopback else LOOPBACK | others)
+
+
+def serve(settings: ServerSettings, ready: Callable[[str], None]) -> None:
+    """Serve until Ctrl-C or TERM; then every open log is closed.
+
+    Args:
+        settings: where and how.
+        ready: called with the server's address (URL) once it can be reached.
+
+    Raises:
+        ConfigError: the port is taken, or the address is not this computer's.
+    """
+    app = make_app(settings.folder, settings.rules())
+    with _listening(settings) as listener:
+        host, port, *_ = listener.getsockname()
+        name = f"[{host}]" if settings.address.version == 6 else host
+        config = uvicorn.Config(
+            app,
+            http="h11",
+            ws="none",
+            log_level="error",
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,
+            limit_concurrency=_MOST_CONNECTIONS,
+            timeout_graceful_shutdown=_LEAVING_S,
+            ssl_certfile=settings.certificate,
+            ssl_keyfile=settings.key,
+        )
+        config.load()  # which reads certificate and key
+        ready(f"{'https' if settings.certificate else 'http'}://{name}:{port}")
+        uvicorn.Server(config).run(sockets=[listener])
+
+
+def _listening(settings: ServerSettings) -> socket.socket:
+    family = socket.AF_INET6 if settings.address.version == 6 else socket.AF_INET
+    try:
+        listener = socket.create_server(
+            (str(settings.address), settings.port), family=family, backlog=_MOST_CONNECTIONS
+        )
+    except OSError as error:
+        raise ConfigError(
+            f"the server cannot listen: {error.strerror}",
+            got=f"{settings.host}, port {settings.port}",
+            remedy="Choose another port; 0 takes any that is free.",
+        ) from error
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # or each answer waits 40 ms for the one before
+    return listener

@@ -1,0 +1,310 @@
+"""The sessions of a folder: each is a log, and those that are open can be driven."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+from isiw.devices.limits import Limits
+from isiw.errors import IsiwError
+from isiw.log.durable import log_of, part_of
+from isiw.log.reader import SessionRecord, read_session
+from isiw.server.answers import DecisionAnswer, EstimateAnswer, SessionAnswer, SessionEntry, TrialRow
+from isiw.server.driven import DrivenSession, not_open
+from isiw.server.refusals import Refusal
+from isiw.server.requests import NAME, CreateRequest
+from isiw.session.recorder import open_session
+from isiw.session.replay import strategy_of
+from isiw.strategy.catalogue import make_strategy
+
+__all__ = ["Sessions"]
+
+REQUEST_KEY: Final = "isiw_serve"
+"""The name under which a log keeps the request that began it."""
+
+MOST_OPEN: Final = 20
+
+
+class Sessions:
+    """The sessions of a folder. Safe to use from several threads.
+
+    Args:
+        folder: where their logs are; made where it is missing.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._folder = folder.resolve()
+        self._open: dict[str, DrivenSession] = {}
+        self._opening: set[str] = set()
+        self._lock = threading.Lock()
+
+    def names(self) -> list[SessionEntry]:
+        """All sessions of the folder."""
+        found = {log_of(path).stem for pattern in ("*.mcap", "*.mcap.part") for path in self._folder.glob(pattern)}
+        with self._lock:
+            opened = set(self._open)
+        return [SessionEntry(id=name, open=name in opened) for name in sorted(found) if re.fullmatch(NAME, name)]
+
+    def opened(self, name: str) -> DrivenSession:
+        """An open session.
+
+        Args:
+            name: its id.
+
+        Raises:
+            Refusal: there is none, or it is not open.
+        """
+        with self._lock:
+            session = self._open.get(name)
+        if session is not None:
+            return session
+        self._existing(name)
+        raise not_open(name)
+
+    @contextmanager
+    def driving(self, name: str) -> Iterator[DrivenSession]:
+        """Within, nobody else drives an open session.
+
+        Args:
+            name: its id.
+
+        Raises:
+            Refusal: there is none, or it is not open, or busy.
+        """
+        session = self.opened(name)
+        try:
+            with session.alone():
+                yield session
+        finally:
+            if session.closed:
+                self._forget(session)
+
+    def create(self, request: CreateRequest) -> SessionAnswer:
+        """Begin a session; the same request once more is answered as at first, as long as nothing was asked for.
+
+        Args:
+            request: its id, and the sections of its configuration.
+
+        Raises:
+            Refusal: there is another session with this id.
+            IsiwError: its strategy cannot be made, or its log not written.
+        """
+        path = self._path(request.id)
+        if path.exists() or part_of(path).exists():
+            self._require_same_beginning(request)
+            return self.resume(request.id)
+        with self._opened_as(request.id):
+            return self._begin(request)
+
+    def resume(self, name: str, lost_pulses: int | None = None) -> SessionAnswer:
+        """Go on with a session; what was asked for and has no outcome becomes a mistrial, as nobody knows of it.
+
+        Args:
+            name: its id.
+            lost_pulses: as for `isiw.open_session`.
+
+        Raises:
+            Refusal: there is no such session.
+            IsiwError: its log cannot be read or written, or its strategy not made again.
+        """
+        with suppress(_NotOpenError), self._driving_if_open(name) as session:
+            session.give_up()
+            return session.stands()
+        with self._opened_as(name):
+            return self._resume(name, read_session(self._existing(name)), lost_pulses)
+
+    def close(self, name: str) -> SessionAnswer:
+        """Close a session; one that is closed already stays so.
+
+        Args:
+            name: its id.
+
+        Raises:
+            Refusal: there is no such session, or it is busy.
+            LogError: its log cannot be closed.
+        """
+        with suppress(_NotOpenError), self._driving_if_open(name) as session:
+            return session.close()
+        return self.stands(name)
+
+    def close_all(self) -> None:
+        """Close all sessions, as the server ends."""
+        for name in list(self._open):
+            with suppress(IsiwError):
+                self.close(name)
+
+    def stands(self, name: str) -> SessionAnswer:
+        """How a session stands, open or not.
+
+        Args:
+            name: its id.
+        """
+        with suppress(_NotOpenError), self._driving_if_open(name) as session:
+            return session.stands()
+        record = self.record(name)
+        decision, unknown = record.decision, record.unknown
+        return SessionAnswer(
+            id=name,
+            open=False,
+            subject=record.header.subject,
+            trials=len(record.table),
+            told=len(record.table.told),
+            open_trial=unknown[-1].trial if unknown else None,
+            open_isi_ms=unknown[-1].isi_ms if unknown else None,
+            stop=decision is not None and decision.stop,
+            reason=decision.reason if decision else "Nothing was told yet.",
+        )
+
+    def trials(self, name: str) -> list[TrialRow]:
+        """The trials of a session, open or not.
+
+        Args:
+            name: its id.
+        """
+        with suppress(_NotOpenError), self._driving_if_open(name) as session:
+            return session.trials()
+        return [TrialRow.of(trial) for trial in self.record(name).table]
+
+    def estimate(self, name: str) -> EstimateAnswer:
+        """What is believed about the window, in a session that is open or not.
+
+        Args:
+            name: its id.
+
+        Raises:
+            Refusal: it is not open, and nothing was told.
+        """
+        with suppress(_NotOpenError), self._driving_if_open(name) as session:
+            return session.estimate()
+        if not (estimates := self.record(name).estimates):
+            raise not_open(name)
+        return EstimateAnswer.of(estimates[-1])
+
+    def decision(self, name: str) -> DecisionAnswer:
+        """Whether to stop a session, and why.
+
+        Args:
+            name: its id.
+        """
+        stands = self.stands(name)
+        return DecisionAnswer(stop=stands.stop, reason=stands.reason)
+
+    def record(self, name: str) -> SessionRecord:
+        """What is in a session's log by now.
+
+        Args:
+            name: its id.
+        """
+        return read_session(self._existing(name))
+
+    @contextmanager
+    def _driving_if_open(self, name: str) -> Iterator[DrivenSession]:
+        with self._lock:
+            is_open = name in self._open
+        if not is_open:
+            raise _NotOpenError
+        with self.driving(name) as session:
+            yield session
+
+    @contextmanager
+    def _opened_as(self, name: str) -> Iterator[None]:
+        """Within, nobody else opens a session of this name."""
+        with self._lock:
+            if name in self._opening or name in self._open:
+                raise Refusal(409, "Busy", "the session is being opened", got=name, retry_s=1.0)
+            if len(self._open) + len(self._opening) >= MOST_OPEN:
+                raise Refusal(
+                    409, "TooManyOpen", "too many sessions are open", expected=f"at most {MOST_OPEN}",
+                    remedy="Close one that is over.",
+                )  # fmt: skip
+            self._opening.add(name)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._opening.discard(name)
+
+    def _begin(self, request: CreateRequest) -> SessionAnswer:
+        space, doubts = request.space.design(), list[str]()
+        recorder = open_session(
+            make_strategy(request.strategy.name, space=space, seed=request.seed, **request.strategy.settings),
+            self._path(request.id),
+            limits=dataclasses.replace(Limits.of_space(space), **request.limits.model_dump()),
+            subject=request.visit.subject,
+            visit=request.visit.noted(),
+            protocol=request.protocol,
+            config={REQUEST_KEY: _kept(request)},
+            on_doubt=doubts.append,
+        )
+        return self._take(DrivenSession(request.id, request.visit.subject, recorder, doubts))
+
+    def _require_same_beginning(self, request: CreateRequest) -> None:
+        """Raise where the session with this id is another one, or goes on already."""
+        record = self.record(request.id)
+        if record.intents or record.header.config.get(REQUEST_KEY) != _kept(request):
+            raise Refusal(
+                409, "Exists", "there is a session with this id", got=request.id,
+                remedy="Choose another id, or resume it.", field="id",
+            )  # fmt: skip
+
+    def _resume(self, name: str, record: SessionRecord, lost_pulses: int | None) -> SessionAnswer:
+        header, doubts = record.header, list[str]()
+        recorder = open_session(
+            strategy_of(header),
+            self._existing(name),
+            resume=True,
+            limits=header.limits,
+            config=header.config,
+            lost_pulses=lost_pulses,
+            on_doubt=doubts.append,
+        )
+        return self._take(DrivenSession(name, header.subject, recorder, doubts, record))
+
+    def _take(self, session: DrivenSession) -> SessionAnswer:
+        try:
+            stands = session.stands()
+        except BaseException:
+            session.recorder.close()
+            raise
+        with self._lock:
+            self._open[session.name] = session
+        return stands
+
+    def _forget(self, session: DrivenSession) -> None:
+        with self._lock:
+            if self._open.get(session.name) is session:
+                del self._open[session.name]
+
+    def _path(self, name: str) -> Path:
+        """Where the log of a session is, which is in the folder itself whatever its name.
+
+        Raises:
+            Refusal: no possible name, or a link out of the folder.
+        """
+        if not re.fullmatch(NAME, name):
+            raise Refusal(404, "NoSuchSession", "there is no such session", got=name)
+        path = self._folder / f"{name}.mcap"
+        if path.is_symlink() or part_of(path).is_symlink():
+            raise Refusal(403, "SymbolicLink", "the log is a symbolic link, which is not followed", got=name)
+        return path
+
+    def _existing(self, name: str) -> Path:
+        path = self._path(name)
+        if not (path.is_file() or part_of(path).is_file()):
+            raise Refusal(404, "NoSuchSession", "there is no such session", got=name, remedy="Create it first.")
+        return path
+
+
+class _NotOpenError(Exception):
+    """The session is not open."""
+
+
+def _kept(request: CreateRequest) -> str:
+    """A request as a log can keep it: in TOML there is no null."""
+    return request.model_dump_json()

@@ -1,0 +1,73 @@
+"""The MATLAB client, run by GNU Octave against a real server."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import httpx
+import pytest
+
+from isiw.log.reader import read_session
+from server.serving import TOKEN, client_of
+
+CLIENT = Path(__file__).parents[2] / "clients" / "matlab"
+OCTAVE = shutil.which("octave-cli") or ""
+
+pytestmark = pytest.mark.skipif(not OCTAVE, reason="needs GNU Octave (octave-cli)")
+
+
+def octave(client: httpx.Client, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(  # noqa: S603 - our own script
+        [OCTAVE, "--quiet", "--path", str(CLIENT), *arguments],
+        env=os.environ | {"ISIW_URL": str(client.base_url), "ISIW_TOKEN": TOKEN},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+def test_the_example_of_forty_lines_runs_and_its_log_has_what_the_rig_delivered(tmp_path: Path) -> None:
+    script = (CLIENT / "example.m").read_text("utf-8")
+    assert len([line for line in script.splitlines() if line.strip()]) <= 40
+    with client_of(tmp_path) as client:
+        ran = octave(client, str(CLIENT / "example.m"))
+    assert ran.returncode == 0, ran.stderr
+    rows = [line.split() for line in ran.stdout.splitlines() if line[0].isdecimal()]
+    delivered = [(int(trial), float(isi_ms), float(mep_mv)) for trial, isi_ms, mep_mv, hit in rows if hit == "1"]
+    record = read_session(tmp_path / "P07.mcap")
+    assert [(trial.index, trial.isi_ms, trial.mep_mv) for trial in record.table.told] == delivered
+    assert record.table[2].reason == "no impact"
+    assert record.finished
+    notes = [event.text for event in record.events if event.kind == "note"]
+    assert [note.partition(" (key ")[0] for note in notes] == ["coil at 5 mm; a = b & c, 12 µV"]
+
+
+REFUSED = """
+lab = isiw(getenv('ISIW_URL'), 'not the token');
+try, lab.create('P07'); catch problem, disp(problem.identifier); end
+lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+try, lab.resume('P07'); catch problem, disp(problem.identifier); end
+lab.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr')));
+[trial, isi_ms] = lab.ask();
+try, lab.ask(); catch problem, disp(problem.identifier); end
+try, lab.tell(trial, isi_ms, NaN); catch problem, disp(problem.message); end
+lab.tell(trial, isi_ms, 0.1);
+lab.tell(trial, isi_ms, 0.1);
+lab.tell(lab.trials, [], 0.02);
+lab.resume('P07');
+disp(lab.trials);
+"""
+
+
+def test_what_is_refused_is_an_error_in_words_and_can_be_put_right(tmp_path: Path) -> None:
+    (tmp_path / "refused.m").write_text(REFUSED)
+    with client_of(tmp_path / "sessions") as client:
+        ran = octave(client, str(tmp_path / "refused.m"))
+    assert ran.returncode == 0, ran.stderr
+    first, second, third, words, trials = ran.stdout.splitlines()
+    assert (first, second, third, trials.strip()) == ("isiw:Unauthorized", "isiw:NoSuchSession", "isiw:TrialOpen", "2")
+    assert "mep_mv" in words

@@ -1,0 +1,283 @@
+"""Sessions over HTTP: the same logs as any other, and nothing is told twice or lost."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError, LogError
+from isiw.log.reader import read_session
+from isiw.session.journal import Journal
+from isiw.strategy.catalogue import make_strategy
+from isiw.trials import MistrialReason
+from server.serving import PLAN, SETTINGS, SPACE, client_of, created, done, mep_mv, refused, told
+
+
+@pytest.fixture
+def client(tmp_path: Path) -> Iterator[httpx.Client]:
+    with client_of(tmp_path) as client:
+        yield client
+
+
+@pytest.fixture
+def session(client: httpx.Client) -> str:
+    return created(client)
+
+
+def test_a_whole_session_leaves_the_log_of_a_session(client: httpx.Client, session: str, tmp_path: Path) -> None:
+    asked = told(client, session, 6)
+    assert done(client.get(f"{session}/decision"))["stop"] is True
+    closed = done(client.post(f"{session}/close"))
+    assert (closed["open"], closed["trials"]) == (False, 6)
+    record = read_session(tmp_path / "P07.mcap")
+    assert record.finished
+    assert (record.header.subject, record.header.visit.muscle) == ("P07", "FCR")
+    assert [trial.isi_ms for trial in record.table.told] == asked
+
+
+def test_it_asks_what_the_same_strategy_asks_in_process(client: httpx.Client, session: str) -> None:
+    alone = make_strategy("even", space=DesignSpace(**SPACE), seed=7, **SETTINGS)  # type: ignore[arg-type]
+    asked = []
+    for _ in range(4):
+        asked.append(alone.ask())
+        alone.tell(asked[-1], mep_mv(asked[-1]))
+    assert told(client, session, 4) == asked
+
+
+def test_the_intent_is_on_disk_before_the_answer(client: httpx.Client, session: str, tmp_path: Path) -> None:
+    answer = done(client.post(f"{session}/ask"))
+    assert [intent.isi_ms for intent in read_session(tmp_path / "P07.mcap").intents] == [answer["isi_ms"]]
+
+
+def test_an_open_trial_is_asked_for_again_only_by_its_number_as_it_may_have_been_delivered(
+    client: httpx.Client, session: str
+) -> None:
+    first = done(client.post(f"{session}/ask"))
+    assert first["again"] is False
+    error = refused(client.post(f"{session}/ask"), 409, "TrialOpen")
+    assert "trial=0" in error["remedy"]
+    assert done(client.post(f"{session}/ask", json={"trial": 0})) == {**first, "again": True}
+    refused(client.post(f"{session}/ask", json={"trial": 1}), 409, "WrongTrial")
+
+
+def test_the_same_outcome_told_again_is_one_trial_and_answered_as_at_first(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    outcome = {"trial": 0, "isi_ms": done(client.post(f"{session}/ask"))["isi_ms"], "mep_mv": 0.1}
+    first = done(client.post(f"{session}/tell", json=outcome))
+    told(client, session, 2)
+    assert done(client.post(f"{session}/tell", json=outcome)) == first
+    assert len(read_session(tmp_path / "P07.mcap").table) == 3
+
+
+def test_another_outcome_is_refused_with_what_is_recorded(client: httpx.Client, session: str) -> None:
+    isi_ms = told(client, session, 1)[0]
+    error = refused(
+        client.post(f"{session}/tell", json={"trial": 0, "isi_ms": isi_ms, "mep_mv": 0.9}), 409, "OtherOutcome"
+    )
+    assert f"isi_ms={isi_ms}" in error["expected"]
+    refused(client.post(f"{session}/mistrial", json={"trial": 0}), 409, "OtherOutcome")
+
+
+def test_a_mistrial_counts_with_its_reason_and_is_one_when_told_again(client: httpx.Client, session: str) -> None:
+    done(client.post(f"{session}/ask"))
+    lost = {"trial": 0, "reason": "no impact"}
+    first = done(client.post(f"{session}/mistrial", json=lost))
+    assert (first["status"], first["reason"]) == ("mistrial", "no impact")
+    assert done(client.post(f"{session}/mistrial", json=lost)) == first
+    assert done(client.get(session))["trials"] == 1
+
+
+def test_what_was_not_asked_for_has_no_outcome(client: httpx.Client, session: str) -> None:
+    refused(client.post(f"{session}/tell", json={"trial": 0, "isi_ms": 50, "mep_mv": 0.1}), 409, "NotAsked")
+    refused(client.post(f"{session}/mistrial", json={"trial": 0}), 409, "NotAsked")
+    done(client.post(f"{session}/ask"))
+    refused(client.post(f"{session}/tell", json={"trial": 1, "isi_ms": 50, "mep_mv": 0.1}), 409, "NotAsked")
+
+
+def test_tms_alone_is_told_without_being_asked(client: httpx.Client, session: str, tmp_path: Path) -> None:
+    alone = {"trial": 0, "isi_ms": None, "mep_mv": 0.02}
+    first = done(client.post(f"{session}/tell", json=alone))
+    assert done(client.post(f"{session}/tell", json=alone)) == first
+    assert read_session(tmp_path / "P07.mcap").table[0].commanded_isi_ms is None
+
+
+def test_a_slip_is_refused_by_its_field_and_can_be_put_right(client: httpx.Client, session: str) -> None:
+    isi_ms = done(client.post(f"{session}/ask"))["isi_ms"]
+    missing = refused(client.post(f"{session}/tell", json={"trial": 0, "isi_ms": isi_ms}), 422, "InvalidValueError")
+    assert missing["field"] == "mep_mv"
+    text = {"trial": 0, "isi_ms": isi_ms, "mep_mv": "0.1"}
+    assert refused(client.post(f"{session}/tell", json=text), 422, "InvalidValueError")["field"] == "mep_mv"
+    refused(client.post(f"{session}/tell", json={**text, "mep_mv": 2e-5}), 422, "InvalidValueError")
+    refused(client.post(f"{session}/tell", json={**text, "isi_ms": 900.0, "mep_mv": 0.1}), 422, "OutOfSpaceError")
+    done(client.post(f"{session}/tell", json={**text, "mep_mv": 0.1}))
+
+
+def test_doubts_come_with_the_answer_and_are_logged(client: httpx.Client, session: str, tmp_path: Path) -> None:
+    for number in range(3):
+        done(client.post(f"{session}/ask"))
+        answer = done(client.post(f"{session}/mistrial", json={"trial": number, "reason": "no impact"}))
+    assert "air supply" in answer["doubts"][0]
+    assert [event.kind for event in read_session(tmp_path / "P07.mcap").events] == ["doubt"]
+
+
+def test_the_inter_trial_interval_is_waited_for_or_the_client_told_how_long_it_is(client: httpx.Client) -> None:
+    session = created(client, limits={"min_iti_s": 0.3})
+    begun_s = time.monotonic()
+    done(client.post(f"{session}/ask"))
+    assert time.monotonic() - begun_s > 0.25
+    done(client.post(f"{session}/mistrial", json={"trial": 0}))
+    response = client.post(f"{session}/ask", json={"wait_s": 0})
+    assert 0 < refused(response, 429, "TooEarly")["retry_s"] <= 0.3
+    assert response.headers["Retry-After"] == "1"
+    assert done(client.get(session))["open_trial"] is None
+
+
+def test_limits_hold_and_their_refusal_keeps_the_session_open(client: httpx.Client) -> None:
+    session = created(client, limits={"min_iti_s": 0.0, "max_pulses": 2})
+    told(client, session, 2)
+    refused(client.post(f"{session}/ask"), 409, "LimitExceededError")
+    assert done(client.get(session))["open"] is True
+
+
+def test_without_limits_those_of_a_configuration_file_hold(client: httpx.Client) -> None:
+    begun = done(client.post("/sessions", json={"id": "P08", "strategy": {"settings": {"particles": 50}}}))
+    assert begun["wait_s"] > 4
+    refused(client.post("/sessions/P08/ask", json={"wait_s": 0.0}), 429, "TooEarly")
+
+
+def test_an_excluded_trial_counts_again_once_it_is_included_and_both_may_be_repeated(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    told(client, session, 3)
+    for _ in range(2):
+        assert done(client.post(f"{session}/exclude", json={"trial": 1, "reason": "cough"}))["told"] == 2
+    assert [row["excluded"] for row in done(client.get(f"{session}/trials"))["trials"]] == [False, True, False]
+    for _ in range(2):
+        assert done(client.post(f"{session}/include", json={"trial": 1}))["told"] == 3
+    refused(client.post(f"{session}/exclude", json={"trial": 9}), 422, "InvalidValueError")
+    assert [event.kind for event in read_session(tmp_path / "P07.mcap").events] == ["exclusion", "inclusion"]
+
+
+def test_a_note_with_a_key_is_logged_once_also_after_resuming(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    remark = {"text": "coil moved: 1 = 2 & 5 µV", "key": "n1"}
+    for _ in range(2):
+        done(client.post(f"{session}/note", json=remark))
+    done(client.post(f"{session}/close"))
+    done(client.post(f"{session}/resume"))
+    done(client.post(f"{session}/note", json=remark))
+    notes = [event.text for event in read_session(tmp_path / "P07.mcap").events if event.kind == "note"]
+    assert notes == ["coil moved: 1 = 2 & 5 µV (key n1)"]
+
+
+def test_the_same_creation_once_more_is_answered_as_at_first_until_something_was_asked(client: httpx.Client) -> None:
+    begun = done(client.post("/sessions", json=PLAN))
+    assert done(client.post("/sessions", json=PLAN)) == begun
+    refused(client.post("/sessions", json={**PLAN, "seed": 8}), 409, "Exists")
+    told(client, "/sessions/P07", 1)
+    assert "resume" in refused(client.post("/sessions", json=PLAN), 409, "Exists")["remedy"]
+
+
+def test_a_closed_session_can_be_looked_at_and_goes_on_once_it_is_resumed(client: httpx.Client, session: str) -> None:
+    told(client, session, 3)
+    estimate = done(client.get(f"{session}/estimate"))
+    rows = done(client.get(f"{session}/trials"))
+    for _ in range(2):
+        assert done(client.post(f"{session}/close"))["open"] is False
+    assert done(client.get(f"{session}/estimate")) == estimate
+    assert done(client.get(f"{session}/trials")) == rows
+    refused(client.post(f"{session}/ask"), 409, "NotOpen")
+    assert done(client.post(f"{session}/resume"))["trials"] == 3
+    assert len(told(client, session, 1)) == 1
+
+
+def test_after_a_restart_the_limits_hold_that_were_logged(tmp_path: Path) -> None:
+    with client_of(tmp_path) as client:
+        session = created(client, limits={"min_iti_s": 0.0, "max_pulses": 3})
+        told(client, session, 3)
+    with client_of(tmp_path) as client:
+        assert done(client.get("/sessions"))["sessions"] == [{"id": "P07", "open": False}]
+        done(client.post(f"{session}/resume"))
+        refused(client.post(f"{session}/ask"), 409, "LimitExceededError")
+
+
+def test_who_resumes_an_open_session_does_not_know_what_came_of_its_open_trial(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    isi_ms = done(client.post(f"{session}/ask"))["isi_ms"]
+    assert done(client.post(f"{session}/resume"))["trials"] == 1
+    late = {"trial": 0, "isi_ms": isi_ms, "mep_mv": 0.1}
+    for _ in range(2):
+        assert "note" in refused(client.post(f"{session}/tell", json=late), 409, "Late")["remedy"]
+    record = read_session(tmp_path / "P07.mcap")
+    assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert [event.text for event in record.events] == [
+        f"An outcome of trial 0 came too late and is not used: isi_ms={isi_ms} mep_mv=0.1"
+    ]
+
+
+def test_what_breaks_a_log_closes_its_session(
+    client: httpx.Client, session: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise LogError("the log cannot be written: no space left")
+
+    monkeypatch.setattr(Journal, "intent", full)
+    refused(client.post(f"{session}/ask"), 409, "LogError")
+    monkeypatch.undo()
+    refused(client.post(f"{session}/ask"), 409, "NotOpen")
+    assert done(client.post(f"{session}/resume"))["open"] is True
+
+
+def test_a_trial_that_was_logged_and_could_not_be_learnt_closes_its_session(
+    client: httpx.Client, session: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refusing(*_: object) -> None:
+        raise InvalidValueError("not to be learnt")
+
+    isi_ms = done(client.post(f"{session}/ask"))["isi_ms"]
+    outcome = {"trial": 0, "isi_ms": isi_ms, "mep_mv": 0.1}
+    monkeypatch.setattr("isiw.session.recorder.learn", refusing)
+    refused(client.post(f"{session}/tell", json=outcome), 422, "InvalidValueError")
+    monkeypatch.undo()
+    refused(client.post(f"{session}/tell", json=outcome), 409, "NotOpen")
+    done(client.post(f"{session}/resume"))
+    assert done(client.post(f"{session}/tell", json=outcome))["mep_mv"] == 0.1
+
+
+def test_what_nobody_foresaw_is_an_answer_in_words(
+    client: httpx.Client, session: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(Journal, "intent", broken)
+    assert "ZeroDivisionError" in refused(client.post(f"{session}/ask"), 500, "InternalError")["message"]
+
+
+def test_only_so_many_sessions_are_open_at_once(client: httpx.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("isiw.server.sessions.MOST_OPEN", 1)
+    session = created(client, "A")
+    refused(client.post("/sessions", json={**PLAN, "id": "B"}), 409, "TooManyOpen")
+    done(client.post(f"{session}/close"))
+    created(client, "B")
+
+
+@pytest.mark.parametrize(("kind", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_a_session_is_drawn(client: httpx.Client, session: str, kind: str, begins: bytes) -> None:
+    told(client, session, 3)
+    picture = client.get(f"{session}/picture", params={"format": kind})
+    assert (picture.status_code, picture.content[:5]) == (200, (begins + picture.content[4:5])[:5])
+
+
+def test_what_is_believed_can_be_asked_for_before_anything_is_told(client: httpx.Client, session: str) -> None:
+    estimate = done(client.get(f"{session}/estimate"))
+    assert len(estimate["grid_ms"]) == len(estimate["profile_mv"]) == 201
+    assert done(client.get(f"{session}/decision"))["stop"] is False

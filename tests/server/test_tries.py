@@ -1,0 +1,24 @@
+"""What the benchmark does to a server in a process of its own, on a smaller scale."""
+
+from __future__ import annotations
+
+import os
+import random
+from pathlib import Path
+
+import pytest
+from benchmarks.server_tries import Served, fuzzed, killed
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="the server is a fork")
+
+
+def test_malformed_requests_neither_fail_the_server_nor_change_a_session(tmp_path: Path) -> None:
+    with Served(tmp_path) as served:
+        _, _, answers = fuzzed(served, 300, random.Random(1))  # noqa: S311 - no secret
+    assert sum(answers.values()) == 300
+    assert {"400", "401", "403", "404", "405", "413", "415", "422"} <= set(answers)
+
+
+@pytest.mark.slow
+def test_a_server_that_is_killed_at_random_loses_and_doubles_nothing(tmp_path: Path) -> None:
+    assert "None is missing" in killed(tmp_path, 20, random.Random(1))  # noqa: S311 - no secret
