@@ -103,6 +103,7 @@ def _write_run(stem: Path, run: Run, onsets_s: Mapping[int, float], part: Part) 
     _json(Path(f"{stem}_emg.json"), _sidecar(run, part))
     _tsv(Path(f"{stem}_channels.tsv"), pd.DataFrame(run.channels))
     _tsv(Path(f"{stem}_events.tsv"), pd.DataFrame(run.events(onsets_s)))
+    _json(Path(f"{stem}_events.json"), _described(emg.EVENT_COLUMNS))
 
 
 def _sidecar(run: Run, part: Part) -> dict[str, Any]:
@@ -131,7 +132,6 @@ def _said(what: str, text: str) -> str:
 def _write_heads(folder: Path, parts: Sequence[Part], lacking: Iterable[str]) -> None:
     trials = {"trial": ("", "its number"), **TRIAL_COLUMNS}
     _json(folder / f"task-{TASK}_beh.json", _TASK | _described(trials))
-    _json(folder / f"task-{TASK}_events.json", _described(emg.EVENT_COLUMNS))
     _json(folder / "sessions.json", _described(SESSION_COLUMNS))
     _json(folder / "participants.json", _described(_PEOPLE))
     _json(

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from isiw.errors import InvalidValueError, LogError, told
+from isiw.errors import InvalidValueError, LogError
 from isiw.log.durable import log_of
 from isiw.log.reader import SessionRecord, read_session
 
@@ -51,7 +51,7 @@ def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
         try:
             records.append(read_session(log))
         except LogError as error:
-            unreadable.append(f"{log.name} is left out: {told(error)}")
+            unreadable.append(f"{log.name} is left out: {error.what}.")
     if not records:
         what = "no log in the folder can be read" if unreadable else "there is no log in the folder"
         raise LogError(what, got=str(source), expected="files called .mcap or .mcap.part")

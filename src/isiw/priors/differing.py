@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from isiw.errors import InvalidValueError, told
+from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord
 from isiw.models.particles.prior import Prior
 from isiw.priors.days import moved
@@ -94,7 +94,7 @@ def _moved(first: SessionRecord, second: SessionRecord) -> tuple[float | None, s
     try:
         return moved(earlier, later), ""
     except InvalidValueError as error:  # with the first day known, there is probably no window on the second
-        return None, told(error)
+        return None, error.what
 
 
 def _later(first_ms: FloatArray, second_ms: FloatArray) -> float:
