@@ -71,7 +71,7 @@ def test_export_obeys_nothing_that_a_log_says_to_the_terminal(isiw: Command, tmp
 
 def test_compare_prints_the_windows_and_draws_them(isiw: Command, tmp_path: Path) -> None:
     for number, name in enumerate(("first", "second")):
-        write_log(tmp_path / f"{name}.mcap", gaussian_person(), trials=8, seed=number)
+        write_log(tmp_path / f"{name}.mcap", gaussian_person(), trials=4, seed=number)
     result = isiw("compare", "first.mcap", "second.mcap", "-o", "c.png")
     assert result.exit_code == 0, result.output
     assert result.output.count("P1 ") >= 2

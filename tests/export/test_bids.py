@@ -155,10 +155,10 @@ def test_sweeps_of_another_length_are_another_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "other",
     [
-        Channel([1.0, 2.0], 3000.0, "V", -50.0),
+        Channel(np.ones(2), 3000.0, "V", -50.0),
         Channel(np.ones(SAMPLES), 1500.0, "V", -50.0),
         Channel(np.ones(SAMPLES), 3000.0, "V", 0.0),
-        Channel([float("nan")] * SAMPLES, 3000.0, "V", -50.0),
+        Channel(np.full(SAMPLES, np.nan), 3000.0, "V", -50.0),
     ],
     ids=["length", "rate", "begin", "not finite"],
 )

@@ -6,12 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from isiw.design import IMPACT_SPACE
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord, read_session
-from isiw.priors import Difference, differences, moved
+from isiw.priors import Difference, differences
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse
 from isiw.subjects.subject import SimulatedSubject
@@ -50,12 +51,9 @@ def test_a_window_that_is_later_is_said_to_be_later(found: list[Difference]) -> 
     assert known(found[0].ends_later) > 0.95
 
 
-def test_only_of_the_same_person_it_is_said_whether_the_window_moved(
-    found: list[Difference], records: list[SessionRecord]
-) -> None:
+def test_only_of_the_same_person_it_is_said_whether_the_window_moved(found: list[Difference]) -> None:
     assert [difference.same_person for difference in found] == [False, True, False, True]
     assert found[0].moved is None
-    assert found[1].moved == moved(records[0], records[2])
     assert known(found[1].moved) > 0.9
     assert known(found[3].moved) < 0.3
 
@@ -71,8 +69,8 @@ def test_of_a_session_without_a_window_nothing_is_said_but_why(found: list[Diffe
 
 
 def test_sessions_without_a_code_are_not_taken_for_one_person(records: list[SessionRecord]) -> None:
-    nameless = [replace(each, header=each.header.model_copy(update={"subject": ""})) for each in records[::2][:2]]
-    assert not differences(nameless)[0].same_person
+    nameless = replace(records[0], header=records[0].header.model_copy(update={"subject": ""}), history=())
+    assert not differences([nameless, nameless])[0].same_person
 
 
 def test_the_earlier_day_comes_first_however_the_logs_are_given(
@@ -85,6 +83,7 @@ def test_the_earlier_day_comes_first_however_the_logs_are_given(
         return 0.5
 
     monkeypatch.setattr("isiw.priors.differing.moved", note)
+    monkeypatch.setattr("isiw.priors.differing._edges", lambda _: np.zeros((1, 2)))
     earlier = records[0].header.model_copy(update={"created": "2026-11-19T10:00:00+00:00"})
     differences([records[2], replace(records[0], header=earlier)])
     assert order == ["2026-11-19T10:00:00+00:00", "2026-11-21T10:00:00+00:00"]

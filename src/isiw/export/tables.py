@@ -94,7 +94,8 @@ def write_tables(parts: Sequence[Part], folder: Path, suffix: str) -> None:
 
 def tidy(frame: pd.DataFrame) -> pd.DataFrame:
     """A table whose texts are on one line each, without what a terminal would obey."""
-    return frame.apply(lambda column: column.map(_one_line) if _has_texts(column) else column)
+    texts = [name for name in frame.columns if _has_texts(frame[name])]
+    return frame.assign(**{name: frame[name].map(_one_line) for name in texts})
 
 
 def _has_texts(column: pd.Series) -> bool:
@@ -127,8 +128,8 @@ def _sessions(parts: Iterable[Part]) -> pd.DataFrame:
 
 
 def _events(parts: Iterable[Part]) -> pd.DataFrame:
-    rows = [
-        part.facts | {"kind": event.kind, "trial": event.trial, "text": event.text}
+    rows: list[dict[str, Any]] = [
+        {**part.facts, "kind": event.kind, "trial": event.trial, "text": event.text}
         for part in parts
         for event in part.record.events
     ]
