@@ -1,4 +1,4 @@
-"""The commands about sessions that are over: comparing them, and exporting them for others' software."""
+"""The commands about several logs: exporting them for others' software, and comparing them."""
 
 from __future__ import annotations
 
@@ -10,10 +10,16 @@ import typer
 import isiw
 from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show
 
-__all__ = ["compare", "export"]
+__all__ = ["register"]
 
 
-def export(
+def register(app: typer.Typer) -> None:
+    """Add these commands to a command line."""
+    app.command("export")(_export)
+    app.command("compare")(_compare)
+
+
+def _export(
     source: Annotated[Path, typer.Argument(help="A session's log, or a folder of logs.", **NO_DEFAULT)],
     folder: Annotated[Path, typer.Argument(help="A new folder; nothing is replaced.", **NO_DEFAULT)],
     to: Annotated[
@@ -37,7 +43,7 @@ def export(
             raise typer.Exit(DAMAGED)
 
 
-def compare(
+def _compare(
     logs: Annotated[list[Path], typer.Argument(help="Logs; each is compared to the first.", **NO_DEFAULT)],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
     overwrite: Annotated[bool, typer.Option(help="Replace a picture that is there; a log never is.")] = False,  # noqa: FBT002 - a flag

@@ -30,8 +30,7 @@ app.add_typer(prior.app, name="prior")
 app.add_typer(study.app, name="study")
 new = typer.Typer(help="Write a starting point of your own.", no_args_is_help=True)
 app.add_typer(new, name="new")
-app.command("export")(logs.export)
-app.command("compare")(logs.compare)
+logs.register(app)
 
 _INTERRUPTED = "Interrupted: the device is stopped and the log is closed."
 
