@@ -17,8 +17,9 @@ import pytest
 from export.recorded import SAMPLES, emg_mv, sweep, write_sweeps
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.export import export_logs
+from isiw.export.emg import Layout, Run
 from isiw.log.reader import read_session
-from isiw.trials import Channel
+from isiw.trials import Channel, MistrialReason, Status, Stimulus, Trial
 from isiw.visit import Visit
 
 OLD_LOGS = Path(__file__).parents[1] / "data" / "logs"
@@ -198,12 +199,37 @@ def test_a_sweep_whose_trial_is_lost_is_there_with_an_unknown_outcome(tmp_path: 
     assert (row["condition"], row["commanded_isi_ms"]) == ("paired", 30.0)
 
 
+@pytest.mark.parametrize(
+    ("trial", "condition"),
+    [
+        (Trial(0, Status.ACCEPTED, 30.0, isi_ms=30.0, mep_mv=0.1), "paired"),
+        (Trial(0, Status.ACCEPTED, None, mep_mv=0.1), "TMS alone"),
+        (Trial(0, Status.ACCEPTED, None, tap_alone=True), "tap alone"),
+        (Trial(0, Status.MISTRIAL, None, MistrialReason.NO_PULSE), "TMS alone"),
+        (Trial.unknown(Stimulus(0, None)), "unknown"),
+        (Trial.unknown(Stimulus(0, 30.0)), "paired"),
+    ],
+)
+def test_each_condition_is_named(trial: Trial, condition: str) -> None:
+    layout = Layout(1000.0, 4, (("emg", "mV"),))
+    (row,) = Run(layout, (trial,), (0.0,), (np.zeros(4),)).events({})
+    assert row["condition"] == condition
+
+
+def test_moments_outside_the_sweep_are_left_out_as_they_would_lie_in_another_trials() -> None:
+    trial = Trial(0, Status.ACCEPTED, 30.0, isi_ms=30.0, mep_mv=0.1, t_valve_ms=-1.0, t_hit_ms=0.0, t_tms_ms=4.0)
+    layout = Layout(1000.0, 4, (("emg", "mV"),))
+    rows = Run(layout, (trial,), (0.0,), (np.zeros(4),)).events({})
+    assert [row["trial_type"] for row in rows] == ["sweep", "tap"]
+
+
 def test_two_people_whose_codes_become_one_label_are_refused(tmp_path: Path) -> None:
     for number, subject in enumerate(("P-07", "p07")):
         write_sweeps(tmp_path / "logs" / f"{number}.mcap", {0: {}}, subject=subject)
     with pytest.raises(InvalidValueError, match="--pseudonymise"):
         export_logs(tmp_path / "logs", tmp_path / "out", "bids")
     assert export_logs(tmp_path / "logs", tmp_path / "out", "bids", pseudonymise=True).sessions == 2
+    assert export_logs(tmp_path / "logs", tmp_path / "tables").sessions == 2
 
 
 def test_a_session_without_sweeps_needs_no_edfio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -85,6 +85,8 @@ def test_sessions_without_a_code_are_different_people(tmp_path: Path) -> None:
         write_sweeps(tmp_path / "logs" / f"{name}.mcap", {0: {}}, subject="")
     exported = export_logs(tmp_path / "logs", tmp_path / "out", pseudonymise=True)
     assert len(exported.pseudonyms) == 2
+    export_logs(tmp_path / "logs", tmp_path / "named")
+    assert pd.read_csv(tmp_path / "named" / "trials.csv").subject.tolist() == ["unnamed1", "unnamed2"]
 
 
 def test_a_log_that_cannot_be_read_is_not_named(logs: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any, Final
 import pandas as pd
 
 import isiw
+from isiw.errors import InvalidValueError
 from isiw.export import emg
 from isiw.export.collection import Part, log_losses
 from isiw.export.emg import Run
@@ -62,25 +64,46 @@ def write_bids(parts: Sequence[Part], folder: Path) -> list[str]:
 
     Raises:
         ConfigError: there are sweeps, and edfio is not installed.
+        InvalidValueError: people whose codes differ only by signs that the names of files cannot have.
     """
+    _require_distinct(parts)
     lacking = [sentence for part in parts for sentence in _write_session(part, folder)]
-    people = [_write_person(label, list(own), folder) for label, own in groupby(parts, key=lambda part: part.label)]
+    people = [_write_person(list(own), folder) for _, own in groupby(parts, key=_label)]
     _tsv(folder / "participants.tsv", pd.DataFrame(people))
     _write_heads(folder, parts, lacking)
     return lacking
 
 
-def _write_person(label: str, parts: Sequence[Part], folder: Path) -> dict[str, Any]:
+def _label(part: Part) -> str:
+    """The person's label: the letters and digits of the code."""
+    return re.sub("[^0-9A-Za-z]", "", part.subject)
+
+
+def _require_distinct(parts: Iterable[Part]) -> None:
+    codes: dict[str, str] = {}
+    for part in parts:
+        label = _label(part).casefold()
+        if not label or codes.setdefault(label, part.subject) != part.subject:
+            raise InvalidValueError(
+                "a person's code cannot be told from another one's in the names of files",
+                got=part.subject,
+                expected="codes that differ in Latin letters or digits",
+                remedy="Export with --pseudonymise, which numbers the people.",
+            )
+
+
+def _write_person(parts: Sequence[Part], folder: Path) -> dict[str, Any]:
     """Write what a person's sessions are, and return what the person is."""
+    label = _label(parts[0])
     rows = [{"session_id": f"ses-{part.session}", **session_facts(part.record)} for part in parts]
     _tsv(folder / f"sub-{label}" / f"sub-{label}_sessions.tsv", pd.DataFrame(rows))
     simulated = all(part.record.header.device.simulated for part in parts)
-    return {"participant_id": f"sub-{label}", "subject": parts[0].record.header.subject, "simulated": simulated}
+    return {"participant_id": f"sub-{label}", "subject": parts[0].subject, "simulated": simulated}
 
 
 def _write_session(part: Part, folder: Path) -> list[str]:
     """Write a session, and return what of it is left out."""
-    name, home = _name(part), folder / f"sub-{part.label}" / f"ses-{part.session}"
+    name, home = _name(part), folder / f"sub-{_label(part)}" / f"ses-{part.session}"
     trials = part.record.trials.rename_axis("trial").reset_index()
     _tsv(home / "beh" / f"{name}_task-{TASK}_beh.tsv", trials)
     files = [f"beh/{name}_task-{TASK}_beh.tsv"]
@@ -93,9 +116,9 @@ def _write_session(part: Part, folder: Path) -> list[str]:
     scans = [{"filename": file, "acq_time": _moment(part)} for file in files]
     _tsv(home / f"{name}_scans.tsv", pd.DataFrame(scans))
     if part.record.path.is_file():
-        source = folder / "sourcedata" / f"sub-{part.label}" / f"ses-{part.session}" / part.record.path.name
+        source = folder / "sourcedata" / f"sub-{_label(part)}" / f"ses-{part.session}" / part.record.path.name
         write_output(source, part.record.path.read_bytes())
-    return [f"{part.label}, session {part.session}: {sentence}" for sentence in left_out]
+    return [f"{part}: {sentence}" for sentence in left_out]
 
 
 def _write_run(stem: Path, run: Run, onsets_s: Mapping[int, float], part: Part) -> None:
@@ -148,18 +171,18 @@ def _write_heads(folder: Path, parts: Sequence[Part], lacking: Iterable[str]) ->
 
 def _readme(parts: Sequence[Part], lacking: Iterable[str]) -> str:
     simulated = sum(part.record.header.device.simulated for part in parts)
-    missing = [f"{part.label}, session {part.session}: {loss}" for part in parts for loss in log_losses(part.record)]
+    missing = [f"{part}: {loss}" for part in parts for loss in log_losses(part.record)]
     said = "\n".join(f"- {each}" for each in [*missing, *lacking] or ["nothing"])
     return _README.format(sessions=len(parts), simulated=simulated, lacking=said)
 
 
 def _name(part: Part) -> str:
-    return f"sub-{part.label}_ses-{part.session}"
+    return f"sub-{_label(part)}_ses-{part.session}"
 
 
 def _moment(part: Part) -> str:
-    created = pd.Timestamp(part.record.header.created)
-    return (created if created.tzinfo is None else created.tz_convert("UTC")).strftime("%Y-%m-%dT%H:%M:%SZ")
+    created = pd.to_datetime(part.record.header.created, errors="coerce", utc=True)
+    return "" if pd.isna(created) else created.strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _described(columns: Columns) -> dict[str, dict[str, str]]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
+import itertools
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from isiw.errors import InvalidValueError, LogError
+from isiw.errors import LogError
 from isiw.log.durable import log_of
 from isiw.log.reader import SessionRecord, read_session
 
@@ -20,19 +20,22 @@ class Part:
     """One session of an export.
 
     Args:
-        label: the person's, of letters and digits only.
+        subject: the person's code.
         session: the number of the person's session, such as "01".
         record: what the log says.
     """
 
-    label: str
+    subject: str
     session: str
     record: SessionRecord
 
+    def __str__(self) -> str:
+        return f"{self.subject}, session {self.session}"
+
     @property
-    def facts(self) -> dict[str, str]:
+    def whose(self) -> dict[str, str]:
         """What the rows of this session begin with in every table."""
-        return {"subject": self.record.header.subject, "session": self.session}
+        return {"subject": self.subject, "session": self.session}
 
 
 def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
@@ -65,38 +68,21 @@ def _logs_of(folder: Path) -> list[Path]:
 
 
 def numbered(records: Iterable[SessionRecord]) -> list[Part]:
-    """Sessions with the label of their person and their number, in the order in which they were begun.
+    """Sessions with their person's code and their number, in the order in which they were begun.
 
-    People without a code cannot be told apart, so each session is taken for another one's.
+    People without a code cannot be told apart, so each of their sessions is taken for another person's.
 
     Args:
         records: the sessions.
-
-    Raises:
-        InvalidValueError: two people whose codes differ by signs only that labels cannot have.
     """
-    earlier: Counter[str] = Counter()
-    people: dict[str, str] = {}
+    sessions: Counter[str] = Counter()
+    unnamed = (f"unnamed{number}" for number in itertools.count(1))
     parts = []
     for record in sorted(records, key=lambda each: each.header.created):
-        subject = record.header.subject or f"unnamed{sum(name.startswith('unnamed') for name in people) + 1}"
-        label = people.setdefault(subject, _label(subject, people))
-        earlier[label] += 1
-        parts.append(Part(label, f"{earlier[label]:02d}", record))
-    return sorted(parts, key=lambda part: (part.label, part.session))
-
-
-def _label(subject: str, people: dict[str, str]) -> str:
-    label = re.sub("[^0-9A-Za-z]", "", subject)
-    taken = {known.casefold() for name, known in people.items() if name != subject}
-    if not label or label.casefold() in taken:
-        raise InvalidValueError(
-            "a person's code cannot be told from another one's in the names of files",
-            got=subject,
-            expected="codes that differ in Latin letters and digits",
-            remedy="Export with --pseudonymise, which numbers the people.",
-        )
-    return label
+        subject = record.header.subject or next(unnamed)
+        sessions[subject] += 1
+        parts.append(Part(subject, f"{sessions[subject]:02d}", record))
+    return sorted(parts, key=lambda part: (part.subject, part.session))
 
 
 def log_losses(record: SessionRecord) -> list[str]:

@@ -68,12 +68,8 @@ def export_logs(source: str | Path, folder: str | Path, to: str = "csv", *, pseu
         lacking = [f"{len(lacking)} logs that cannot be read are left out."] if lacking else []
     parts = numbered(records)
     for part in parts:
-        lacking += [f"{_name(part)}: {loss}" for loss in log_losses(part.record)]
+        lacking += [f"{part}: {loss}" for loss in log_losses(part.record)]
     with new_folder(folder) as beside:
         lacking += FORMATS[to](parts, beside) or ()
     trials = sum(len(part.record.table) for part in parts)
     return Exported(Path(folder), len(parts), trials, tuple(lacking), pseudonyms)
-
-
-def _name(part: Part) -> str:
-    return f"{part.label}, session {part.session}"

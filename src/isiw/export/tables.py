@@ -13,7 +13,7 @@ from isiw.export.collection import Part, log_losses
 from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.outputs import write_output
 from isiw.log.reader import SessionRecord
-from isiw.texts import plain
+from isiw.texts import one_line
 
 __all__ = ["EVENT_COLUMNS", "SESSION_COLUMNS", "all_trials", "session_facts", "tidy", "write_tables"]
 
@@ -95,15 +95,15 @@ def write_tables(parts: Sequence[Part], folder: Path, suffix: str) -> None:
 def tidy(frame: pd.DataFrame) -> pd.DataFrame:
     """A table whose texts are on one line each, without what a terminal would obey."""
     texts = [name for name in frame.columns if _has_texts(frame[name])]
-    return frame.assign(**{name: frame[name].map(_one_line) for name in texts})
+    return frame.assign(**{name: frame[name].map(_tidied) for name in texts})
 
 
 def _has_texts(column: pd.Series) -> bool:
     return pd.api.types.is_object_dtype(column) or pd.api.types.is_string_dtype(column)
 
 
-def _one_line(value: Any) -> Any:
-    return " ".join(plain(value).split()) if isinstance(value, str) else value
+def _tidied(value: Any) -> Any:
+    return one_line(value) if isinstance(value, str) else value
 
 
 def all_trials(parts: Sequence[Part]) -> pd.DataFrame:
@@ -117,19 +117,19 @@ def all_trials(parts: Sequence[Part]) -> pd.DataFrame:
 
 
 def _led_by(part: Part, frame: pd.DataFrame) -> pd.DataFrame:
-    for position, (name, value) in enumerate(part.facts.items()):
+    for position, (name, value) in enumerate(part.whose.items()):
         frame.insert(position, name, pd.Series(value, index=frame.index, dtype=object))
     return frame
 
 
 def _sessions(parts: Iterable[Part]) -> pd.DataFrame:
-    rows = [part.facts | session_facts(part.record) for part in parts]
+    rows = [part.whose | session_facts(part.record) for part in parts]
     return pd.DataFrame(rows, columns=[*_WHOSE, *SESSION_COLUMNS])
 
 
 def _events(parts: Iterable[Part]) -> pd.DataFrame:
     rows: list[dict[str, Any]] = [
-        {**part.facts, "kind": event.kind, "trial": event.trial, "text": event.text}
+        {**part.whose, "kind": event.kind, "trial": event.trial, "text": event.text}
         for part in parts
         for event in part.record.events
     ]

@@ -13,7 +13,7 @@ from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, save_figure, tidied
-from isiw.texts import plain
+from isiw.texts import one_line
 
 __all__ = ["comparison_figure", "save_comparison_plot"]
 
@@ -88,7 +88,7 @@ def _chance(estimate: Estimate) -> str:
 
 
 def _name(record: SessionRecord) -> str:
-    code = " ".join(plain(record.header.subject).split()) or "unnamed"
+    code = one_line(record.header.subject) or "unnamed"
     code = code if len(code) <= _LONGEST_CODE else f"{code[: _LONGEST_CODE - 1]}…"
     return f"{code}, {record.header.created[:10]}".replace("$", r"\$")
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.priors.differing import Difference
+from isiw.texts import one_line
 
 __all__ = ["comparison_sentence", "comparison_table"]
 
@@ -27,7 +28,12 @@ def comparison_table(records: Sequence[SessionRecord]) -> str:
 
 def _row(number: int, record: SessionRecord) -> tuple[str, ...]:
     header = record.header
-    who = (str(number), header.subject or "unnamed", header.created[:16].replace("T", " "), str(len(record.table.told)))
+    who = (
+        str(number),
+        one_line(header.subject) or "unnamed",
+        header.created[:16].replace("T", " "),
+        str(len(record.table.told)),
+    )
     if not (record.estimates and record.rests_on_data):
         return (*who, "–", "too little was measured", "", "")
     return (*who, *_found(record.estimates[-1]))
@@ -66,7 +72,7 @@ def comparison_sentence(difference: Difference) -> str:
 
 
 def _whose(record: SessionRecord) -> str:
-    return f"{record.header.subject or 'unnamed'} ({record.path.name})"
+    return f"{one_line(record.header.subject) or 'unnamed'} ({record.path.name})"
 
 
 def _moved(difference: Difference) -> str:
