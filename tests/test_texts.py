@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from isiw.texts import plain
+from isiw.texts import one_line, plain
 
 
 @pytest.mark.parametrize(
@@ -37,3 +37,7 @@ def test_what_is_left_can_be_printed(text: str) -> None:
     assert "\x1b" not in plain(text)
     assert plain(plain(text)) == plain(text)
     plain(text).encode()
+
+
+def test_a_text_on_one_line_has_single_spaces() -> None:
+    assert one_line(" a\n\tb\x1b[2J  c ") == "a b c"

@@ -2,6 +2,7 @@ from . import acquisition as acquisition
 from . import config as config
 from . import devices as devices
 from . import errors as errors
+from . import export as export
 from . import log as log
 from . import metrics as metrics
 from . import models as models

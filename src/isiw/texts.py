@@ -6,7 +6,7 @@ import re
 import unicodedata
 from typing import Final
 
-__all__ = ["plain"]
+__all__ = ["one_line", "plain"]
 
 _SEQUENCES: Final = re.compile(
     r"(?:\x1b[\]PX^_]|[\x9d\x90\x98\x9e\x9f]).*?(?:\x07|\x1b\\|\x9c|$)"  # titles, links, and what a device is told
@@ -21,6 +21,11 @@ _OBEYED: Final = frozenset({"Cc", "Cf", "Cs", "Co"})
 def plain(text: str) -> str:
     """A text without escape sequences and invisible characters; newlines and tabs stay."""
     return "".join(map(_plain, _SEQUENCES.sub("", text)))
+
+
+def one_line(text: str) -> str:
+    """The same on one line, with single spaces."""
+    return " ".join(plain(text).split())
 
 
 def _plain(character: str) -> str:

@@ -13,6 +13,8 @@ import pandas as pd
 from pydantic import ValidationError
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.log.frames import trial_frame
+from isiw.log.onsets import Onset, Onsets
 from isiw.log.salvage import Message, Salvage, salvage
 from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Estimate, Event, Header, Intent, Record, Waveform
 from isiw.log.topics import decode
@@ -45,6 +47,7 @@ class SessionRecord:
         finished: whether the session closed its log.
         end_lost: whether its end is missing, so that nobody knows how many stimuli it told of.
         delivered: how many stimuli were given by its index, or may have been; 0 where it has none.
+        onsets: when each stimulus was about to be delivered, by its trial's number.
     """
 
     path: Path
@@ -55,6 +58,7 @@ class SessionRecord:
     finished: bool
     end_lost: bool = False
     delivered: int = 0
+    onsets: Mapping[int, Onset] = field(default_factory=dict, repr=False)
 
     def __str__(self) -> str:
         header, last = self.header, self.estimates[-1] if self.estimates else None
@@ -76,8 +80,11 @@ class SessionRecord:
 
     @property
     def trials(self) -> pd.DataFrame:
-        """All trials as a DataFrame, a row a trial, indexed by their number."""
-        return self.table.to_frame()
+        """All trials as a DataFrame, a row a trial, indexed by their number: onset, outcome, and the belief after it.
+
+        The columns are those of `isiw.log.frames.TRIAL_COLUMNS`.
+        """
+        return trial_frame(self.table, self.onsets, self.estimates)
 
     @property
     def rests_on_data(self) -> bool:
@@ -155,6 +162,7 @@ def read_salvaged(salvaged: Salvage) -> SessionRecord:
         salvaged.finished,
         salvaged.end_lost,
         _delivered(salvaged, records.history),
+        records.onsets.by_trial,
     )
 
 
@@ -172,6 +180,7 @@ class _Records:
     history: list[Record] = field(default_factory=list)
     waveforms: dict[tuple[int, str], Channel] = field(default_factory=dict)
     losses: list[str] = field(default_factory=list)
+    onsets: Onsets = field(default_factory=Onsets)
     _trials: set[int] = field(default_factory=set)
 
     def take(self, message: Message) -> None:
@@ -189,8 +198,15 @@ class _Records:
             self.losses.append(f"A second record of trial {record.index} is left out.")
         elif not isinstance(record, Waveform):
             self.history.append(record)
-            if isinstance(record, Trial):
-                self._trials.add(record.index)
+            self._note(record, message.log_time_ns)
+
+    def _note(self, record: Record, at_ns: int) -> None:
+        if isinstance(record, Trial):
+            self._trials.add(record.index)
+        elif isinstance(record, Intent):
+            self.onsets.take(record, at_ns)
+        elif isinstance(record, Event) and record.kind == "resume":
+            self.onsets.resumed()
 
 
 def _first_line(error: ValueError) -> str:

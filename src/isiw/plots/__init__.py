@@ -1,12 +1,15 @@
-"""Pictures: of a session, of a study, and of the timing of taps. They draw, and compute nothing anew."""
+"""Pictures: of sessions, of a study, and of the timing of taps. They draw, and compute nothing anew."""
 
+from isiw.plots.comparison import comparison_figure, save_comparison_plot
 from isiw.plots.prior import prior_figure, save_prior_plot
 from isiw.plots.session import save_session_plot, session_figure
 from isiw.plots.study import save_study_plot, study_figure
 from isiw.plots.timing import save_timing_plot, timing_figure
 
 __all__ = [
+    "comparison_figure",
     "prior_figure",
+    "save_comparison_plot",
     "save_prior_plot",
     "save_session_plot",
     "save_study_plot",

@@ -2,17 +2,20 @@
 
 from isiw.priors.comparison import compared, densities
 from isiw.priors.days import DayToDay, after, moved
+from isiw.priors.differing import Difference, differences
 from isiw.priors.file import load, read_lab_prior, write_lab_prior
 from isiw.priors.lab import LabPrior, LearntSession, learn
 from isiw.priors.recall import recalled
 
 __all__ = [
     "DayToDay",
+    "Difference",
     "LabPrior",
     "LearntSession",
     "after",
     "compared",
     "densities",
+    "differences",
     "learn",
     "load",
     "moved",

@@ -1,3 +1,5 @@
+from .comparison import comparison_sentence as comparison_sentence
+from .comparison import comparison_table as comparison_table
 from .facts import first_facts as first_facts
 from .page import report_page as report_page
 from .page import save_report as save_report

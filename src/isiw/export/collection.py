@@ -1,0 +1,102 @@
+"""Which sessions are exported: the logs, whose they are, and which visit of the person each is."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from isiw.errors import LogError
+from isiw.log.durable import log_of
+from isiw.log.reader import SessionRecord, read_session
+
+__all__ = ["Part", "log_losses", "numbered", "read_logs"]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One session of an export.
+
+    Args:
+        subject: the person's code.
+        session: the number of the person's session, such as "01".
+        record: what the log says.
+    """
+
+    subject: str
+    session: str
+    record: SessionRecord
+
+    def __str__(self) -> str:
+        return f"{self.subject}, session {self.session}"
+
+    @property
+    def whose(self) -> dict[str, str]:
+        """What the rows of this session begin with in every table."""
+        return {"subject": self.subject, "session": self.session}
+
+
+def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
+    """The sessions of a log or of a folder with logs, and a sentence for each log that cannot be read.
+
+    Args:
+        source: a log, with or without `.part`, or a folder, whose folders are looked into, too.
+
+    Raises:
+        LogError: there is no such log, no log in the folder, or none of them can be read.
+    """
+    if not Path(source).is_dir():
+        return [read_session(source)], []
+    records, unreadable = [], []
+    for log in _logs_of(Path(source)):
+        try:
+            records.append(read_session(log))
+        except LogError as error:
+            unreadable.append(f"{log.name} is left out: {error.what}.")
+    if not records:
+        what = "no log in the folder can be read" if unreadable else "there is no log in the folder"
+        raise LogError(what, got=str(source), expected="files called .mcap or .mcap.part")
+    return records, unreadable
+
+
+def _logs_of(folder: Path) -> list[Path]:
+    """Its logs, each once, whether it is finished or not."""
+    files = (file for file in folder.rglob("*.mcap*") if file.suffix in {".mcap", ".part"} and file.is_file())
+    return sorted({log_of(file) for file in files})
+
+
+def numbered(records: Iterable[SessionRecord]) -> list[Part]:
+    """Sessions with their person's code and their number, in the order in which they were begun.
+
+    People without a code cannot be told apart, so each of their sessions is taken for another person's.
+
+    Args:
+        records: the sessions.
+    """
+    sessions: Counter[str] = Counter()
+    unnamed = (f"unnamed{number}" for number in itertools.count(1))
+    parts = []
+    for record in sorted(records, key=lambda each: each.header.created):
+        subject = record.header.subject or next(unnamed)
+        sessions[subject] += 1
+        parts.append(Part(subject, f"{sessions[subject]:02d}", record))
+    return sorted(parts, key=lambda part: (part.subject, part.session))
+
+
+def log_losses(record: SessionRecord) -> list[str]:
+    """What a log lacks, a sentence each.
+
+    Args:
+        record: the session.
+    """
+    unknown = [str(intent.trial) for intent in record.unknown]
+    timeless = [str(trial.index) for trial in record.table if trial.index not in record.onsets]
+    said: Sequence[tuple[object, str]] = (
+        (record.end_lost, "The end of the log is missing; nobody knows how many stimuli it told of."),
+        (unknown, f"The outcome of stimuli that may have been given is not known: trials {', '.join(unknown)}."),
+        (timeless, f"The onset is not known of trials {', '.join(timeless)}."),
+        (not record.finished and not record.losses, "The session had not closed its log."),
+    )
+    return [*record.losses, *(sentence for lacks, sentence in said if lacks)]

@@ -1,0 +1,262 @@
+"""The sweeps of a session as BIDS has EMG: one behind the other in a BDF file, with what was when in each.
+
+Sweeps are separate stretches with seconds between them. They are written as BIDS calls "epoched": end to end, so that
+nothing is made up for the time between, and the events' onsets are times in the file. Sweeps of different channels,
+rates or lengths are different runs.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from isiw.errors import ConfigError
+from isiw.log.reader import SessionRecord
+from isiw.trials import Channel, Stimulus, Trial
+from isiw.types import FloatArray
+
+if TYPE_CHECKING:
+    from edfio import BdfSignal
+
+__all__ = ["EMG", "EVENT_COLUMNS", "Run", "bdf", "runs"]
+
+EMG: Final = "emg"
+"""The channel whose sweeps are exported, with whatever was recorded along with it."""
+
+EVENT_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
+    "onset": ("s", "when it was, in the file"),
+    "duration": ("s", "how long it lasted; 0 for a moment"),
+    "trial_type": (
+        "",
+        "sweep: a trial's waveforms; and in it valve: the valve command, tap: the impact, tms: the pulse",
+    ),
+    "trial": ("", "the number of the trial"),
+    "condition": ("", "paired, TMS alone or tap alone; unknown where its record is lost"),
+    "commanded_isi_ms": ("ms", "the ISI that was asked for; none for a control trial"),
+    "isi_ms": ("ms", "the realised ISI"),
+    "status": ("", "accepted, or mistrial: nothing is learnt from it"),
+    "reason": ("", "why it is a mistrial"),
+    "excluded": ("", "whether an operator excluded it afterwards"),
+    "mep_mv": ("mV", "peak-to-peak amplitude of the MEP"),
+    "session_s": ("s", "when the trial was, since the first stimulus of the log"),
+}
+"""Unit and meaning of what is said about a moment of a sweep."""
+
+_SHORTEST_RECORD_S: Final = 1e-4
+_LABEL: Final = 16
+"""Most characters of a channel's name in a BDF file."""
+
+_ASCII_UNITS: Final = {"µV": "uV", "μV": "uV", "m/s²": "m/s^2", "°C": "oC"}
+
+
+class Layout(NamedTuple):
+    """What sweeps of one run have in common."""
+
+    rate_hz: float
+    samples: int
+    channels: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Sweeps of one layout.
+
+    Args:
+        layout: rate [Hz], samples of a sweep, and names and units of the channels.
+        trials: whose sweeps they are.
+        starts_ms: the first sample of each, on the sweep's own clock [ms].
+        values: the samples of each channel, the sweeps end to end, shape (trials · samples,) each.
+    """
+
+    layout: Layout
+    trials: tuple[Trial, ...]
+    starts_ms: tuple[float, ...]
+    values: tuple[FloatArray, ...]
+
+    @property
+    def sweep_s(self) -> float:
+        """How long a sweep is [s]."""
+        return self.layout.samples / self.layout.rate_hz
+
+    @property
+    def channels(self) -> list[dict[str, Any]]:
+        """The rows of `_channels.tsv`."""
+        return [
+            {
+                "name": label,
+                "type": {EMG: "EMG", "valve": "TRIG"}.get(name, "MISC"),
+                "units": _unit(unit),
+                "description": name,
+                "sampling_frequency": self.layout.rate_hz,
+            }
+            for label, (name, unit) in zip(_labels(self.layout), self.layout.channels, strict=True)
+        ]
+
+    def events(self, onsets_s: Mapping[int, float]) -> list[dict[str, Any]]:
+        """The rows of `_events.tsv`, as in `EVENT_COLUMNS`.
+
+        Args:
+            onsets_s: when each trial was, since the first one [s].
+        """
+        rows = [
+            moment | _facts(trial) | {"session_s": onsets_s.get(trial.index)}
+            for number, (trial, start_ms) in enumerate(zip(self.trials, self.starts_ms, strict=True))
+            for moment in self._moments(number, trial, start_ms)
+        ]
+        return sorted(rows, key=lambda row: float(row["onset"]))
+
+    def _moments(self, number: int, trial: Trial, start_ms: float) -> Iterable[dict[str, Any]]:
+        begin_s = number * self.sweep_s
+        yield {"onset": begin_s, "duration": self.sweep_s, "trial_type": "sweep"}
+        for kind, at_ms in (("valve", trial.t_valve_ms), ("tap", trial.t_hit_ms), ("tms", trial.t_tms_ms)):
+            within_s = math.nan if at_ms is None else (at_ms - start_ms) / 1e3
+            if 0 <= within_s < self.sweep_s:
+                yield {"onset": begin_s + within_s, "duration": 0, "trial_type": kind}
+
+
+def _facts(trial: Trial) -> dict[str, Any]:
+    kind = "TMS alone" if trial.is_control else "unknown" if trial.commanded_isi_ms is None else "paired"
+    return {
+        "trial": trial.index,
+        "condition": "tap alone" if trial.tap_alone else kind,
+        "commanded_isi_ms": trial.commanded_isi_ms,
+        "isi_ms": trial.isi_ms,
+        "status": str(trial.status),
+        "reason": None if trial.reason is None else str(trial.reason),
+        "excluded": trial.excluded,
+        "mep_mv": trial.mep_mv,
+    }
+
+
+def runs(record: SessionRecord) -> tuple[list[Run], list[str]]:
+    """The sweeps of a session by their layout, and a sentence for what is not among them.
+
+    Args:
+        record: the session.
+    """
+    trials = {trial.index: trial for trial in record.table}
+    of_layout: dict[Layout, list[tuple[Trial, Mapping[str, Channel]]]] = {}
+    left_out: dict[str, list[int]] = {}
+    for number in sorted({number for number, _ in record.waveforms}):
+        channels, others = _side_by_side(record.sweep(number))
+        for name in others:
+            left_out.setdefault(name, []).append(number)
+        if channels:
+            trial = trials.get(number) or _lost(record, number)
+            of_layout.setdefault(_layout(channels), []).append((trial, channels))
+    return [_run(layout, sweeps) for layout, sweeps in of_layout.items()], _sentences(left_out)
+
+
+def _lost(record: SessionRecord, number: int) -> Trial:
+    """The trial whose record is lost."""
+    commanded = {intent.trial: (intent.isi_ms, intent.tap_alone) for intent in record.intents}
+    return Trial.unknown(Stimulus(number, *commanded.get(number, (None, False))))
+
+
+def _side_by_side(sweep: Mapping[str, Channel]) -> tuple[dict[str, Channel], list[str]]:
+    """The EMG and what was recorded along with it, sample by sample, and the names of other channels."""
+    emg = sweep.get(EMG)
+    fitting = {name: channel for name, channel in sweep.items() if emg is not None and _fits(channel, emg)}
+    channels = fitting if EMG in fitting else {}
+    return channels, [name for name in sweep if name not in channels]
+
+
+def _fits(channel: Channel, emg: Channel) -> bool:
+    shape = (channel.rate_hz, channel.t0_ms, len(channel.values))
+    if shape != (emg.rate_hz, emg.t0_ms, len(emg.values)) or not len(emg.values):
+        return False
+    return bool(np.isfinite(channel.values).all()) and _record_samples(channel.rate_hz, len(emg.values)) is not None
+
+
+def _layout(channels: Mapping[str, Channel]) -> Layout:
+    emg = channels[EMG]
+    ordered = sorted(channels, key=lambda name: (name != EMG, name))
+    return Layout(emg.rate_hz, len(emg.values), tuple((name, channels[name].unit) for name in ordered))
+
+
+def _run(layout: Layout, sweeps: Sequence[tuple[Trial, Mapping[str, Channel]]]) -> Run:
+    values = [np.concatenate([channels[name].values for _, channels in sweeps]) for name, _ in layout.channels]
+    starts_ms = tuple(channels[EMG].t0_ms for _, channels in sweeps)
+    return Run(layout, tuple(trial for trial, _ in sweeps), starts_ms, tuple(values))
+
+
+def _sentences(left_out: Mapping[str, Sequence[int]]) -> list[str]:
+    return [
+        f"The channel {name} is not in the EMG file in {len(numbers)} trials (first {numbers[0]}): it is not "
+        "finite, or has not the EMG's rate, begin and length."
+        for name, numbers in left_out.items()
+    ]
+
+
+def bdf(run: Run) -> bytes:
+    """A BDF file of the sweeps, end to end; at its very end the last sample is repeated where a record is to be filled.
+
+    Args:
+        run: the sweeps.
+
+    Raises:
+        ConfigError: edfio is not installed.
+    """
+    try:
+        import edfio  # noqa: PLC0415 - an extra
+    except ImportError as error:
+        raise ConfigError("EMG-BIDS needs edfio", remedy='Install it: pip install "isiw[bids]".') from error
+    samples = _record_samples(run.layout.rate_hz, run.layout.samples) or run.layout.samples
+    duration_s = round(samples / run.layout.rate_hz, 6)
+    labels = _labels(run.layout)
+    signals = [
+        _signal(edfio.BdfSignal, _filled(values, samples), samples / duration_s, label, unit)
+        for values, label, (_, unit) in zip(run.values, labels, run.layout.channels, strict=True)
+    ]
+    file = io.BytesIO()
+    edfio.Bdf(signals, data_record_duration=duration_s).write(file)
+    return file.getvalue()
+
+
+def _signal(kind: Callable[..., BdfSignal], values: FloatArray, rate_hz: float, label: str, unit: str) -> BdfSignal:
+    low, high = float(values.min()), float(values.max())
+    range_ = None if low < high else (low - 1.0, high + 1.0)
+    return kind(values, rate_hz, label=label, physical_dimension=_unit(unit), physical_range=range_)
+
+
+def _filled(values: FloatArray, samples: int) -> FloatArray:
+    """The values with the last one repeated up to a whole number of records."""
+    return np.pad(values, (0, -len(values) % samples), mode="edge")
+
+
+def _record_samples(rate_hz: float, sweep: int) -> int | None:
+    """How many samples a record of the file holds: a sweep's, or few; its duration must be written in eight digits.
+
+    None where no duration that can be written holds a whole number of samples.
+    """
+    rate = Fraction(rate_hz).limit_denominator(1000)
+    if abs(float(rate) - rate_hz) > 1e-9 * rate_hz:
+        return None
+    fewest = rate.numerator // math.gcd(rate.numerator, 10**6 * rate.denominator)
+    fewest *= math.ceil(_SHORTEST_RECORD_S * rate_hz / fewest)
+    return next((samples for samples in (sweep, fewest) if _can_be_written(samples / rate)), None)
+
+
+def _can_be_written(duration_s: Fraction) -> bool:
+    text = str(round(float(duration_s), 6))
+    return len(text) <= 8 and "e" not in text and Fraction(text) == duration_s
+
+
+def _unit(unit: str) -> str:
+    """A unit as both files have it: in ASCII."""
+    return _ASCII_UNITS.get(unit, unit).encode("ascii", "replace").decode()[:8]
+
+
+def _labels(layout: Layout) -> list[str]:
+    """The channels' names, where a BDF file can hold them, else their numbers."""
+    names = [name for name, _ in layout.channels]
+    return [
+        name if name.isascii() and name.isprintable() and len(name) <= _LABEL else f"channel {number}"
+        for number, name in enumerate(names)
+    ]

@@ -1,0 +1,75 @@
+"""Sessions exported into a new folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+
+from isiw.checks import choice
+from isiw.export.bids import write_bids
+from isiw.export.collection import Part, log_losses, numbered, read_logs
+from isiw.export.folder import new_folder
+from isiw.export.pseudonyms import pseudonymised
+from isiw.export.tables import write_tables
+
+__all__ = ["FORMATS", "Exported", "export_logs"]
+
+FORMATS: Mapping[str, Callable[[Sequence[Part], Path], Sequence[str] | None]] = MappingProxyType(
+    {
+        "csv": partial(write_tables, suffix="csv"),
+        "parquet": partial(write_tables, suffix="parquet"),
+        "bids": write_bids,
+    }
+)
+"""What writes each format."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was exported.
+
+    Args:
+        folder: where to.
+        sessions: how many sessions.
+        trials: how many trials.
+        lacking: what could not be read or exported, a sentence each.
+        pseudonyms: which code stands for whom, where the sessions are pseudonymised; it is kept nowhere else.
+    """
+
+    folder: Path
+    sessions: int
+    trials: int
+    lacking: tuple[str, ...] = ()
+    pseudonyms: Mapping[str, str] = field(default_factory=dict)
+
+
+def export_logs(source: str | Path, folder: str | Path, to: str = "csv", *, pseudonymise: bool = False) -> Exported:
+    """Export a log, or all logs of a folder as one data set.
+
+    Args:
+        source: the log or the folder.
+        folder: a new folder.
+        to: the format, one of `FORMATS`.
+        pseudonymise: whether people's codes and dates are replaced, and free texts left out; docs/export.md says what
+            exactly.
+
+    Raises:
+        InvalidValueError: an unknown format, a folder with something in it, or people who could not be told apart.
+        LogError: nothing can be read.
+    """
+    choice("the format of an export", to, FORMATS)
+    records, lacking = read_logs(source)
+    pseudonyms: Mapping[str, str] = {}
+    if pseudonymise:
+        records, pseudonyms = pseudonymised(records)
+        lacking = [f"{len(lacking)} logs that cannot be read are left out."] if lacking else []
+    parts = numbered(records)
+    for part in parts:
+        lacking += [f"{part}: {loss}" for loss in log_losses(part.record)]
+    with new_folder(folder) as beside:
+        lacking += FORMATS[to](parts, beside) or ()
+    trials = sum(len(part.record.table) for part in parts)
+    return Exported(Path(folder), len(parts), trials, tuple(lacking), pseudonyms)

@@ -1,0 +1,181 @@
+"""Three tables of some sessions: what each session is and found, its trials, and what happened to it."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import pandas as pd
+
+from isiw.export.collection import Part, log_losses
+from isiw.log.frames import TRIAL_COLUMNS
+from isiw.log.outputs import write_output
+from isiw.log.reader import SessionRecord
+from isiw.texts import one_line
+
+__all__ = ["EVENT_COLUMNS", "SESSION_COLUMNS", "all_trials", "session_facts", "tidy", "write_tables"]
+
+Columns = Mapping[str, tuple[str, str]]
+
+_WHOSE: Final[Columns] = {
+    "subject": ("", "the person's code"),
+    "session": ("", "the number of the person's session, in the order in which they were begun"),
+}
+
+SESSION_COLUMNS: Final[Columns] = {
+    "log": ("", "the name of the log"),
+    "created": ("", "when it was begun, UTC"),
+    "simulated": ("", "whether nobody was stimulated"),
+    "device": ("", "what the device calls itself"),
+    "reference": ("", "the event that ISIs count from: the impact, or the command that opens the valve"),
+    "low_ms": ("ms", "the first ISI that could be asked"),
+    "high_ms": ("ms", "the last ISI that could be asked"),
+    "strategy": ("", "the strategy's name; none for one of a user's own objects"),
+    "seed": ("", "the seed of the session"),
+    "isiw_version": ("", "the version of isiw that wrote the log"),
+    "day": ("", "the number of the person's visit, where it was noted"),
+    "operator": ("", "who ran the session, where it was noted"),
+    "muscle": ("", "whose EMG was recorded, where it was noted"),
+    "electrodes": ("", "which, and where they were, where it was noted"),
+    "intensity_pct_rmt": ("%", "intensity of the pulse, of the resting motor threshold"),
+    "intensity_pct_mso": ("%", "intensity of the pulse, of the maximum stimulator output"),
+    "delivered": ("", "stimuli that were given, or may have been"),
+    "told": ("", "trials that the strategy learnt from"),
+    "mistrials": ("", "trials that were judged to be mistrials"),
+    "p_window": ("", "probability that there is a window, at the end"),
+    "window": ("", "the window that was reported, its segments; none where none was"),
+    "start_low_ms": ("ms", "lower end of the 90 % interval of its start; infinite beyond the range"),
+    "start_high_ms": ("ms", "upper end of the 90 % interval of its start"),
+    "end_low_ms": ("ms", "lower end of the 90 % interval of its end"),
+    "end_high_ms": ("ms", "upper end of the 90 % interval of its end"),
+    "stopped": ("", "whether the strategy had stopped"),
+    "why": ("", "why it stopped, or went on"),
+    "lacks": ("", "what the log lacks; empty where it is whole"),
+}
+"""Unit and meaning of what is said about a session."""
+
+EVENT_COLUMNS: Final[Columns] = {
+    "kind": ("", "what kind of thing happened"),
+    "trial": ("", "the trial that was judged, refused or answered late; else the last one before the event"),
+    "text": ("", "what happened, in words"),
+}
+"""Unit and meaning of what is said about an event."""
+
+_ENCODERS: Final[Mapping[str, Callable[[pd.DataFrame, io.BytesIO], None]]] = {
+    "csv": lambda frame, file: frame.to_csv(file, index=False, na_rep=""),
+    "parquet": lambda frame, file: frame.to_parquet(file, index=False),
+}
+
+
+def write_tables(parts: Sequence[Part], folder: Path, suffix: str) -> None:
+    """Write the tables `sessions`, `trials` and `events`, and `columns`, which says what is in them.
+
+    Args:
+        parts: the sessions.
+        folder: where to.
+        suffix: csv or parquet.
+    """
+    contents = {"sessions": SESSION_COLUMNS, "trials": {"trial": ("", "its number"), **TRIAL_COLUMNS},
+                "events": EVENT_COLUMNS}  # fmt: skip
+    tables = {"sessions": _sessions(parts), "trials": all_trials(parts), "events": _events(parts)}
+    meanings = [
+        (table, name, unit, meaning)
+        for table, columns in contents.items()
+        for name, (unit, meaning) in {**_WHOSE, **columns}.items()
+    ]
+    tables["columns"] = pd.DataFrame(meanings, columns=["table", "column", "unit", "meaning"])
+    for name, frame in tables.items():
+        content = io.BytesIO()
+        _ENCODERS[suffix](tidy(frame), content)
+        write_output(folder / f"{name}.{suffix}", content.getvalue())
+
+
+def tidy(frame: pd.DataFrame) -> pd.DataFrame:
+    """A table whose texts are on one line each, without what a terminal would obey."""
+    texts = [name for name in frame.columns if _has_texts(frame[name])]
+    return frame.assign(**{name: frame[name].map(_tidied) for name in texts})
+
+
+def _has_texts(column: pd.Series) -> bool:
+    return pd.api.types.is_object_dtype(column) or pd.api.types.is_string_dtype(column)
+
+
+def _tidied(value: Any) -> Any:
+    return one_line(value) if isinstance(value, str) else value
+
+
+def all_trials(parts: Sequence[Part]) -> pd.DataFrame:
+    """The trials of all sessions, a row a trial, each with its person, session and number.
+
+    Args:
+        parts: the sessions.
+    """
+    frames = [_led_by(part, part.record.trials.rename_axis("trial").reset_index()) for part in parts]
+    return pd.concat(frames, ignore_index=True)
+
+
+def _led_by(part: Part, frame: pd.DataFrame) -> pd.DataFrame:
+    for position, (name, value) in enumerate(part.whose.items()):
+        frame.insert(position, name, pd.Series(value, index=frame.index, dtype=object))
+    return frame
+
+
+def _sessions(parts: Iterable[Part]) -> pd.DataFrame:
+    rows = [part.whose | session_facts(part.record) for part in parts]
+    return pd.DataFrame(rows, columns=[*_WHOSE, *SESSION_COLUMNS])
+
+
+def _events(parts: Iterable[Part]) -> pd.DataFrame:
+    rows: list[dict[str, Any]] = [
+        {**part.whose, "kind": event.kind, "trial": event.trial, "text": event.text}
+        for part in parts
+        for event in part.record.events
+    ]
+    return pd.DataFrame(rows, columns=[*_WHOSE, *EVENT_COLUMNS]).astype({"trial": "Int64"})
+
+
+def session_facts(record: SessionRecord) -> dict[str, Any]:
+    """What a session is and found, as in `SESSION_COLUMNS`.
+
+    Args:
+        record: the session.
+    """
+    return _what_it_is(record) | _what_came_of_it(record) | {"lacks": " ".join(log_losses(record))}
+
+
+def _what_it_is(record: SessionRecord) -> dict[str, Any]:
+    header = record.header
+    return {
+        "log": record.path.name,
+        "created": header.created,
+        "simulated": header.device.simulated,
+        "device": header.device.name,
+        "reference": header.space.reference,
+        "low_ms": header.space.low_ms,
+        "high_ms": header.space.high_ms,
+        "strategy": header.strategy.name,
+        "seed": header.seed,
+        "isiw_version": header.isiw_version,
+        **{name: getattr(header.visit, name) for name in header.visit.__dataclass_fields__},
+    }
+
+
+def _what_came_of_it(record: SessionRecord) -> dict[str, Any]:
+    counts = {
+        "delivered": len(record.table) + len(record.unknown),
+        "told": len(record.table.told),
+        "mistrials": sum(trial.reason is not None for trial in record.table),
+    }
+    if not record.estimates:
+        return counts
+    last = record.estimates[-1]
+    edges = ("start_low_ms", "start_high_ms", "end_low_ms", "end_high_ms")
+    return counts | {
+        "p_window": last.probability,
+        "window": "" if last.window is None or not record.rests_on_data else str(last.window),
+        **{name: getattr(last, name) for name in edges},
+        "stopped": last.stop,
+        "why": last.reason,
+    }

@@ -1,0 +1,101 @@
+"""The picture of several sessions: their windows below each other, with the intervals of the edges."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from isiw.errors import InvalidValueError
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import Estimate
+from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, save_figure, tidied
+from isiw.texts import one_line
+
+__all__ = ["comparison_figure", "save_comparison_plot"]
+
+_AXIS_NAME = {"impact": "ISI after the impact [ms]", "valve": "ISI after the valve command [ms]"}
+_LONGEST_CODE = 24
+
+
+def save_comparison_plot(records: Sequence[SessionRecord], path: str | Path, *, overwrite: bool = False) -> Path:
+    """Draw sessions below each other into a file; its suffix chooses the format.
+
+    Args:
+        records: the sessions.
+        path: where to.
+        overwrite: whether to replace a file that is there; a log never is.
+
+    Raises:
+        InvalidValueError: no sessions, ISIs that count from different events, a format that matplotlib does not know,
+            or a file that is not to be replaced.
+    """
+    return save_figure(comparison_figure(records), path, overwrite=overwrite)
+
+
+def comparison_figure(records: Sequence[SessionRecord]) -> Figure:
+    """Sessions below each other as a figure.
+
+    Args:
+        records: the sessions.
+
+    Raises:
+        InvalidValueError: no sessions, or ISIs that count from different events.
+    """
+    references = {record.header.space.reference for record in records}
+    if len(references) != 1:
+        raise InvalidValueError("a picture needs sessions whose ISIs count from one event", got=sorted(references))
+    figure = Figure(figsize=(7.2, 1.5 + 0.45 * len(records)), layout="constrained")
+    axes = figure.subplots()
+    tidied(axes)
+    for line, record in enumerate(records):
+        _draw(axes, line, record)
+    axes.set_yticks(range(len(records)), [_name(record) for record in records])
+    axes.set_ylim(len(records) - 0.4, -0.6)
+    spaces = [record.header.space for record in records]
+    axes.set_xlim(min(space.low_ms for space in spaces), max(space.high_ms for space in spaces))
+    axes.set_xlabel(_AXIS_NAME[spaces[0].reference], fontsize=9)
+    _explain(figure, axes)
+    return figure
+
+
+def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
+    last = record.estimates[-1] if record.estimates and record.rests_on_data else None
+    if last is None or last.window is None:
+        said = "too little was measured" if last is None else f"no window ({_chance(last)})"
+        axes.annotate(said, (0.02, line), xycoords=("axes fraction", "data"), va="center", fontsize=8, color=FAINT)
+        return
+    for start_ms, end_ms in last.window.segments:
+        axes.barh(line, end_ms - start_ms, left=start_ms, height=0.5, color=BLUE, alpha=0.3, label="window")
+    space = record.header.space
+    for edge, colour in (("start", GREEN), ("end", ORANGE)):
+        ends = (getattr(last, f"{edge}_low_ms"), getattr(last, f"{edge}_high_ms"))
+        if None not in ends:
+            low_ms, high_ms = np.clip(ends, space.low_ms, space.high_ms)
+            label = f"90 % interval of its {edge}"
+            axes.plot((low_ms, high_ms), (line, line), color=colour, lw=4, solid_capstyle="butt", label=label)
+    axes.annotate(
+        _chance(last), (1.01, line), xycoords=("axes fraction", "data"), va="center", fontsize=8, color=INK,
+        annotation_clip=False,
+    )  # fmt: skip
+
+
+def _chance(estimate: Estimate) -> str:
+    return "" if estimate.probability is None else f"P(window) = {estimate.probability:.2f}"
+
+
+def _name(record: SessionRecord) -> str:
+    code = one_line(record.header.subject) or "unnamed"
+    code = code if len(code) <= _LONGEST_CODE else f"{code[: _LONGEST_CODE - 1]}…"
+    return f"{code}, {record.header.created[:10]}".replace("$", r"\$")
+
+
+def _explain(figure: Figure, axes: Axes) -> None:
+    """A legend that has each thing once."""
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    if once:
+        figure.legend(once.values(), once.keys(), loc="outside upper left", ncols=3, fontsize=7.5, frameon=False)

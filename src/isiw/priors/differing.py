@@ -1,0 +1,103 @@
+"""Whether windows differ: of one person on two days, or of two people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from isiw.errors import InvalidValueError
+from isiw.log.reader import SessionRecord
+from isiw.models.particles.prior import Prior
+from isiw.priors.days import moved
+from isiw.priors.recall import recalled
+from isiw.types import FloatArray
+
+__all__ = ["Difference", "differences"]
+
+_Session: TypeAlias = tuple[SessionRecord, FloatArray | None]
+"""A session, and samples of its window's edges [ms]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """How the window of a session differs from that of an earlier one.
+
+    Args:
+        first: the session that it is compared to.
+        second: the other one.
+        same_person: whether both have the same person's code.
+        starts_later: probability that the second window starts later, given a window in each; .5 where nothing is
+            known, None where nothing can be said.
+        ends_later: the same of its end.
+        moved: of the same person, how probable it is that the window moved, beyond the usual shift from day to day;
+            None where it cannot be said.
+        obstacle: why something cannot be said.
+    """
+
+    first: SessionRecord
+    second: SessionRecord
+    same_person: bool
+    starts_later: float | None = None
+    ends_later: float | None = None
+    moved: float | None = None
+    obstacle: str = ""
+
+
+def differences(records: Sequence[SessionRecord]) -> list[Difference]:
+    """How each session's window differs from the first one's, by the trials that count.
+
+    Each session's trials are told to the particle model with the built-in prior, whatever strategy had asked for them,
+    so that all are judged alike. Two sessions of one person are compared in the order in which they were begun.
+
+    Args:
+        records: the sessions, at least two.
+
+    Raises:
+        InvalidValueError: fewer than two sessions, or some whose ISIs count from different events.
+    """
+    references = {record.header.space.reference for record in records}
+    if len(records) < 2:
+        raise InvalidValueError("a comparison needs sessions", got=len(records), expected="at least two")
+    if len(references) > 1:
+        raise InvalidValueError("ISIs that count from different events cannot be compared", got=sorted(references))
+    edges = [_edges(record) for record in records]
+    sessions = list(zip(records, edges, strict=True))
+    return [_difference(sessions[0], session) for session in sessions[1:]]
+
+
+def _edges(record: SessionRecord) -> FloatArray | None:
+    """Samples of start and end, given a window [ms]; None where too few trials count, or there is probably none."""
+    if not record.rests_on_data:
+        return None
+    estimate = recalled(record, Prior()).estimate()
+    return estimate.edge_samples_ms if (estimate.probability or 0.0) >= 0.5 else None
+
+
+def _difference(first: _Session, second: _Session) -> Difference:
+    (one, one_ms), (other, other_ms) = first, second
+    same = bool(one.header.subject) and one.header.subject == other.header.subject
+    if one_ms is None or other_ms is None:
+        which = " and ".join(record.path.name for record, edges_ms in (first, second) if edges_ms is None)
+        return Difference(
+            one, other, same, obstacle=f"There is probably no window, or too little was measured: {which}"
+        )
+    probability, obstacle = _moved(one, other) if same else (None, "")
+    starts, ends = (_later(one_ms[:, edge], other_ms[:, edge]) for edge in (0, 1))
+    return Difference(one, other, same, starts, ends, probability, obstacle)
+
+
+def _moved(first: SessionRecord, second: SessionRecord) -> tuple[float | None, str]:
+    earlier, later = sorted((first, second), key=lambda record: record.header.created)
+    try:
+        return moved(earlier, later), ""
+    except InvalidValueError as error:  # with the first day known, there is probably no window on the second
+        return None, error.what
+
+
+def _later(first_ms: FloatArray, second_ms: FloatArray) -> float:
+    """Probability that a draw of the second is larger; ties, such as two edges beyond the range, count half."""
+    larger, equal = second_ms[:, None] > first_ms, second_ms[:, None] == first_ms
+    return float(np.mean(larger + 0.5 * equal))

@@ -1,0 +1,133 @@
+"""Exported tables: they read back to the same numbers, and say what they lack."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from export.recorded import note, sweep, write_sweeps
+from isiw.errors import InvalidValueError, LogError
+from isiw.export import export_logs
+from isiw.log.frames import TRIAL_COLUMNS
+from isiw.log.reader import read_session
+from isiw.session.loop import Session
+from logs import cut_after
+from scripted import ScriptedDevice, scripted_strategy
+
+READERS: dict[str, Callable[[Path], pd.DataFrame]] = {"csv": pd.read_csv, "parquet": pd.read_parquet}
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    """A session of six trials."""
+    Session(ScriptedDevice(), scripted_strategy(6), log=tmp_path / "logs" / "s.mcap", subject="P07").run()
+    return tmp_path / "logs" / "s.mcap"
+
+
+@pytest.mark.parametrize("to", READERS)
+def test_what_is_read_back_is_what_was_logged(log: Path, tmp_path: Path, to: str) -> None:
+    export_logs(log, tmp_path / "out", to)
+    back, trials = READERS[to](tmp_path / "out" / f"trials.{to}"), read_session(log).trials
+    assert list(back.columns) == ["subject", "session", "trial", *TRIAL_COLUMNS]
+    for name in TRIAL_COLUMNS:
+        expected = trials[name]
+        if expected.dtype.kind == "f":
+            assert back[name].to_numpy(float) == pytest.approx(expected.to_numpy(), abs=0, rel=0, nan_ok=True), name
+    assert pd.to_datetime(back.intent_utc).tolist() == trials.intent_utc.tolist()
+    assert back.status.tolist() == trials.status.tolist()
+
+
+@pytest.mark.parametrize("to", READERS)
+def test_a_session_is_a_row_that_says_what_it_is_and_found(log: Path, tmp_path: Path, to: str) -> None:
+    export_logs(log, tmp_path / "out", to)
+    (row,) = READERS[to](tmp_path / "out" / f"sessions.{to}").to_dict("records")
+    assert (row["subject"], row["log"], row["device"], bool(row["simulated"])) == ("P07", "s.mcap", "scripted", True)
+    assert (row["delivered"], row["told"], row["p_window"], row["window"]) == (6, 6, 0.9, "36–96 ms")
+    assert math.isinf(row["end_high_ms"])
+    assert row["why"] == "The budget of 6 stimuli is used up."
+
+
+def test_every_column_is_explained(log: Path, tmp_path: Path) -> None:
+    export_logs(log, tmp_path / "out")
+    explained = pd.read_csv(tmp_path / "out" / "columns.csv")
+    for table in ("sessions", "trials", "events"):
+        columns = list(pd.read_csv(tmp_path / "out" / f"{table}.csv").columns)
+        assert explained.column[explained.table == table].tolist() == columns
+    assert explained.meaning.notna().all()
+
+
+def test_a_folder_of_logs_is_one_data_set(tmp_path: Path) -> None:
+    logs = tmp_path / "logs"
+    for name, subject, created in (
+        ("second", "P07", "2026-11-22T10:00:00+00:00"),
+        ("first", "P07", "2026-11-21T10:00:00+00:00"),
+        ("nested/other", "P08", "2026-11-20T10:00:00+00:00"),
+    ):
+        write_sweeps(logs / f"{name}.mcap", {0: {}}, subject=subject, created=created)
+    (logs / "picture.png").write_bytes(b"no log")
+    assert export_logs(logs, tmp_path / "out").sessions == 3
+    sessions = pd.read_csv(tmp_path / "out" / "sessions.csv")
+    assert sessions[["subject", "session", "log"]].to_numpy().tolist() == [
+        ["P07", 1, "first.mcap"], ["P07", 2, "second.mcap"], ["P08", 1, "other.mcap"],
+    ]  # fmt: skip
+
+
+def test_nothing_is_ever_replaced(log: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "trials.csv").write_text("precious")
+    with pytest.raises(InvalidValueError, match="replaces nothing"):
+        export_logs(log, tmp_path / "out")
+    assert (tmp_path / "out" / "trials.csv").read_text() == "precious"
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["trials.csv"]
+
+
+def test_an_export_that_fails_leaves_nothing_behind(log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any) -> None:
+        raise OSError("no room")
+
+    monkeypatch.setattr("isiw.export.tables.write_output", fail)
+    with pytest.raises(OSError, match="no room"):
+        export_logs(log, tmp_path / "out")
+    assert [path.name for path in tmp_path.iterdir()] == ["logs"]
+
+
+def test_a_damaged_log_exports_what_it_has_and_says_what_it_lacks(log: Path, tmp_path: Path) -> None:
+    cut_after(log, 4)
+    exported = export_logs(log, tmp_path / "out")
+    assert exported.trials == 4
+    assert any("The end of the log is missing" in loss for loss in exported.lacking)
+    assert len(pd.read_csv(tmp_path / "out" / "trials.csv")) == 4
+    assert "The end of the log is missing" in pd.read_csv(tmp_path / "out" / "sessions.csv").lacks[0]
+
+
+def test_a_log_that_nobody_can_read_does_not_keep_the_others_from_being_exported(log: Path, tmp_path: Path) -> None:
+    (log.parent / "empty.mcap").write_bytes(b"")
+    exported = export_logs(log.parent, tmp_path / "out")
+    assert (exported.sessions, exported.trials) == (1, 6)
+    assert exported.lacking == ("empty.mcap is left out: the log is empty.",)
+    log.unlink()
+    with pytest.raises(LogError, match="no log in the folder can be read"):
+        export_logs(log.parent, tmp_path / "again")
+
+
+def test_a_folder_without_logs_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    with pytest.raises(LogError, match="there is no log in the folder"):
+        export_logs(tmp_path / "logs", tmp_path / "out")
+
+
+def test_an_unknown_format_is_refused(log: Path, tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match="csv or parquet or bids"):
+        export_logs(log, tmp_path / "out", "xlsx")
+
+
+def test_texts_are_on_one_line_and_hold_nothing_that_a_terminal_obeys(tmp_path: Path) -> None:
+    write_sweeps(tmp_path / "s.mcap", {0: sweep(0)}, note('a cough\n\x1b[2Jthen,\ta "laugh"'))
+    export_logs(tmp_path / "s.mcap", tmp_path / "out")
+    (text,) = pd.read_csv(tmp_path / "out" / "events.csv").text
+    assert text == 'a cough then, a "laugh"'

@@ -1,0 +1,97 @@
+"""How windows differ: between two days of one person, and between two people."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from isiw.design import IMPACT_SPACE
+from isiw.errors import InvalidValueError
+from isiw.log.reader import SessionRecord, read_session
+from isiw.priors import Difference, differences
+from isiw.subjects.profiles import PeakProfile
+from isiw.subjects.responses import GainResponse
+from isiw.subjects.subject import SimulatedSubject
+from known import instance, known
+from priors.logged import gaussian_person, write_log
+
+
+def person(start_ms: float, gain: float = 3.0) -> SimulatedSubject:
+    usual = gaussian_person()
+    response = instance(GainResponse, usual.response)
+    profile = replace(instance(PeakProfile, usual.profile), start_ms=start_ms, width_ms=110.0)
+    return replace(usual, profile=profile, response=replace(response, gain_mv=gain * response.gain_mv))
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory: Any) -> list[SessionRecord]:
+    """P1 early, P2 late, P1 late, somebody without a window, and P1 early again."""
+    folder: Path = tmp_path_factory.mktemp("sessions")
+    sessions = [
+        ("P1", person(20.0)), ("P2", person(200.0)), ("P1", person(200.0)), ("P3", person(20.0, gain=0.0)),
+        ("P1", person(24.0)),
+    ]  # fmt: skip
+    return [
+        read_session(write_log(folder / f"{number}.mcap", who, subject=subject, trials=14, seed=number + 1))
+        for number, (subject, who) in enumerate(sessions)
+    ]
+
+
+@pytest.fixture(scope="module")
+def found(records: list[SessionRecord]) -> list[Difference]:
+    return differences(records)
+
+
+def test_a_window_that_is_later_is_said_to_be_later(found: list[Difference]) -> None:
+    assert known(found[0].starts_later) > 0.95
+    assert known(found[0].ends_later) > 0.95
+
+
+def test_only_of_the_same_person_it_is_said_whether_the_window_moved(found: list[Difference]) -> None:
+    assert [difference.same_person for difference in found] == [False, True, False, True]
+    assert found[0].moved is None
+    assert known(found[1].moved) > 0.9
+    assert known(found[3].moved) < 0.3
+
+
+def test_of_windows_at_the_same_place_neither_is_later(found: list[Difference]) -> None:
+    assert 0.05 < known(found[3].starts_later) < 0.95
+
+
+def test_of_a_session_without_a_window_nothing_is_said_but_why(found: list[Difference]) -> None:
+    assert (found[2].starts_later, found[2].ends_later, found[2].moved) == (None, None, None)
+    assert "probably no window" in found[2].obstacle
+    assert "3.mcap" in found[2].obstacle
+
+
+def test_sessions_without_a_code_are_not_taken_for_one_person(records: list[SessionRecord]) -> None:
+    nameless = replace(records[0], header=records[0].header.model_copy(update={"subject": ""}), history=())
+    assert not differences([nameless, nameless])[0].same_person
+
+
+def test_the_earlier_day_comes_first_however_the_logs_are_given(
+    records: list[SessionRecord], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order: list[str] = []
+
+    def note(first: SessionRecord, second: SessionRecord) -> float:
+        order.extend((first.header.created, second.header.created))
+        return 0.5
+
+    monkeypatch.setattr("isiw.priors.differing.moved", note)
+    monkeypatch.setattr("isiw.priors.differing._edges", lambda _: np.zeros((1, 2)))
+    earlier = records[0].header.model_copy(update={"created": "2026-11-19T10:00:00+00:00"})
+    differences([records[2], replace(records[0], header=earlier)])
+    assert order == ["2026-11-19T10:00:00+00:00", "2026-11-21T10:00:00+00:00"]
+
+
+def test_one_session_and_sessions_on_different_clocks_are_refused(records: list[SessionRecord]) -> None:
+    with pytest.raises(InvalidValueError, match="at least two"):
+        differences(records[:1])
+    other = records[1].header.model_copy(update={"space": IMPACT_SPACE})
+    with pytest.raises(InvalidValueError, match="different events"):
+        differences([records[0], replace(records[1], header=other)])

@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from isiw.log.reader import SessionRecord, read_session
+from isiw.priors import Difference
+from isiw.report.comparison import comparison_sentence, comparison_table
+from isiw.session.loop import Session
+from scripted import ScriptedDevice, scripted_strategy
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> SessionRecord:
+    Session(ScriptedDevice(), scripted_strategy(4), log=tmp_path / "s.mcap", subject="P07").run()
+    return read_session(tmp_path / "s.mcap")
+
+
+def test_the_table_has_a_line_a_session_with_its_window_and_intervals(record: SessionRecord) -> None:
+    headings, first, second = comparison_table([record, record]).splitlines()
+    assert headings.split() == ["session", "subject", "begun", "told", "P(window)", "window", "start", "end"]
+    assert "P07" in first
+    assert first.endswith("4     0.90       34–94 ms  29–39 ms  150–> ms")
+    assert second.startswith("2 ")
+
+
+def test_a_session_in_which_too_little_was_measured_says_so(record: SessionRecord) -> None:
+    empty = type(record)(record.path, record.header, (), {}, (), False)
+    assert comparison_table([empty]).splitlines()[1].endswith("–          too little was measured")
+
+
+def test_of_the_same_person_it_is_said_whether_the_window_moved(record: SessionRecord) -> None:
+    difference = Difference(record, record, same_person=True, starts_later=0.97, ends_later=0.6, moved=0.91)
+    assert comparison_sentence(difference) == (
+        "P07 (s.mcap) against P07 (s.mcap), the same person: the window moved with probability 0.91, beyond the usual "
+        "shift from day to day; it starts later with probability 0.97 and ends later with probability 0.60 (0.5 where "
+        "nothing is known)."
+    )
+
+
+def test_where_nothing_can_be_said_it_is_said_why(record: SessionRecord) -> None:
+    difference = Difference(record, record, same_person=False, obstacle="There is probably no window: s.mcap")
+    assert comparison_sentence(difference) == (
+        "P07 (s.mcap) against P07 (s.mcap), two people, or not known to be one: There is probably no window: s.mcap."
+    )
