@@ -195,6 +195,17 @@ def test_rests_between_blocks_are_waited_for_also_after_resuming(log: Path, spac
     assert t_s[3] >= 1130.0 + 120.0 - 1.0  # by the calendar, on which all three were just now
 
 
+def test_a_resumed_session_keeps_the_logged_limits_unless_others_are_given(log: Path, space: DesignSpace) -> None:
+    with open_session(scripted_strategy(9), log, limits=Limits.of_space(space, min_iti_s=0.0, max_pulses=2)) as session:
+        run(session, 2)
+    with open_session(scripted_strategy(9), log, resume=True) as session, pytest.raises(LimitExceededError):
+        session.ask()
+    assert read_session(log).header.limits.max_pulses == 2
+    more = Limits.of_space(space, min_iti_s=0.0, max_pulses=3)
+    with open_session(scripted_strategy(9), log, resume=True, limits=more) as session:
+        run(session, 1)
+
+
 @pytest.mark.parametrize("limit", [{"max_coil_c": 40.0}, {"intensity_pct_mso": 60.0}])
 def test_a_limit_of_what_nobody_reports_here_allows_nothing(
     log: Path, space: DesignSpace, limit: dict[str, float]

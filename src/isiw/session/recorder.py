@@ -58,8 +58,9 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         log: where the log is; it must not exist yet, unless the session goes on.
         resume: whether to go on with the log where there is one. What was asked and has no outcome in it becomes a
             mistrial.
-        limits: what may be asked; the strategy's space and 200 pulses by default, without an inter-trial interval.
-            Limits of the coil and of the intensity allow nothing, as nobody reports these here.
+        limits: what may be asked; the strategy's space and 200 pulses by default, without an inter-trial interval; of a
+            session that goes on, the logged ones by default. Limits of the coil and of the intensity allow nothing, as
+            nobody reports these here.
         clock: tells the time, and waits in `ask` until the interval, the rest and the period of the limits have passed,
             before the first stimulus, too, as nobody knows what came before.
         subject: the person's code, for the log.
@@ -94,13 +95,12 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
             got=f"{strategy.delivered} trials",
             remedy="Make it anew, or give the session strategy.restarted().",
         )
-    limits = limits or Limits.of_space(strategy.space, min_iti_s=0.0)
     header = header_of(
         strategy,
         subject=text("subject", subject),
         visit=visit or Visit(),
         protocol=_without_controls(protocol or VisitProtocol()),
-        limits=limits,
+        limits=limits or Limits.of_space(strategy.space, min_iti_s=0.0),
         device=DeviceInfo("a loop of the lab's own", strategy.space.reference),
         signals=SignalLimits(),
         config=dict(config or {}),
@@ -116,6 +116,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         "subject": header.subject or record.header.subject,
         "visit": visit or record.header.visit,
         "protocol": protocol or record.header.protocol,
+        "limits": limits or record.header.limits,
     }
     header = header.model_copy(update=kept)
     writer = continued(path, salvaged, record.header, replayed, header)
