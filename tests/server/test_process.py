@@ -50,6 +50,7 @@ def test_a_killed_server_loses_nothing_and_a_new_one_resumes_by_the_id(tmp_path:
     assert "came too late" in record.events[-1].text
 
 
+@pytest.mark.slow
 def test_a_server_that_is_told_to_end_closes_its_logs(tmp_path: Path) -> None:
     with server(tmp_path) as (process, url), client_at(url) as client:
         told(client, created(client), 2)
@@ -117,6 +118,7 @@ def test_others_may_ask_only_with_tls(tmp_path: Path) -> None:
     assert len({ServerSettings(tmp_path).token for _ in range(3)}) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not OPENSSL, reason="needs openssl, to make a certificate")
 def test_with_a_certificate_it_is_served_by_tls_alone(tmp_path: Path) -> None:
     key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"

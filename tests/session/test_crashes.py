@@ -160,9 +160,8 @@ def require_it_goes_on(bench: Bench, asks: list[float]) -> None:
     assert len(set(bench.delivered)) == len(bench.delivered)
 
 
-@pytest.mark.parametrize(
-    "ending", [Ending.TORN, *(pytest.param(e, marks=pytest.mark.slow) for e in (Ending.KILLED, Ending.POWER_CUT))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", list(Ending))
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_whenever_it_dies_nothing_is_lost_or_replaced_and_it_goes_on(
     scenario: Any, ending: Any, bench: Any, asks: Any

@@ -29,6 +29,7 @@ def client(cluster: LocalCluster) -> Iterator[Client]:
         yield client
 
 
+@pytest.mark.slow
 def test_a_study_has_identical_rows_on_a_cluster(tmp_path: Path, cluster: LocalCluster) -> None:
     here = conduct(tiny(), tmp_path / "here")
     there = conduct(tiny(), tmp_path / "there", DaskCluster(cluster.scheduler_address))
@@ -41,6 +42,7 @@ def test_what_raises_on_a_cluster_is_a_failure_among_the_results(client: Client)
     assert results == {0: 0, 1: 2, 2: 4, 4: 8}
 
 
+@pytest.mark.slow
 def test_what_takes_workers_of_a_cluster_down_is_given_up_and_the_others_finish(client: Client) -> None:
     results = dict(DaskCluster(client).results(double_or_die, range(5)))
     failure = results.pop(3)

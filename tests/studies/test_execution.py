@@ -28,6 +28,7 @@ def test_what_raises_is_a_failure_among_the_results(workers: int) -> None:
 
 
 @posix
+@pytest.mark.slow
 def test_what_takes_its_worker_down_again_and_again_is_given_up_and_the_others_finish() -> None:
     results = dict(Processes(2, attempts=2).results(double_or_die, range(6)))
     failure = instance(Failure, results.pop(3))

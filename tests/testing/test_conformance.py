@@ -27,6 +27,9 @@ from isiw.window import Window, WindowEstimate
 
 FEW: dict[str, Any] = {"particles": 100}
 NAMES = sorted(list_strategies())
+FITTED = ("parametric-", "gp-")
+"""Strategies whose fits take seconds begin so."""
+SLOW_FITS = [pytest.param(name, marks=pytest.mark.slow) if name.startswith(FITTED) else name for name in NAMES]
 SCORING = sorted(name for name, make in ACQUISITIONS.items() if ProposesIsi not in make(0).needs)
 
 
@@ -68,7 +71,7 @@ def test_every_acquisition_function_scores_what_breaks_things(name: str) -> None
         check_acquisition(ACQUISITIONS[name](3), particles_after(trials), VALVE_SPACE)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SLOW_FITS)
 def test_every_named_strategy_conforms(name: str) -> None:
     check_strategy(lambda: make_strategy(name, seed=1, **settings_of(name)))
 
@@ -79,7 +82,7 @@ def test_every_named_strategy_conforms_over_forty_trials(name: str) -> None:
     check_strategy(lambda: make_strategy(name, seed=1), trials=40)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SLOW_FITS)
 @pytest.mark.parametrize("people", ["recruitment", "nonresponder"])
 def test_every_named_strategy_finishes_a_session_of_forty_trials(name: str, people: str) -> None:
     strategy = make_strategy(name, seed=1, **settings_of(name))
@@ -124,7 +127,7 @@ class Broken:
         ("counts twice", "one trial more"),
         ("depends on chance", "same seed and trials"),
         ("forgets the first", "one trial more"),
-        ("weighs by the order", "order"),
+        pytest.param("weighs by the order", "order", marks=pytest.mark.slow),
     ],
 )
 def test_the_suite_finds_a_broken_model(fault: str, promise: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 
@@ -223,7 +224,7 @@ def is_judged_since(record: SessionRecord) -> bool:
     Args:
         record: the session, with an estimate.
     """
-    since = record.history[record.history.index(record.estimates[-1]) :]
+    since = itertools.takewhile(lambda entry: not isinstance(entry, Estimate), reversed(record.history))
     return any(isinstance(entry, Event) and entry.kind in VERDICTS for entry in since)
 
 

@@ -78,6 +78,7 @@ def test_model_and_posterior_keep_their_protocols() -> None:
         assert isinstance(posterior, protocol)
 
 
+@pytest.mark.slow
 def test_the_parametric_model_conforms_whatever_the_order_of_the_trials() -> None:
     model = ParametricModel(samples=64, effort=Effort(scouts=96, starts=4, steps=8, draws=150, fits=3, enough=100))
     check_model(lambda: replace(model), IMPACT_SPACE, order_tolerance_ms=0.0)
