@@ -160,8 +160,9 @@ def test_sweeps_of_another_length_are_another_run(tmp_path: Path) -> None:
         Channel(np.ones(SAMPLES), 1500.0, "V", -50.0),
         Channel(np.ones(SAMPLES), 3000.0, "V", 0.0),
         Channel(np.full(SAMPLES, np.nan), 3000.0, "V", -50.0),
+        Channel(np.full(SAMPLES, -1e9), 3000.0, "V", -50.0),
     ],
-    ids=["length", "rate", "begin", "not finite"],
+    ids=["length", "rate", "begin", "not finite", "too large"],
 )
 def test_a_channel_that_does_not_go_with_the_emg_is_left_out_and_said_to_be(tmp_path: Path, other: Channel) -> None:
     log = write_sweeps(tmp_path / "s.mcap", {0: {**sweep(0), "force": other}})

@@ -92,4 +92,4 @@ def test_sessions_without_a_code_are_different_people(tmp_path: Path) -> None:
 def test_a_log_that_cannot_be_read_is_not_named(logs: Path, tmp_path: Path) -> None:
     (logs / "meier_tuesday.mcap").write_bytes(b"")
     exported = export_logs(logs, tmp_path / "out", pseudonymise=True)
-    assert exported.lacking == ("1 logs that cannot be read are left out.",)
+    assert exported.lacking == ("Logs that are left out, as they cannot be read or are copies: 1.",)

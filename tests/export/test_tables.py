@@ -115,6 +115,13 @@ def test_a_log_that_nobody_can_read_does_not_keep_the_others_from_being_exported
         export_logs(log.parent, tmp_path / "again")
 
 
+def test_a_copy_of_a_log_counts_once(log: Path, tmp_path: Path) -> None:
+    export_logs(log, log.parent / "earlier", "bids")
+    exported = export_logs(log.parent, tmp_path / "out")
+    assert (exported.sessions, exported.trials) == (1, 6)
+    assert "it is a copy of s.mcap" in exported.lacking[0]
+
+
 def test_a_folder_without_logs_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     with pytest.raises(LogError, match="there is no log in the folder"):

@@ -19,6 +19,7 @@ from isiw.export.emg import Run
 from isiw.export.tables import SESSION_COLUMNS, session_facts, tidy
 from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.outputs import write_output
+from isiw.texts import one_line
 
 __all__ = ["write_bids"]
 
@@ -172,7 +173,7 @@ def _write_heads(folder: Path, parts: Sequence[Part], lacking: Iterable[str]) ->
 def _readme(parts: Sequence[Part], lacking: Iterable[str]) -> str:
     simulated = sum(part.record.header.device.simulated for part in parts)
     missing = [f"{part}: {loss}" for part in parts for loss in log_losses(part.record)]
-    said = "\n".join(f"- {each}" for each in [*missing, *lacking] or ["nothing"])
+    said = "\n".join(f"- {one_line(each)}" for each in [*missing, *lacking] or ["nothing"])
     return _README.format(sessions=len(parts), simulated=simulated, lacking=said)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -39,7 +40,9 @@ class Part:
 
 
 def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
-    """The sessions of a log or of a folder with logs, and a sentence for each log that cannot be read.
+    """The sessions of a log or of a folder with logs, and a sentence for each log that is left out.
+
+    Copies of a log, such as those in an earlier export, count once.
 
     Args:
         source: a log, with or without `.part`, or a folder, whose folders are looked into, too.
@@ -49,16 +52,21 @@ def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
     """
     if not Path(source).is_dir():
         return [read_session(source)], []
-    records, unreadable = [], []
+    records: dict[str, SessionRecord] = {}
+    left_out = []
     for log in _logs_of(Path(source)):
         try:
-            records.append(read_session(log))
+            record = read_session(log)
         except LogError as error:
-            unreadable.append(f"{log.name} is left out: {error.what}.")
+            left_out.append(f"{log.name} is left out: {error.what}.")
+            continue
+        first = records.setdefault(hashlib.sha256(record.path.read_bytes()).hexdigest(), record)
+        if first is not record:
+            left_out.append(f"{log.name} is left out: it is a copy of {first.path.name}.")
     if not records:
-        what = "no log in the folder can be read" if unreadable else "there is no log in the folder"
+        what = "no log in the folder can be read" if left_out else "there is no log in the folder"
         raise LogError(what, got=str(source), expected="files called .mcap or .mcap.part")
-    return records, unreadable
+    return list(records.values()), left_out
 
 
 def _logs_of(folder: Path) -> list[Path]:

@@ -49,6 +49,9 @@ EVENT_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
 """Unit and meaning of what is said about a moment of a sweep."""
 
 _SHORTEST_RECORD_S: Final = 1e-4
+_LARGEST: Final = 1e7
+"""More than a BDF file has room for, in whatever unit; what is not finite is not below it either."""
+
 _LABEL: Final = 16
 """Most characters of a channel's name in a BDF file."""
 
@@ -171,7 +174,10 @@ def _fits(channel: Channel, emg: Channel) -> bool:
     shape = (channel.rate_hz, channel.t0_ms, len(channel.values))
     if shape != (emg.rate_hz, emg.t0_ms, len(emg.values)) or not len(emg.values):
         return False
-    return bool(np.isfinite(channel.values).all()) and _record_samples(channel.rate_hz, len(emg.values)) is not None
+    return (
+        bool((np.abs(channel.values) < _LARGEST).all())
+        and _record_samples(channel.rate_hz, len(emg.values)) is not None
+    )
 
 
 def _layout(channels: Mapping[str, Channel]) -> Layout:
@@ -189,7 +195,7 @@ def _run(layout: Layout, sweeps: Sequence[tuple[Trial, Mapping[str, Channel]]]) 
 def _sentences(left_out: Mapping[str, Sequence[int]]) -> list[str]:
     return [
         f"The channel {name} is not in the EMG file in {len(numbers)} trials (first {numbers[0]}): it is not "
-        "finite, or has not the EMG's rate, begin and length."
+        "finite or too large, or has not the EMG's rate, begin and length."
         for name, numbers in left_out.items()
     ]
 

@@ -65,7 +65,7 @@ def export_logs(source: str | Path, folder: str | Path, to: str = "csv", *, pseu
     pseudonyms: Mapping[str, str] = {}
     if pseudonymise:
         records, pseudonyms = pseudonymised(records)
-        lacking = [f"{len(lacking)} logs that cannot be read are left out."] if lacking else []
+        lacking = [f"Logs that are left out, as they cannot be read or are copies: {len(lacking)}."] if lacking else []
     parts = numbered(records)
     for part in parts:
         lacking += [f"{part}: {loss}" for loss in log_losses(part.record)]
