@@ -18,7 +18,10 @@ from report.sessions import HOSTILE, tapped
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 SIZE: ViewportSize = {"width": 1000, "height": 900}
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page in")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page in"),
+]
 
 
 @dataclass

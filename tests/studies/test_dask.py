@@ -51,6 +51,7 @@ def test_what_takes_workers_of_a_cluster_down_is_given_up_and_the_others_finish(
     assert results == {0: 0, 1: 2, 2: 4, 4: 8}
 
 
+@pytest.mark.slow
 def test_stopping_early_leaves_the_cluster_free_for_others(client: Client) -> None:
     results = DaskCluster(client).results(double, range(20))
     next(results)

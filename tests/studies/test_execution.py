@@ -37,6 +37,7 @@ def test_what_takes_its_worker_down_again_and_again_is_given_up_and_the_others_f
 
 
 @posix
+@pytest.mark.slow
 def test_what_runs_while_a_worker_dies_is_run_again(tmp_path: Path) -> None:
     items = [(number, tmp_path / "witness") for number in range(6)]
     results = [(item[0], result) for item, result in Processes(2).results(double_or_die_once, items)]
