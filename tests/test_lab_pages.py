@@ -50,6 +50,7 @@ def test_the_example_of_the_folder_runs(tmp_path: Path, monkeypatch: pytest.Monk
     assert len(result.trials.told) == 6
 
 
+@pytest.mark.slow
 def test_the_example_of_lsl_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pylsl", reason="the extra lsl is not installed")
     monkeypatch.chdir(tmp_path)

@@ -236,8 +236,8 @@ def test_a_terminal_that_takes_no_output_delays_no_disarming(operator: Operator,
     operator.press(CTRL_S)
     operator.press("?" * 300)  # more than any terminal keeps, were somebody to wait for it
     operator.press(key)
-    operator.waits(lambda: not operator.armed, "disarming")
-    assert (operator.folder / "stopped").read_text() == "stop\n"
+    stopped = operator.folder / "stopped"
+    operator.waits(lambda: not operator.armed and stopped.exists() and stopped.read_text() == "stop\n", "disarming")
     operator.press(CTRL_Q)
     operator.sees("r goes on")
 

@@ -235,6 +235,7 @@ def victim(log: Path, hang: str) -> subprocess.Popen[str]:
     return process
 
 
+@pytest.mark.slow
 def test_a_session_that_is_busy_outside_python_is_disarmed_by_the_first_signal_and_ended_by_the_second(
     log: Path,
 ) -> None:

@@ -134,6 +134,7 @@ def error_of(made: isiw.LslDevice, trial: int) -> BaseException | None:
     return None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_told_as_what_it_is_and_disarms(
     fault: str, outcomes: Mapping[str, tuple[BaseException | None, BaseException | None]]
