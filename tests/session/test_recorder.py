@@ -206,6 +206,15 @@ def test_a_resumed_session_keeps_the_logged_limits_unless_others_are_given(log: 
         run(session, 1)
 
 
+def test_a_resumed_session_keeps_the_logged_configuration_unless_another_is_given(log: Path) -> None:
+    with open_session(scripted_strategy(9), log, config={"coil": "figure of eight"}) as session:
+        run(session, 1)
+    for given, kept in ((None, {"coil": "figure of eight"}), ({"coil": "round"}, {"coil": "round"})):
+        with open_session(scripted_strategy(9), log, resume=True, config=given):
+            pass
+        assert read_session(log).header.config == kept
+
+
 @pytest.mark.parametrize("limit", [{"max_coil_c": 40.0}, {"intensity_pct_mso": 60.0}])
 def test_a_limit_of_what_nobody_reports_here_allows_nothing(
     log: Path, space: DesignSpace, limit: dict[str, float]

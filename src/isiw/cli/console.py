@@ -12,7 +12,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 import isiw
-from isiw.texts import plain
+from isiw.text import plain
 
 __all__ = ["DAMAGED", "INTERRUPTED", "NO_DEFAULT", "errors_reported", "show", "show_entry"]
 

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, errors_reported, show
-from isiw.texts import plain
+from isiw.text import plain
 
 if TYPE_CHECKING:
     from isiw.studies import Store, Unit

@@ -38,7 +38,7 @@ from isiw.signals.judgement import SignalLimits
 from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
 from isiw.subjects.cohorts import COHORTS, cohort
 from isiw.subjects.subject import SimulatedSubject
-from isiw.toml_files import checked, read_toml
+from isiw.text.toml_files import checked, read_toml
 from isiw.types import Reference
 from isiw.visit import Visit, VisitProtocol
 from isiw.window import Window

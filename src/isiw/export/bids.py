@@ -19,7 +19,7 @@ from isiw.export.emg import Run
 from isiw.export.tables import SESSION_COLUMNS, session_facts, tidy
 from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.outputs import write_output
-from isiw.texts import one_line
+from isiw.text import one_line
 
 __all__ = ["write_bids"]
 

@@ -13,7 +13,7 @@ from isiw.export.collection import Part, log_losses
 from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.outputs import write_output
 from isiw.log.reader import SessionRecord
-from isiw.texts import one_line
+from isiw.text import one_line
 
 __all__ = ["EVENT_COLUMNS", "SESSION_COLUMNS", "all_trials", "session_facts", "tidy", "write_tables"]
 

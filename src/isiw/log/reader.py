@@ -21,7 +21,7 @@ from isiw.log.topics import decode
 from isiw.log.verdicts import under_all
 from isiw.log.writer import CONFIGURATION
 from isiw.strategy.stopping import StopDecision
-from isiw.toml_files import parsed
+from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial, TrialTable
 from isiw.window import ENOUGH_PAIRS
 

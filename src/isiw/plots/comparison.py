@@ -13,7 +13,7 @@ from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, save_figure, tidied
-from isiw.texts import one_line
+from isiw.text import one_line
 
 __all__ = ["comparison_figure", "save_comparison_plot"]
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, RED, save_figure, tidied
 from isiw.signals.impact import VALVE_MS
-from isiw.texts import plain
+from isiw.text import plain
 
 if TYPE_CHECKING:
     from isiw.repeatability import TimingStudy

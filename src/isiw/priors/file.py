@@ -11,7 +11,7 @@ import tomli_w
 from isiw.errors import ConfigError
 from isiw.models.particles.prior import Prior
 from isiw.priors.lab import SCHEMA_VERSION, LabPrior
-from isiw.toml_files import checked, read_toml
+from isiw.text.toml_files import checked, read_toml
 
 __all__ = ["load", "read_lab_prior", "write_lab_prior"]
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.priors.differing import Difference
-from isiw.texts import one_line
+from isiw.text import one_line
 
 __all__ = ["comparison_sentence", "comparison_table"]
 

@@ -11,7 +11,7 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.report.tables import trial_row
 from isiw.report.words import finding_sentence
-from isiw.texts import plain
+from isiw.text import plain
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
 from isiw.window import ENOUGH_PAIRS

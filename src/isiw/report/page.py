@@ -27,7 +27,7 @@ from isiw.report.drawn import drawn
 from isiw.report.facts import first_facts, further_facts, settings_facts
 from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
 from isiw.report.words import finding_sentences, fit_sentence, is_judged_since
-from isiw.texts import plain
+from isiw.text import plain
 from isiw.window import Window
 
 __all__ = ["report_page", "save_report"]

@@ -10,7 +10,7 @@ from fastapi import Response
 
 from isiw.errors import IsiwError, LimitExceededError, LogError, RequestError, told
 from isiw.server.answers import Error, ErrorAnswer
-from isiw.texts import plain
+from isiw.text import plain
 
 __all__ = ["Refusal", "answered", "as_refusal"]
 

@@ -259,7 +259,6 @@ class Sessions:
             strategy_of(header),
             self._existing(name),
             resume=True,
-            config=header.config,
             lost_pulses=lost_pulses,
             on_doubt=doubts.append,
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from isiw.session.terminal import is_terminal
-from isiw.texts import plain
+from isiw.text import plain
 
 __all__ = ["alarm", "goes_on"]
 

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from isiw.session.updates import SessionUpdate
-from isiw.texts import plain
+from isiw.text import plain
 from isiw.trials import Trial
 from isiw.window import Interval, WindowEstimate
 

@@ -67,7 +67,8 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         visit: what is noted about the visit, for the log; of a session that goes on, the logged one by default.
         protocol: intervals, blocks and rests, which `ask` waits for; of a session that goes on, the logged one by
             default. Control trials are the loop's own: `tell(None, …)` is TMS alone.
-        config: anything that should be kept in the log, as TOML values.
+        config: anything that should be kept in the log, as TOML values; of a session that goes on, what is logged by
+            default.
         lost_pulses: as for `isiw.resume`: needed where the end of the log is missing.
         on_doubt: called with what looks like a slip in what was told, or like a rig that needs somebody to look; by
             default a warning.
@@ -117,6 +118,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         "visit": visit or record.header.visit,
         "protocol": protocol or record.header.protocol,
         "limits": limits or record.header.limits,
+        "config": record.header.config if config is None else header.config,
     }
     header = header.model_copy(update=kept)
     writer = continued(path, salvaged, record.header, replayed, header)

@@ -15,7 +15,7 @@ from isiw.session.header import versions
 from isiw.session.journal import learn
 from isiw.strategy.catalogue import make_strategy, settings_for
 from isiw.strategy.strategy import Strategy
-from isiw.texts import plain
+from isiw.text import plain
 from isiw.trials import Stimulus, Trial, TrialTable
 
 __all__ = ["Replayed", "replay", "resumption_text", "strategy_of", "warn_where_differing"]

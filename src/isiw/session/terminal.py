@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from types import TracebackType
 from typing import Any, Self
 
-from isiw.texts import plain
+from isiw.text import plain
 
 if sys.platform == "win32":
     import msvcrt

@@ -30,7 +30,7 @@ from isiw.strategy.settings.common import settings_values
 from isiw.studies.batch import simulate_batch
 from isiw.studies.sessions import SimulatedSession, Stopping, simulate
 from isiw.subjects.cohorts import COHORTS
-from isiw.toml_files import checked, read_toml
+from isiw.text.toml_files import checked, read_toml
 
 __all__ = [
     "Engine",

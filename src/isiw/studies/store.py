@@ -33,7 +33,7 @@ from isiw.log.durable import put
 from isiw.log.locks import claim
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Study, Unit, study_from, study_values
-from isiw.toml_files import read_toml
+from isiw.text.toml_files import read_toml
 
 __all__ = ["Store", "begin_store", "open_store"]
 

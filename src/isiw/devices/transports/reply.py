@@ -9,7 +9,7 @@ from typing import Final, Unpack
 
 from isiw.checks import Bounds, number
 from isiw.errors import DeviceError, InvalidValueError
-from isiw.texts import plain
+from isiw.text import plain
 
 __all__ = ["LONGEST_REPLY", "Reply"]
 

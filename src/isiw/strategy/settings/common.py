@@ -24,7 +24,7 @@ from isiw.design import DesignSpace
 from isiw.errors import StrategyError
 from isiw.models.protocol import ResponseModel
 from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoWindow, SmallGain, StoppingRule
-from isiw.toml_files import checked
+from isiw.text.toml_files import checked
 
 __all__ = ["Asking", "Setting", "Settings", "Stopping", "settings_from", "settings_keys", "settings_values"]
 

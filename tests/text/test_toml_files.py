@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from isiw.errors import ConfigError
-from isiw.toml_files import checked, read_toml
+from isiw.text.toml_files import checked, read_toml
 
 
 @dataclass(frozen=True)
