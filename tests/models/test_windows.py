@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from isiw.design import DesignSpace
-from isiw.models.windows import SampledProfiles, best_window, edge_samples, profile_grid, sampled_estimate
+from isiw.models.windows import SampledProfiles, best_window, edge_samples, ends, profile_grid, sampled_estimate
 from known import known
 
 SPACE = DesignSpace(0, 9)
@@ -40,7 +40,7 @@ def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets() -> 
 
 
 def test_an_edge_at_the_border_of_the_range_lies_beyond_it() -> None:
-    edges = edge_samples(masks("1110000000", "0000011111", "0011100000"), SPACE)
+    edges = edge_samples(*ends(masks("1110000000", "0000011111", "0011100000")), SPACE)
     assert edges.tolist() == [[-np.inf, 2.0], [5.0, np.inf], [2.0, 4.0]]
 
 

@@ -26,6 +26,7 @@ __all__ = [
     "SampledProfiles",
     "best_window",
     "edge_samples",
+    "ends",
     "least_excess_mv",
     "profile_grid",
     "sampled_estimate",
@@ -66,25 +67,31 @@ def best_window(masks: Tensor, grid_ms: FloatArray) -> tuple[Window | None, floa
     return Window.from_mask(grid_ms, candidates[best].cpu().numpy() > 0), float(expected_f1)
 
 
-def edge_samples(masks: Tensor, space: DesignSpace) -> Tensor:
+def ends(masks: Tensor) -> tuple[Tensor, Tensor]:
+    """Grid index of the start and of the end of sampled windows, each of shape (s,).
+
+    Args:
+        masks: sampled windows as 0 or 1, shape (s, t); none of them empty.
+    """
+    points = masks.shape[-1]
+    rising = torch.arange(1.0, points + 1.0, device=masks.device)
+    # A largest product is found much faster than the place of the first 1.
+    last, first = ((masks * weights).amax(-1).long() for weights in (rising, rising.flip(0)))
+    return points - first, last - 1
+
+
+def edge_samples(first: Tensor, last: Tensor, space: DesignSpace) -> Tensor:
     """Start and end of sampled windows [ms], ±inf where a window runs out of the range, shape (s, 2).
 
     Args:
-        masks: sampled windows on the space's grid as 0 or 1, shape (s, t); none of them empty.
+        first: grid index of the start, shape (s,).
+        last: grid index of the end, shape (s,).
         space: the design space.
     """
-    grid = torch.tensor(space.grid_ms, dtype=masks.dtype, device=masks.device)
-    first = masks.argmax(-1)
-    last = masks.shape[-1] - 1 - masks.flip(-1).argmax(-1)
+    grid = torch.tensor(space.grid_ms, dtype=torch.float32, device=first.device)
     start = torch.where(first == 0, -torch.inf, grid[first])
-    end = torch.where(last == masks.shape[-1] - 1, torch.inf, grid[last])
+    end = torch.where(last == len(grid) - 1, torch.inf, grid[last])
     return torch.stack((start, end), dim=-1)
-
-
-def _split(masks: Tensor) -> Tensor:
-    """Which sampled windows have more than one segment, shape (s,)."""
-    rises = (masks[:, 1:] > masks[:, :-1]).sum(-1) + (masks[:, 0] > 0)
-    return rises > 1
 
 
 def profile_grid(space: DesignSpace) -> Tensor:
@@ -133,10 +140,11 @@ def sampled_estimate(
         space: the design space.
         hypotheses: of the sampled windows; None where the model has none.
     """
-    somewhere = masks.any(-1)
+    somewhere = masks.sum(-1) > 0
     present = masks[somewhere]
     probability = len(present) / len(masks)
-    edges = edge_samples(present, space)
+    first, last = ends(present)
+    edges = edge_samples(first, last, space)
     start, end = edges.median(0).values.tolist() if len(present) else (None, None)
     reported, f1 = best_window(present, space.grid_ms) if probability >= 0.5 else (None, 1.0)
     levels = torch.tensor([0.05, 0.5, 0.95], dtype=profiles.mep_mv.dtype, device=profiles.mep_mv.device)
@@ -148,7 +156,7 @@ def sampled_estimate(
         grid_ms=profile_grid(space).double().numpy(),
         edge_samples_ms=edges.double().cpu().numpy(),
         profile_quantiles_mv=torch.quantile(profiles.mep_mv, levels, dim=0).double().cpu().numpy(),
-        split_probability=float(_split(present).double().mean()) if len(present) else None,
+        split_probability=float((present.sum(-1) <= last - first).double().mean()) if len(present) else None,
         hypothesis_samples=None if hypotheses is None else hypotheses.kinds[somewhere].cpu().numpy(),
         hypothesis_names=() if hypotheses is None else hypotheses.names,
         expected_f1=f1 * (1.0 - probability if reported is None else probability),

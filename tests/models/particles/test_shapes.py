@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from isiw.models.particles.shapes import TOGETHER, Shape, ShapeKind, facilitation
+from isiw.models.particles.shapes import TOGETHER, Shape, ShapeKind, facilitation, reaches
 from isiw.subjects.profiles import PeakProfile, TwoPeakProfile
 
 ISI_MS = np.linspace(-50, 400, 451)
@@ -47,3 +47,12 @@ def test_two_peaks_far_apart_are_two_windows_by_the_rule(form: float) -> None:
     got = level(ShapeKind.TWO_PEAK, form)
     enhanced = got >= 0.135 * got.max()
     assert (np.diff(enhanced.astype(int)) == 1).sum() == 2
+
+
+@pytest.mark.parametrize("kind", ShapeKind)
+def test_a_profile_reaches_a_level_where_its_facilitation_is_at_least_that(kind: ShapeKind) -> None:
+    draws = torch.rand((4, 400), generator=torch.Generator().manual_seed(1))
+    shape = Shape(torch.full((400,), kind), 300 * draws[0], 20 + 200 * draws[1], 2 * draws[2] - 1)
+    isi_ms = torch.tensor(ISI_MS, dtype=torch.float32)
+    assert (reaches(shape, draws[3], isi_ms) == (facilitation(shape, isi_ms) >= draws[3, :, None])).all()
+    assert not reaches(shape, torch.full((400,), 2.0), isi_ms).any()

@@ -11,7 +11,7 @@ from isiw.design import DesignSpace
 from isiw.models.particles.likelihood import in_pieces, levels
 from isiw.models.particles.noise import NODES, evoked_mean, log_gain, outcome_density
 from isiw.models.particles.prior import Person
-from isiw.models.particles.shapes import highest_facilitation
+from isiw.models.particles.shapes import highest_facilitation, reaches
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
 from isiw.models.windows import least_excess_mv
@@ -57,8 +57,7 @@ class PersonSample:
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows as 0 or 1, shape (b, s, t)."""
-        level = levels(self.person, isi_ms.unsqueeze(0))
-        return (level >= self.edge_level.unsqueeze(-1)).to(level.dtype)
+        return reaches(self.person.shape, self.edge_level, isi_ms).to(torch.float32)
 
     def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
         """Expected MEP [mV], shape (b, s, t)."""

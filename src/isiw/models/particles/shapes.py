@@ -68,11 +68,32 @@ def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:
     square = offset.square_().clamp_(1e-12, 1e6)
     # Powers and second peaks are dear, and few particles have them.
     flat, double = shape.kind == ShapeKind.PLATEAU, shape.kind == ShapeKind.TWO_PEAK
-    square[flat] = square[flat].pow(torch.exp(0.75 * (shape.form[flat] + 1.0)).unsqueeze(-1))
+    square[flat] = square[flat].pow(_flatness(shape.form[flat]).unsqueeze(-1))
     level = square.mul_(-2.0 / math.log(2.0)).exp2_()  # much faster than powers of e
-    form, start_ms, width_ms = (field[double].unsqueeze(-1) for field in (shape.form, shape.start_ms, shape.width_ms))
-    level[double] = _two_peaks(form, (isi_ms.expand_as(level)[double] - start_ms) / width_ms)
+    level[double] = _two_peaks(_of(shape, double), isi_ms.expand_as(level)[double])
     return level
+
+
+def reaches(shape: Shape, level: Tensor, isi_ms: Tensor) -> Tensor:
+    """Whether facilitation is at least a level: profiles of one peak are where they cross it, and are not worked out.
+
+    Args:
+        shape: profiles, fields of shape (..., p).
+        level: facilitation, shape (..., p); nothing reaches one above 1.
+        isi_ms: ISIs [ms], shape (t,).
+
+    Returns:
+        Booleans, shape (..., p, t).
+    """
+    peak_at = _peak_at(shape)
+    peak_ms = shape.start_ms + peak_at * shape.width_ms
+    away = (-0.5 * level.log()).sqrt()  # of the crossings from the peak, in flanks; NaN where no ISI reaches the level
+    away = torch.where(shape.kind == ShapeKind.PLATEAU, away.pow(1.0 / _flatness(shape.form)), away) * shape.width_ms
+    first_ms, last_ms = peak_ms - peak_at * away, peak_ms + (1.0 - peak_at) * away
+    reached = (isi_ms >= first_ms.unsqueeze(-1)) & (isi_ms <= last_ms.unsqueeze(-1))
+    double = shape.kind == ShapeKind.TWO_PEAK
+    reached[double] = _two_peaks(_of(shape, double), isi_ms) >= level[double].unsqueeze(-1)
+    return reached
 
 
 def highest_facilitation(shape: Shape, low_ms: float, high_ms: float) -> Tensor:
@@ -95,12 +116,25 @@ def _peak_at(shape: Shape) -> Tensor:
     return torch.where(shape.kind == ShapeKind.SKEWED, 0.5 + 0.33 * shape.form, 0.5)
 
 
-def _two_peaks(form: Tensor, share: Tensor) -> Tensor:
+def _flatness(form: Tensor) -> Tensor:
+    """The power of a plateau's flanks, in squares of the distance from its middle."""
+    return torch.exp(0.75 * (form + 1.0))
+
+
+def _of(shape: Shape, which: Tensor) -> Shape:
+    return Shape(*(field[which] for field in shape))
+
+
+def _two_peaks(shape: Shape, isi_ms: Tensor) -> Tensor:
+    """Facilitation of profiles with two peaks, fields of shape (n,), at ISIs of shape (n or 1, t)."""
+    form, start_ms, width_ms = (field.unsqueeze(-1) for field in (shape.form, shape.start_ms, shape.width_ms))
+    share = (isi_ms - start_ms) / width_ms
     apart = form.abs() > TOGETHER
     sd = torch.where(apart, APART_SD, PEAK_SD)
     lower = 1.0 - 0.7 * torch.where(apart, (form.abs() - TOGETHER) / (1.0 - TOGETHER), form.abs() / TOGETHER)
     heights = torch.where(form < 0, lower, 1.0), torch.where(form < 0, 1.0, lower)
     first, second = (
-        height * torch.exp(-0.5 * ((share - at) / sd).square()) for height, at in zip(heights, PEAKS_AT, strict=True)
+        height * share.sub(at).div_(sd).square_().mul_(-0.5).exp_()
+        for height, at in zip(heights, PEAKS_AT, strict=True)
     )
     return first + second
