@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,6 +10,7 @@ from typing import Never
 import numpy as np
 import pytest
 
+from forked import Forked
 from isiw.devices.deadlines import Deadlines
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LogError, NotDelivered
@@ -250,11 +249,12 @@ def test_where_a_device_cannot_be_disarmed_the_process_ends_with_the_reason_on_s
     log: Path, how: str
 ) -> None:
     script = LOST.format(tests=str(TESTS), how=how, log=str(log))
-    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)  # noqa: S603
-    assert ended.returncode == STILL_ARMED
-    assert "went on" not in ended.stdout
-    assert "cannot be disarmed" in ended.stderr
-    assert "interlock" in ended.stderr
+    with Forked(script) as child:
+        printed, said = child.stdout.read(), child.stderr.read()
+    assert child.returncode == STILL_ARMED
+    assert "went on" not in printed
+    assert "cannot be disarmed" in said
+    assert "interlock" in said
     record = read_session(log)
     assert record.losses == ()
     assert len(record.table) == 3

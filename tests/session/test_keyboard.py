@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import select
 import signal
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Self
 
 import pytest
 
+from forked import run_and_end
 from isiw.log.reader import SessionRecord, read_session
 from isiw.session.resume import resume
 from known import known
@@ -84,7 +84,7 @@ class Operator:
         script = OPERATED.format(tests=str(TESTS), room=str(TESTS.parent / "src"), folder=str(folder), trials=TRIALS)
         self.process, self._terminal = pty.fork()
         if self.process == 0:
-            os.execv(sys.executable, [sys.executable, "-c", script])  # noqa: S606
+            run_and_end(script)
         self.settings = termios.tcgetattr(self._terminal)
 
     def __enter__(self) -> Self:

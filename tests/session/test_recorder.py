@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from forked import Forked
 from isiw.design import DesignSpace
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
@@ -324,8 +323,8 @@ time.sleep(600)
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 def test_a_killed_loop_loses_nothing(log: Path) -> None:
     script = VICTIM.format(tests=str(Path(__file__).parents[1]), log=str(log))
-    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as victim:  # noqa: S603
-        assert known(victim.stdout).readline() == "hanging\n"
+    with Forked(script) as victim:
+        assert victim.stdout.readline() == "hanging\n"
         victim.send_signal(signal.SIGKILL)
     with open_session(scripted_strategy(9), log, resume=True) as session:
         assert [trial.told for trial in session.trials] == [True, True, True, False]

@@ -4,14 +4,13 @@ import dataclasses
 import os
 import re
 import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from forked import Forked
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
@@ -400,8 +399,8 @@ def test_a_killed_session_loses_nothing_and_asks_the_same_again(
     log: Path, uninterrupted: list[float | None], point: str, open_intents: int
 ) -> None:
     script = VICTIM.format(tests=str(Path(__file__).parents[1]), point=point, log=str(log))
-    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as victim:  # noqa: S603
-        assert known(victim.stdout).readline() == "hanging\n"
+    with Forked(script) as victim:
+        assert victim.stdout.readline() == "hanging\n"
         victim.send_signal(signal.SIGKILL)
     assert victim.returncode == -signal.SIGKILL
     killed = read_session(log)

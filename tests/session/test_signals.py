@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from forked import Forked
 from isiw.log.reader import read_session
 from isiw.session.lastresort import INTERRUPTED
 from isiw.session.loop import Session
@@ -22,7 +21,6 @@ from isiw.session.resume import resume
 from isiw.session.safeguards import Safeguards
 from isiw.session.updates import SessionUpdate
 from isiw.trials import Measurement, Stimulus
-from known import known
 from scripted import ScriptedDevice, scripted_strategy
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
@@ -226,12 +224,9 @@ Session(device, strategy, log={log!r}).run()
 BUSY_IN_C = 'hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)'
 
 
-def victim(log: Path, hang: str) -> subprocess.Popen[str]:
-    script = VICTIM.format(tests=str(TESTS), log=str(log), hang=hang)
-    process = subprocess.Popen(  # noqa: S603
-        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert known(process.stdout).readline() == "hanging\n"
+def victim(log: Path, hang: str) -> Forked:
+    process = Forked(VICTIM.format(tests=str(TESTS), log=str(log), hang=hang))
+    assert process.stdout.readline() == "hanging\n"
     return process
 
 
@@ -241,10 +236,10 @@ def test_a_session_that_is_busy_outside_python_is_disarmed_by_the_first_signal_a
 ) -> None:
     with victim(log, BUSY_IN_C) as process:
         process.send_signal(signal.SIGINT)
-        assert known(process.stdout).readline() == "disarmed\n"
+        assert process.stdout.readline() == "disarmed\n"
         process.send_signal(signal.SIGINT)
-        assert process.wait(300) == INTERRUPTED
-        assert "does not react" in known(process.stderr).read()
+        assert "does not react" in process.stderr.read()
+        assert process.returncode == INTERRUPTED
     record = read_session(log)
     assert record.losses == ()
     assert len(record.table) == 3
@@ -255,10 +250,10 @@ def test_a_session_that_is_busy_outside_python_is_disarmed_by_the_first_signal_a
 def test_ctrl_z_disarms_before_it_suspends_and_a_continued_session_arms_for_nobody(log: Path) -> None:
     with victim(log, "time.sleep(600)") as process:
         process.send_signal(signal.SIGTSTP)
-        _, status = os.waitpid(process.pid, os.WUNTRACED)
+        _, status = os.waitpid(process.process, os.WUNTRACED)
         assert os.WIFSTOPPED(status)
-        assert known(process.stdout).readline() == "disarmed\n"
+        assert process.stdout.readline() == "disarmed\n"
         process.send_signal(signal.SIGCONT)
-        assert process.wait(300) != 0
+        assert process.returncode != 0
     assert len(read_session(log).table) == 3
     assert len(resume(log, ScriptedDevice(), scripted_strategy(10)).run().trials) == 10

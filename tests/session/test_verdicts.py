@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +12,7 @@ from typing import TypeAlias
 import pytest
 
 import isiw
+from forked import Forked
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session
@@ -218,7 +217,7 @@ def test_while_a_session_waits_another_thread_can_do_all_of_it_and_pause(log: Pa
 
 KILLED = """
 import os, signal, sys
-sys.path.insert(0, {tests!r})
+sys.path[:0] = [{tests!r}, {tests!r} + "/session"]
 from scripted import scripted_strategy
 from test_verdicts import loud_in, session_that
 
@@ -236,10 +235,8 @@ session_that({{4: all_of_it, 5: lambda _: os.kill(os.getpid(), signal.SIGKILL)}}
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 def test_a_killed_and_resumed_session_has_them_all_and_asks_what_it_would_have_asked(log: Path) -> None:
-    folders = os.pathsep.join([str(TESTS), str(TESTS / "session"), *sys.path])
-    script = KILLED.format(tests=str(TESTS), log=str(log))
-    killed = subprocess.run([sys.executable, "-c", script], env=os.environ | {"PYTHONPATH": folders}, check=False)  # noqa: S603
-    assert killed.returncode == -signal.SIGKILL
+    with Forked(KILLED.format(tests=str(TESTS), log=str(log))) as killed:
+        assert killed.returncode == -signal.SIGKILL
     session = resume(log, loud_in(), scripted_strategy(8))
     assert [trial.index for trial in session.trials if not trial.told] == [0, 2]
     assert session.trials[1].overruled is MistrialReason.BACKGROUND_ACTIVITY

@@ -73,7 +73,7 @@ def test_every_acquisition_function_scores_what_breaks_things(name: str) -> None
 
 @pytest.mark.parametrize("name", SLOW_FITS)
 def test_every_named_strategy_conforms(name: str) -> None:
-    check_strategy(lambda: make_strategy(name, seed=1, **settings_of(name)))
+    check_strategy(lambda: make_strategy(name, seed=1, **settings_of(name)), trials=8)
 
 
 @pytest.mark.long
