@@ -51,7 +51,7 @@ class RecruitmentBelief:
     """
 
     slopes_per_pct: tuple[float, ...] = (0.20, 0.27, 0.36)
-    sigmas_x_pct: tuple[float, ...] = (4.5, 7.0, 10.0)
+    sigmas_x_pct: tuple[float, ...] = (5.0, 8.0, 12.0)
     amplitudes_mv: tuple[float, ...] = (0.1, 0.18, 0.4, 1.0, 2.5)
     sigma_y: float = 0.4
     floor_mv: float = 0.010

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, Final
 
 from isiw.checks import choice, number
-from isiw.errors import InvalidValueError, StrategyError
+from isiw.errors import InvalidValueError
 from isiw.signals.plausibility import implausible_amplitude
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.bayes import BayesThreshold
 from isiw.strategy.threshold.hunting import MaximumLikelihood
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate, ThresholdMethod, one_sided
 from isiw.strategy.threshold.relative import FiveOfTen
+from isiw.text.toml_files import checked
 
 __all__ = ["METHODS", "ThresholdSearch", "list_threshold_methods", "make_threshold_search", "require_plausible"]
 
-METHODS: Final[Mapping[str, Callable[..., Any]]] = {
+METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen]]] = {
     "bayes": BayesThreshold,
     "maximum-likelihood": MaximumLikelihood,
     "five-of-ten": FiveOfTen,
@@ -41,15 +42,11 @@ def make_threshold_search(name: str, space: IntensityRange, **settings: Any) -> 
         **settings: what differs from the defaults of the method.
 
     Raises:
-        StrategyError: a setting that the method does not have.
-        InvalidValueError: an unknown name, or an invalid setting.
+        ConfigError: a setting that the method does not have, or an invalid one.
+        InvalidValueError: an unknown name.
     """
     choice("the method", name, METHODS)
-    try:
-        method = METHODS[name](**settings)
-    except TypeError as error:
-        raise StrategyError(f"{name} does not have such a setting", got=settings) from error
-    return ThresholdSearch(name, method, space)
+    return ThresholdSearch(name, checked(METHODS[name], settings, f"the settings of {name}"), space)
 
 
 def require_plausible(mep_mv: float) -> None:
@@ -106,10 +103,24 @@ class ThresholdSearch:
             InvalidValueError: NaN, a negative amplitude, one that no muscle gives, or not exactly one outcome.
             LimitExceededError: an intensity beyond the range or off its grid.
         """
+        self.pulses = (*self.pulses, self.checked(intensity_pct_mso, mep_mv, response=response))
+
+    def checked(self, intensity_pct_mso: float, mep_mv: float | None = None, *, response: bool | None = None) -> Pulse:
+        """What `tell` would learn from, without learning it.
+
+        Args:
+            intensity_pct_mso: as for `tell` [% MSO].
+            mep_mv: as for `tell` [mV].
+            response: as for `tell`.
+
+        Raises:
+            InvalidValueError: as for `tell`.
+            LimitExceededError: as for `tell`.
+        """
         self.space.require(number("intensity_pct_mso", intensity_pct_mso))
         if mep_mv is not None:
             require_plausible(mep_mv)
-        self.pulses = (*self.pulses, Pulse(intensity_pct_mso, mep_mv, response))
+        return Pulse(intensity_pct_mso, mep_mv, response)
 
     def estimate(self) -> ThresholdEstimate:
         """What is believed now; no number before there were both responses and pulses without one."""

@@ -1,0 +1,324 @@
+"""A logged search for the motor threshold: every intensity is on disk before it is given, and every pulse afterwards."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import isiw
+from isiw.checks import text
+from isiw.design import VALVE_SPACE
+from isiw.devices.clock import Clock, MonotonicClock
+from isiw.devices.limited import require_real_time
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import DeviceInfo
+from isiw.errors import DamagedLogError, InvalidValueError, LogError, told
+from isiw.log.durable import log_of, part_of
+from isiw.log.pulses import pulses_s
+from isiw.log.reader import SessionRecord, read_any
+from isiw.log.salvage import salvage
+from isiw.log.schema import Event, Header, Intent, PulseOutcome, StrategyRecipe, ThresholdBelief
+from isiw.log.writer import LogWriter
+from isiw.session.header import versions
+from isiw.signals.judgement import SignalLimits
+from isiw.strategy.stopping import StopDecision
+from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
+from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
+
+__all__ = ["ThresholdRecorder", "open_threshold", "outcomes", "read_threshold", "resume_threshold"]
+
+UNKNOWN = "outcome unknown"
+BY_HAND = DeviceInfo("a stimulator that is set by hand", "impact")
+
+
+def open_threshold(  # noqa: PLR0913 - all but two are keyword-only
+    search: ThresholdSearch,
+    log: str | Path,
+    *,
+    device: DeviceInfo = BY_HAND,
+    min_iti_s: float = 5.0,
+    max_pulses: int = 100,
+    clock: Clock | None = None,
+    subject: str = "",
+) -> ThresholdRecorder:
+    """Open a search for the motor threshold: ask it for intensities, and tell it what came of them.
+
+    Args:
+        search: proposes intensities and learns; before its first pulse.
+        log: where the log is; it must not exist yet.
+        device: what stimulates.
+        min_iti_s: shortest time between two pulses, which `ask` waits for [s].
+        max_pulses: most pulses, lost ones included.
+        clock: tells the time, and waits; a virtual one for a simulated device only.
+        subject: the person's code, for the log.
+
+    Raises:
+        DeviceError: a virtual clock for a device that is not simulated.
+        InvalidValueError: a search that knows of pulses already, or limits that limit nothing.
+        LogError: there is a log already, or it cannot be written.
+    """
+    if search.pulses:
+        raise InvalidValueError("the search knows of pulses that are not this log's", got=len(search.pulses))
+    header = Header(
+        isiw_version=isiw.__version__,
+        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+        subject=text("subject", subject),
+        seed=0,
+        strategy=StrategyRecipe(name=f"threshold/{search.name}", seed=0, settings=search.settings),
+        space=VALVE_SPACE,
+        limits=Limits.of_space(VALVE_SPACE, min_iti_s=min_iti_s, max_pulses=max_pulses),
+        device=device,
+        signals=SignalLimits(),
+        versions={name: version for name, version in versions().items() if name != "isiw"},
+        intensities=search.space,
+    )
+    clock = clock or MonotonicClock()
+    require_real_time(device, clock)
+    return ThresholdRecorder(search, LogWriter.create(log_of(Path(log)), header), header.limits, clock)
+
+
+def resume_threshold(log: str | Path, clock: Clock | None = None) -> ThresholdRecorder:
+    """Go on with a search where its log ends. A pulse without an outcome in it counts, and nothing is learnt from it.
+
+    Args:
+        log: the log, finished or not.
+        clock: as for `open_threshold`.
+
+    Raises:
+        DamagedLogError: the end of the log is missing, so that nobody knows how many pulses were given.
+        DeviceError: a virtual clock for a device that is not simulated.
+        LogError: no such log, or one of something else.
+    """
+    salvaged = salvage(log)
+    record = read_threshold(log)
+    clock = clock or MonotonicClock()
+    require_real_time(record.header.device, clock)
+    if record.end_lost:
+        raise DamagedLogError(
+            "the log's end is missing, so nobody knows how many pulses were given",
+            got=str(record.path),
+            remedy="Begin a new log, with the pulses that the stimulator has counted taken off max_pulses.",
+        )
+    known = outcomes(record)
+    writer = LogWriter.continuing(log, salvaged, record.header)
+    recorder = ThresholdRecorder(search_of(record), writer, record.header.limits, clock, known, pulses_s(salvaged))
+    recorder.conclude_open(record.intents)
+    return recorder
+
+
+def read_threshold(log: str | Path) -> SessionRecord:
+    """Read the log of a search for the motor threshold.
+
+    Args:
+        log: the log, finished or not.
+
+    Raises:
+        LogError: no such log, or one of something else.
+    """
+    record = read_any(salvage(log))
+    if record.header.intensities is None:
+        raise LogError(
+            "the log is of a search for a window, not of a motor threshold",
+            got=str(record.path),
+            remedy=f"isiw show {record.path} says what was found.",
+        )
+    return record
+
+
+def search_of(record: SessionRecord) -> ThresholdSearch:
+    """The search of a log, which has learnt its pulses.
+
+    Args:
+        record: the log.
+    """
+    recipe, space = record.header.strategy, record.header.intensities
+    if space is None:
+        raise InvalidValueError("the log has no range of intensities", got=str(record.path))
+    search = make_threshold_search(recipe.name.removeprefix("threshold/"), space, **recipe.settings)
+    search.pulses = tuple(_pulse(each) for each in outcomes(record) if not each.reason)
+    return search
+
+
+def outcomes(record: SessionRecord) -> tuple[PulseOutcome, ...]:
+    """What came of each pulse, as it counts after what an operator said about it.
+
+    Args:
+        record: the log.
+    """
+    excluded = {event.trial: event.text for event in record.events if event.kind == "exclusion"}
+    found = [entry for entry in record.history if isinstance(entry, PulseOutcome)]
+    return tuple(
+        each.model_copy(update={"reason": excluded[each.trial]}) if each.trial in excluded else each for each in found
+    )
+
+
+def _pulse(outcome: PulseOutcome) -> Pulse:
+    return Pulse(outcome.intensity_pct_mso, outcome.mep_mv, outcome.response)
+
+
+class ThresholdRecorder:
+    """An open search; `open_threshold` opens one. As a context manager it closes its log.
+
+    Args:
+        search: proposes intensities and learns.
+        log: the open log.
+        limits: how many pulses may be given, and how fast.
+        clock: tells the time, and waits.
+        earlier: what came of the pulses before; the search has learnt them.
+        ages_s: how long ago these were [s].
+    """
+
+    def __init__(
+        self,
+        search: ThresholdSearch,
+        log: LogWriter,
+        limits: Limits,
+        clock: Clock,
+        earlier: Sequence[PulseOutcome] = (),
+        ages_s: Sequence[float] = (),
+    ) -> None:
+        self.search, self._log, self._limits, self._clock = search, log, limits, clock
+        self.outcomes = list(earlier)
+        self._made_s = clock.now_s()
+        self._times_s = [self._made_s - age_s for age_s in sorted(ages_s, reverse=True)]
+        self._asked: float | None = None
+
+    def conclude_open(self, intents: Sequence[Intent]) -> None:
+        """Log that nobody knows the outcome of pulses that were about to be given.
+
+        Args:
+            intents: all of the log.
+        """
+        known = {outcome.trial for outcome in self.outcomes}
+        for intent in intents:
+            if intent.trial not in known and intent.intensity_pct_mso is not None:
+                self._conclude(
+                    PulseOutcome(trial=intent.trial, intensity_pct_mso=intent.intensity_pct_mso, reason=UNKNOWN)
+                )
+        self._log.append(Event(kind="resume", text=f"Went on after {len(self.outcomes)} pulses."))
+        self._log.sync()
+
+    def ask(self) -> float:
+        """The next intensity [% MSO], the same until its outcome; on disk as about to be given before this returns.
+
+        Raises:
+            LimitExceededError: a limit is reached; deliver nothing.
+            LogError: the log cannot be written; deliver nothing.
+        """
+        if self._asked is None:
+            self._limits.require_left(len(self.outcomes))
+            intensity = self.search.ask()
+            earliest_s = max(self._made_s + self._limits.min_iti_s, self._limits.earliest_s(self._times_s))
+            self._clock.sleep_s(earliest_s - self._clock.now_s())
+            now_s = self._clock.now_s()
+            trial = len(self.outcomes)
+            self._log.append(Intent(trial=trial, isi_ms=None, t_s=now_s, intensity_pct_mso=intensity))
+            self._log.sync()
+            self._asked = intensity
+        return self._asked
+
+    def tell(self, mep_mv: float | None = None, *, response: bool | None = None) -> None:
+        """What came of the intensity that was asked; it is on disk before the search learns it.
+
+        Args:
+            mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 is below the detection limit.
+            response: whether a response was seen, instead of an amplitude.
+
+        Raises:
+            InvalidValueError: nothing was asked, or a value that cannot be; nothing is logged, and the right value can
+                be told.
+            LogError: the log cannot be written.
+        """
+        pulse = self.search.checked(self._require_asked(), mep_mv, response=response)
+        self._conclude(self._outcome(mep_mv=pulse.mep_mv, response=pulse.response))
+
+    def lost(self, reason: str) -> None:
+        """That nothing can be learnt from the pulse that was asked; it counts as given.
+
+        Args:
+            reason: why.
+
+        Raises:
+            InvalidValueError: nothing was asked, or there is no reason.
+            LogError: the log cannot be written.
+        """
+        self._require_asked()
+        if not text("reason", reason).strip():
+            raise InvalidValueError("a pulse is lost for a reason", got=reason, expected="a few words")
+        self._conclude(self._outcome(reason=reason))
+
+    def exclude(self, trial: int, reason: str) -> None:
+        """Let a pulse not count from here on: an event is appended, nothing is erased.
+
+        Args:
+            trial: its number.
+            reason: why.
+
+        Raises:
+            InvalidValueError: no pulse that counts has this number.
+            LogError: the log cannot be written.
+        """
+        counting = [outcome.trial for outcome in self.outcomes if not outcome.reason]
+        if trial not in counting:
+            raise InvalidValueError("there is no such pulse to exclude", got=trial, expected=f"one of {counting}")
+        self._log.append(Event(kind="exclusion", trial=trial, text=reason))
+        self.outcomes[trial] = self.outcomes[trial].model_copy(update={"reason": reason})
+        self._learn()
+
+    def estimate(self) -> ThresholdEstimate:
+        """What is believed about the threshold now."""
+        return self.search.estimate()
+
+    def decision(self) -> StopDecision:
+        """Whether to stop now, and why."""
+        return self.search.decision()
+
+    def close(self) -> None:
+        """Close the log; calling it again is harmless."""
+        self._log.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if error is not None:
+                self._log.append(Event(kind="fault", text=told(error)))
+        finally:
+            self.close()
+
+    def _require_asked(self) -> float:
+        if self._asked is None:
+            raise InvalidValueError(
+                "nothing was asked whose outcome this could be", remedy="Call ask() first, then deliver, then tell()."
+            )
+        return self._asked
+
+    def _outcome(self, mep_mv: float | None = None, response: bool | None = None, reason: str = "") -> PulseOutcome:  # noqa: FBT001 - as `tell` was told
+        return PulseOutcome(
+            trial=len(self.outcomes),
+            intensity_pct_mso=self._require_asked(),
+            mep_mv=mep_mv,
+            response=response,
+            reason=reason,
+        )
+
+    def _conclude(self, outcome: PulseOutcome) -> None:
+        """Put a pulse on disk, then learn it, then put on disk what is believed."""
+        self._log.append(outcome)
+        self._log.sync()
+        self.outcomes.append(outcome)
+        self._asked = None
+        self._times_s.append(self._clock.now_s())
+        self._learn()
+
+    def _learn(self) -> None:
+        self.search.pulses = tuple(_pulse(outcome) for outcome in self.outcomes if not outcome.reason)
+        belief = ThresholdBelief(trial=len(self.outcomes) - 1, estimate=self.estimate(), decision=self.decision())
+        self._log.append(belief)
+        self._log.sync()
