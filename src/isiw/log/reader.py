@@ -155,7 +155,7 @@ def read_salvaged(salvaged: Salvage) -> SessionRecord:
         raise LogError(
             "the log is of a motor threshold, not of a search for a window",
             got=str(record.path),
-            remedy=f"isiw threshold {record.path} says what was found.",
+            remedy=f"isiw threshold {record.path} --show says what was found.",
         )
     return record
 

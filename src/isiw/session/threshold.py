@@ -1,22 +1,22 @@
-"""A logged search for the motor threshold: every intensity is on disk before it is given, and every pulse afterwards."""
+"""A logged search for the motor threshold: what is about to be given is on disk first, and what came of it at once."""
 
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import isiw
 from isiw.checks import text
 from isiw.design import VALVE_SPACE
-from isiw.devices.clock import Clock, MonotonicClock
+from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limited import require_real_time
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, InvalidValueError, LogError, told
-from isiw.log.durable import log_of, part_of
+from isiw.log.durable import log_of
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord, read_any
 from isiw.log.salvage import salvage
@@ -28,13 +28,13 @@ from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
 
-__all__ = ["ThresholdRecorder", "open_threshold", "outcomes", "read_threshold", "resume_threshold"]
+__all__ = ["ThresholdRecorder", "open_threshold", "outcomes", "read_threshold", "resume_threshold", "search_of"]
 
 UNKNOWN = "outcome unknown"
 BY_HAND = DeviceInfo("a stimulator that is set by hand", "impact")
 
 
-def open_threshold(  # noqa: PLR0913 - all but two are keyword-only
+def open_threshold(
     search: ThresholdSearch,
     log: str | Path,
     *,
@@ -43,6 +43,7 @@ def open_threshold(  # noqa: PLR0913 - all but two are keyword-only
     max_pulses: int = 100,
     clock: Clock | None = None,
     subject: str = "",
+    config: Mapping[str, Any] | None = None,
 ) -> ThresholdRecorder:
     """Open a search for the motor threshold: ask it for intensities, and tell it what came of them.
 
@@ -52,8 +53,9 @@ def open_threshold(  # noqa: PLR0913 - all but two are keyword-only
         device: what stimulates.
         min_iti_s: shortest time between two pulses, which `ask` waits for [s].
         max_pulses: most pulses, lost ones included.
-        clock: tells the time, and waits; a virtual one for a simulated device only.
+        clock: tells the time, and waits; a virtual one for a simulated device only, where it is the default.
         subject: the person's code, for the log.
+        config: anything that should be kept in the log, as TOML values.
 
     Raises:
         DeviceError: a virtual clock for a device that is not simulated.
@@ -73,11 +75,17 @@ def open_threshold(  # noqa: PLR0913 - all but two are keyword-only
         device=device,
         signals=SignalLimits(),
         versions={name: version for name, version in versions().items() if name != "isiw"},
+        config=dict(config or {}),
         intensities=search.space,
     )
-    clock = clock or MonotonicClock()
+    clock = _clock_for(device, clock)
+    return ThresholdRecorder(search, LogWriter.create(log_of(Path(log)), header), header, clock)
+
+
+def _clock_for(device: DeviceInfo, clock: Clock | None) -> Clock:
+    clock = clock or (VirtualClock() if device.simulated else MonotonicClock())
     require_real_time(device, clock)
-    return ThresholdRecorder(search, LogWriter.create(log_of(Path(log)), header), header.limits, clock)
+    return clock
 
 
 def resume_threshold(log: str | Path, clock: Clock | None = None) -> ThresholdRecorder:
@@ -94,8 +102,7 @@ def resume_threshold(log: str | Path, clock: Clock | None = None) -> ThresholdRe
     """
     salvaged = salvage(log)
     record = read_threshold(log)
-    clock = clock or MonotonicClock()
-    require_real_time(record.header.device, clock)
+    clock = _clock_for(record.header.device, clock)
     if record.end_lost:
         raise DamagedLogError(
             "the log's end is missing, so nobody knows how many pulses were given",
@@ -104,7 +111,7 @@ def resume_threshold(log: str | Path, clock: Clock | None = None) -> ThresholdRe
         )
     known = outcomes(record)
     writer = LogWriter.continuing(log, salvaged, record.header)
-    recorder = ThresholdRecorder(search_of(record), writer, record.header.limits, clock, known, pulses_s(salvaged))
+    recorder = ThresholdRecorder(search_of(record), writer, record.header, clock, known, pulses_s(salvaged))
     recorder.conclude_open(record.intents)
     return recorder
 
@@ -155,6 +162,12 @@ def outcomes(record: SessionRecord) -> tuple[PulseOutcome, ...]:
     )
 
 
+def _a_reason(reason: str) -> str:
+    if not text("reason", reason).strip():
+        raise InvalidValueError("nothing is left out without a reason", got=reason, expected="a few words")
+    return reason
+
+
 def _pulse(outcome: PulseOutcome) -> Pulse:
     return Pulse(outcome.intensity_pct_mso, outcome.mep_mv, outcome.response)
 
@@ -165,7 +178,7 @@ class ThresholdRecorder:
     Args:
         search: proposes intensities and learns.
         log: the open log.
-        limits: how many pulses may be given, and how fast.
+        header: what the session is: who stimulates, and how often and how fast at most.
         clock: tells the time, and waits.
         earlier: what came of the pulses before; the search has learnt them.
         ages_s: how long ago these were [s].
@@ -175,16 +188,27 @@ class ThresholdRecorder:
         self,
         search: ThresholdSearch,
         log: LogWriter,
-        limits: Limits,
+        header: Header,
         clock: Clock,
-        earlier: Sequence[PulseOutcome] = (),
+        earlier: Iterable[PulseOutcome] = (),
         ages_s: Sequence[float] = (),
     ) -> None:
-        self.search, self._log, self._limits, self._clock = search, log, limits, clock
-        self.outcomes = list(earlier)
+        self.search, self.header, self._log, self._clock = search, header, log, clock
+        self._limits = header.limits
+        self._outcomes = {outcome.trial: outcome for outcome in earlier}
         self._made_s = clock.now_s()
         self._times_s = [self._made_s - age_s for age_s in sorted(ages_s, reverse=True)]
         self._asked: float | None = None
+
+    @property
+    def outcomes(self) -> tuple[PulseOutcome, ...]:
+        """What came of each pulse so far, as it counts now, in order."""
+        return tuple(self._outcomes[trial] for trial in sorted(self._outcomes))
+
+    @property
+    def given(self) -> int:
+        """How many pulses were given, or may have been; also the number of the next one."""
+        return max(self._outcomes, default=-1) + 1
 
     def conclude_open(self, intents: Sequence[Intent]) -> None:
         """Log that nobody knows the outcome of pulses that were about to be given.
@@ -192,13 +216,12 @@ class ThresholdRecorder:
         Args:
             intents: all of the log.
         """
-        known = {outcome.trial for outcome in self.outcomes}
         for intent in intents:
-            if intent.trial not in known and intent.intensity_pct_mso is not None:
+            if intent.trial not in self._outcomes and intent.intensity_pct_mso is not None:
                 self._conclude(
                     PulseOutcome(trial=intent.trial, intensity_pct_mso=intent.intensity_pct_mso, reason=UNKNOWN)
                 )
-        self._log.append(Event(kind="resume", text=f"Went on after {len(self.outcomes)} pulses."))
+        self._log.append(Event(kind="resume", text=f"Went on after {self.given} pulses."))
         self._log.sync()
 
     def ask(self) -> float:
@@ -209,13 +232,12 @@ class ThresholdRecorder:
             LogError: the log cannot be written; deliver nothing.
         """
         if self._asked is None:
-            self._limits.require_left(len(self.outcomes))
+            self._limits.require_left(self.given)
             intensity = self.search.ask()
             earliest_s = max(self._made_s + self._limits.min_iti_s, self._limits.earliest_s(self._times_s))
             self._clock.sleep_s(earliest_s - self._clock.now_s())
             now_s = self._clock.now_s()
-            trial = len(self.outcomes)
-            self._log.append(Intent(trial=trial, isi_ms=None, t_s=now_s, intensity_pct_mso=intensity))
+            self._log.append(Intent(trial=self.given, isi_ms=None, t_s=now_s, intensity_pct_mso=intensity))
             self._log.sync()
             self._asked = intensity
         return self._asked
@@ -246,9 +268,7 @@ class ThresholdRecorder:
             LogError: the log cannot be written.
         """
         self._require_asked()
-        if not text("reason", reason).strip():
-            raise InvalidValueError("a pulse is lost for a reason", got=reason, expected="a few words")
-        self._conclude(self._outcome(reason=reason))
+        self._conclude(self._outcome(reason=_a_reason(reason)))
 
     def exclude(self, trial: int, reason: str) -> None:
         """Let a pulse not count from here on: an event is appended, nothing is erased.
@@ -258,14 +278,14 @@ class ThresholdRecorder:
             reason: why.
 
         Raises:
-            InvalidValueError: no pulse that counts has this number.
+            InvalidValueError: no pulse that counts has this number, or there is no reason.
             LogError: the log cannot be written.
         """
         counting = [outcome.trial for outcome in self.outcomes if not outcome.reason]
         if trial not in counting:
             raise InvalidValueError("there is no such pulse to exclude", got=trial, expected=f"one of {counting}")
-        self._log.append(Event(kind="exclusion", trial=trial, text=reason))
-        self.outcomes[trial] = self.outcomes[trial].model_copy(update={"reason": reason})
+        self._log.append(Event(kind="exclusion", trial=trial, text=_a_reason(reason)))
+        self._outcomes[trial] = self._outcomes[trial].model_copy(update={"reason": reason})
         self._learn()
 
     def estimate(self) -> ThresholdEstimate:
@@ -301,7 +321,7 @@ class ThresholdRecorder:
 
     def _outcome(self, mep_mv: float | None = None, response: bool | None = None, reason: str = "") -> PulseOutcome:  # noqa: FBT001 - as `tell` was told
         return PulseOutcome(
-            trial=len(self.outcomes),
+            trial=self.given,
             intensity_pct_mso=self._require_asked(),
             mep_mv=mep_mv,
             response=response,
@@ -312,13 +332,13 @@ class ThresholdRecorder:
         """Put a pulse on disk, then learn it, then put on disk what is believed."""
         self._log.append(outcome)
         self._log.sync()
-        self.outcomes.append(outcome)
+        self._outcomes[outcome.trial] = outcome
         self._asked = None
         self._times_s.append(self._clock.now_s())
         self._learn()
 
     def _learn(self) -> None:
         self.search.pulses = tuple(_pulse(outcome) for outcome in self.outcomes if not outcome.reason)
-        belief = ThresholdBelief(trial=len(self.outcomes) - 1, estimate=self.estimate(), decision=self.decision())
+        belief = ThresholdBelief(trial=self.given - 1, estimate=self.estimate(), decision=self.decision())
         self._log.append(belief)
         self._log.sync()

@@ -1,7 +1,7 @@
-"""Simulated people of whom the stimulation intensity and the place of the coil are varied, before any window is sought.
+"""Simulated people for whom the intensity and the place of the coil are varied, before any window is sought.
 
-Their recruitment curves are those of the cohorts. The curve is moved along the intensity so that half of the MEPs exceed
-50 µV at the person's resting motor threshold, which is its definition [Rossini2015].
+Their recruitment curves are those of the cohorts. The curve is moved along the intensity so that half of the MEPs
+exceed 50 µV at the person's resting motor threshold, which is its definition [Rossini2015].
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ SPOT_RANGE_MM: Final = 20.0
 SPREAD_MM: Final = (20.0, 35.0)
 
 THRESHOLD_COHORTS: Final = ("recruitment", "hand", "steep", "flat")
-"""The cohorts whose recruitment curves these people may have: forearm, hand, and less and more noise than was measured."""
+"""Whose recruitment curves these people may have: forearm, hand, and less and more noise than was measured."""
 
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(15)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
@@ -190,7 +190,10 @@ def people(name: str, n: int, seed: int) -> list[StimulatedPerson]:
     """
     choice("the cohort", name, THRESHOLD_COHORTS)
     subjects = cohort(name, whole("n", n, least=0), seed)
-    return [_person(name, seed, index, subject.response, subject.input_correlation) for index, subject in enumerate(subjects)]
+    return [
+        _person(name, seed, index, subject.response, subject.input_correlation)
+        for index, subject in enumerate(subjects)
+    ]
 
 
 def _person(name: str, seed: int, index: int, response: object, correlation: float) -> StimulatedPerson:

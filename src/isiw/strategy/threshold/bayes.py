@@ -22,9 +22,6 @@ __all__ = ["THRESHOLDS_PCT_MSO", "BayesThreshold"]
 THRESHOLDS_PCT_MSO: Final = np.arange(10.0, 130.5, 0.5)
 """Thresholds that are believed possible; those above 100 are beyond any stimulator."""
 
-BEYOND: Final = 0.95
-"""So probable must it be that the threshold is beyond the range before the search stops for that."""
-
 
 @dataclass(frozen=True)
 class BayesThreshold:
@@ -71,23 +68,22 @@ class BayesThreshold:
         """The posterior's median, and its central 90 %."""
         posterior = self.posterior(pulses)
         low, median, high = (_quantile(posterior, level) for level in (0.05, 0.5, 0.95))
-        within = space.low_pct_mso <= median <= space.high_pct_mso
-        reason = "" if within else f"it is probably {'above' if median > space.high_pct_mso else 'below'} {space}."
-        return ThresholdEstimate(median if within else None, low, high, _sd(posterior), reason)
+        return ThresholdEstimate(median, low, high, _sd(posterior)).within(space)
 
     def decision(self, pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision:
-        """Stop at a small SD, or when the threshold is beyond the range."""
+        """Stop at a small SD, or when the whole interval is beyond the range."""
         posterior = self.posterior(pulses)
-        for side, beyond in (("above", THRESHOLDS_PCT_MSO > space.high_pct_mso),
-                             ("below", THRESHOLDS_PCT_MSO < space.low_pct_mso)):  # fmt: skip
-            if (probability := float(posterior[beyond].sum())) >= BEYOND:
-                return StopDecision(True, f"The threshold is {side} {space} with a probability of {probability:.2f}.")
+        sides = {space.beyond(_quantile(posterior, level)) for level in (0.05, 0.95)}
+        if len(sides) == 1 and (side := sides.pop()):
+            return StopDecision(stop=True, reason=f"The whole 90 % interval of the threshold is {side}.")
         sd = _sd(posterior)
         if sd <= self.stop_sd_pct_mso:
-            return StopDecision(True, f"The threshold is known to ± {sd:.1f} % MSO (SD).")
+            return StopDecision(stop=True, reason=f"The threshold is known to ± {sd:.1f} % MSO (SD).")
         if len(pulses) >= self.max_pulses:
-            return StopDecision(True, f"The budget of {self.max_pulses} pulses is used up.")
-        return StopDecision(False, f"The threshold is known to ± {sd:.1f} % MSO (SD); {self.stop_sd_pct_mso:g} is wanted.")
+            return StopDecision(stop=True, reason=f"The budget of {self.max_pulses} pulses is used up.")
+        return StopDecision(
+            stop=False, reason=f"The threshold is known to ± {sd:.1f} % MSO (SD); {self.stop_sd_pct_mso:g} is wanted."
+        )
 
 
 @lru_cache(maxsize=256)

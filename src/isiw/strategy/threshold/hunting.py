@@ -45,21 +45,23 @@ class MaximumLikelihood:
     def ask(self, pulses: Sequence[Pulse], space: IntensityRange) -> float:
         """The most likely threshold, on the grid."""
         granted = [Pulse(space.low_pct_mso, response=False), Pulse(space.high_pct_mso, response=True)]
-        return space.snap(_best(*self._log_likelihood([*granted, *pulses], space)))
+        return space.snap(_best(*self._log_likelihood([*granted, *pulses])))
 
     def estimate(self, pulses: Sequence[Pulse], space: IntensityRange) -> ThresholdEstimate:
         """The most likely threshold, and what the likelihood ratio does not exclude."""
-        thresholds, log_likelihood = self._log_likelihood(pulses, space)
+        thresholds, log_likelihood = self._log_likelihood(pulses)
         likely = thresholds[log_likelihood >= log_likelihood.max() - _DROP]
-        return ThresholdEstimate(_best(thresholds, log_likelihood), float(likely[0]), float(likely[-1]))
+        best = _best(thresholds, log_likelihood)
+        return ThresholdEstimate(best, float(likely[0]), float(likely[-1])).within(space)
 
     def decision(self, pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision:
         """Stop after a fixed number of pulses."""
         del space
-        return StopDecision(len(pulses) >= self.pulses, f"{len(pulses)} of {self.pulses} pulses are given.")
+        return StopDecision(stop=len(pulses) >= self.pulses, reason=f"{len(pulses)} of {self.pulses} pulses are given.")
 
-    def _log_likelihood(self, pulses: Sequence[Pulse], space: IntensityRange) -> tuple[FloatArray, FloatArray]:
-        thresholds = np.arange(space.low_pct_mso, space.high_pct_mso + 0.05, 0.1)
+    def _log_likelihood(self, pulses: Sequence[Pulse]) -> tuple[FloatArray, FloatArray]:
+        """Thresholds [% MSO], also some beyond any stimulator, and the logarithm of their likelihoods."""
+        thresholds = np.arange(10.0, 130.05, 0.1)
         intensity = np.array([pulse.intensity_pct_mso for pulse in pulses])[:, None]
         side = np.where([pulse.responded for pulse in pulses], 1.0, -1.0)[:, None]
         z = (intensity - thresholds) / (self.relative_spread * thresholds)

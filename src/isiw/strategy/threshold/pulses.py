@@ -6,7 +6,7 @@ The resting motor threshold is the intensity at which half of the pulses evoke a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 import numpy as np
@@ -21,8 +21,9 @@ __all__ = ["CRITERION_MV", "IntensityRange", "Pulse", "ThresholdEstimate", "Thre
 CRITERION_MV: Final = 0.05
 """A larger MEP is a response [mV]."""
 
-ENOUGH_OF_A_KIND: Final = 6
-"""After so many pulses at the end of the range, all of them with or all without a response, the range is wrong."""
+ENOUGH_AT_THE_END: Final = 6
+NEAR_THE_END_PCT_MSO: Final = 3.0
+"""After so many pulses so near to the end of the range, none of which changed anything, the range is wrong."""
 
 _GRID_TOLERANCE: Final = 1e-6
 
@@ -67,6 +68,18 @@ class IntensityRange:
         """The nearest intensity on the grid [% MSO]."""
         inside = min(max(number("an intensity [% MSO]", intensity_pct_mso), self.low_pct_mso), self.high_pct_mso)
         return float(self.grid_pct_mso[self._steps(inside)])
+
+    def beyond(self, threshold_pct_mso: float) -> str | None:
+        """On which side of the range a threshold is, in words; None where it is within.
+
+        Args:
+            threshold_pct_mso: the threshold [% MSO].
+        """
+        if threshold_pct_mso > self.high_pct_mso:
+            return f"above the highest intensity, {self.high_pct_mso:g} % MSO"
+        if threshold_pct_mso < self.low_pct_mso:
+            return f"below the lowest intensity, {self.low_pct_mso:g} % MSO"
+        return None
 
     def _steps(self, intensity_pct_mso: float) -> int:
         return round((intensity_pct_mso - self.low_pct_mso) / self.step_pct_mso)
@@ -141,11 +154,20 @@ class ThresholdEstimate:
 
     def __str__(self) -> str:
         if self.threshold_pct_mso is None:
-            return f"No resting motor threshold: {self.reason}"
+            return f"No resting motor threshold. {self.reason}"
         told = f"Resting motor threshold: {self.threshold_pct_mso:.1f} % MSO"
         if self.low_pct_mso is None or self.high_pct_mso is None:
             return f"{told}."
         return f"{told} (90 % interval {self.low_pct_mso:.1f}–{self.high_pct_mso:.1f})."
+
+    def within(self, space: IntensityRange) -> ThresholdEstimate:
+        """The same, without its number where that is beyond the range.
+
+        Args:
+            space: the intensities that may be asked.
+        """
+        side = None if self.threshold_pct_mso is None else space.beyond(self.threshold_pct_mso)
+        return replace(self, threshold_pct_mso=None, reason=f"It is probably {side}.") if side else self
 
 
 class ThresholdMethod(Protocol):
@@ -176,24 +198,25 @@ class ThresholdMethod(Protocol):
         """
 
 
-def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> str | None:
-    """Why pulses of one kind only give no number, with what to do; None where there are both kinds.
+def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | None:
+    """That pulses of one kind only give no number, and whether the range can still change that; None with both kinds.
 
     Args:
         pulses: what was told so far.
         space: the intensities that may be asked.
     """
     kinds = {pulse.responded for pulse in pulses}
-    if not pulses:
-        return "nothing was told yet."
-    if kinds == {True}:
-        return (
-            f"every pulse was answered, down to {min(p.intensity_pct_mso for p in pulses):g} % MSO. The range of "
-            f"{space} may begin too high. Is the EMG quiet, and the muscle at rest?"
-        )
-    if kinds == {False}:
-        return (
-            f"no pulse was answered, up to {max(p.intensity_pct_mso for p in pulses):g} % MSO. The range of {space} "
-            "may end too low. Is the coil on the hot spot, and does the amplifier record?"
-        )
-    return None
+    if len(kinds) == 2:
+        return None
+    if not kinds:
+        return StopDecision(stop=False, reason="Nothing was told yet.")
+    answered = kinds == {True}
+    end = space.low_pct_mso if answered else space.high_pct_mso
+    at_end = sum(abs(pulse.intensity_pct_mso - end) <= NEAR_THE_END_PCT_MSO for pulse in pulses)
+    if answered:
+        seen = f"Every pulse was answered, down to {min(pulse.intensity_pct_mso for pulse in pulses):g} % MSO."
+        advice = f"The range begins too high, at {end:g} %. Or is the muscle not at rest, or the EMG not quiet?"
+    else:
+        seen = f"No pulse was answered, up to {max(pulse.intensity_pct_mso for pulse in pulses):g} % MSO."
+        advice = f"The range ends too low, at {end:g} %. Or is the coil off the hot spot, or the amplifier off?"
+    return StopDecision(at_end >= ENOUGH_AT_THE_END, f"{seen} {advice}" if at_end >= ENOUGH_AT_THE_END else seen)

@@ -106,8 +106,10 @@ def _density(belief: RecruitmentBelief, amplitude_mv: float) -> FloatArray:
 
 
 def _with_input_noise(belief: RecruitmentBelief, by_input: FloatArray) -> FloatArray:
-    """The same by distance and recruitment curve, whose order is slope, input noise, amplitude."""
-    return np.einsum("skatx,xka->tksa", _input_noise(belief), by_input).reshape(len(DISTANCES_PCT), -1)
+    """The same by distance and recruitment curve, whose order is input noise, slope, amplitude."""
+    inputs_last = np.moveaxis(by_input, 0, -1)[..., None]
+    by_curve = (_input_noise(belief) @ inputs_last)[..., 0]
+    return np.moveaxis(by_curve, -1, 0).reshape(len(DISTANCES_PCT), -1)
 
 
 @lru_cache(maxsize=4)

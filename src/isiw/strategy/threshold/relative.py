@@ -70,20 +70,24 @@ class FiveOfTen:
         if enough is None:
             return self._upwards(short, space)
         if enough == space.low_pct_mso:
-            return enough, StopDecision(True, f"the lowest intensity of {space} suffices: the range begins too high.")
+            return enough, StopDecision(
+                stop=True, reason=f"{enough:g} % MSO suffices, and the range has no less: it begins too high."
+            )
         if short is None:
             return space.snap(enough - self.large_step_pct_mso), _on(f"{enough:g} % MSO suffices.")
         if enough - short > 1.5 * space.step_pct_mso:
             return space.snap(enough - space.step_pct_mso), _on(f"It is between {short:g} and {enough:g} % MSO.")
-        return enough, StopDecision(True, f"{enough:g} % MSO suffices, and {short:g} % MSO does not.")
+        return enough, StopDecision(stop=True, reason=f"{enough:g} % MSO suffices, and {short:g} % MSO does not.")
 
     def _upwards(self, short: float | None, space: IntensityRange) -> tuple[float, StopDecision]:
         if short is None:
             return space.snap(self.start_pct_mso), _on("No intensity suffices yet.")
         if short == space.high_pct_mso:
-            return short, StopDecision(True, f"the highest intensity of {space} does not suffice: it ends too low.")
+            return short, StopDecision(
+                stop=True, reason=f"{short:g} % MSO does not suffice, and the range has no more: it ends too low."
+            )
         return space.snap(short + self.large_step_pct_mso), _on(f"{short:g} % MSO does not suffice.")
 
 
 def _on(reason: str) -> StopDecision:
-    return StopDecision(False, reason)
+    return StopDecision(stop=False, reason=reason)

@@ -24,9 +24,6 @@ METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen]
     "five-of-ten": FiveOfTen,
 }
 
-HOPELESS: Final = 6
-"""After so many pulses at an end of the range, none of which changed anything, the range is wrong."""
-
 
 def list_threshold_methods() -> dict[str, str]:
     """The named ways to a threshold and what each does in a sentence."""
@@ -124,14 +121,11 @@ class ThresholdSearch:
 
     def estimate(self) -> ThresholdEstimate:
         """What is believed now; no number before there were both responses and pulses without one."""
-        reason = one_sided(self.pulses, self.space)
-        return ThresholdEstimate(None, reason=reason) if reason else self.method.estimate(self.pulses, self.space)
+        refused = one_sided(self.pulses, self.space)
+        if refused is not None:
+            return ThresholdEstimate(None, reason=refused.reason)
+        return self.method.estimate(self.pulses, self.space)
 
     def decision(self) -> StopDecision:
         """Whether to stop now, and why; not before there were both kinds of pulses, unless the range is wrong."""
-        reason = one_sided(self.pulses, self.space)
-        if reason is None:
-            return self.method.decision(self.pulses, self.space)
-        end = self.space.low_pct_mso if self.pulses and self.pulses[0].responded else self.space.high_pct_mso
-        at_end = sum(pulse.intensity_pct_mso == end for pulse in self.pulses)
-        return StopDecision(at_end >= HOPELESS, reason[0].upper() + reason[1:])
+        return one_sided(self.pulses, self.space) or self.method.decision(self.pulses, self.space)
