@@ -1,10 +1,11 @@
 """A session: the closed loop from the first ask to the decision, and going on with one from its log."""
 
+from isiw.log.threshold import read_threshold
 from isiw.session.loop import Session
 from isiw.session.progress import PROGRESS_HEADINGS, aligned, progress_row
 from isiw.session.recorder import Recorder, open_session
 from isiw.session.resume import exclude, include, resume
-from isiw.session.threshold import ThresholdRecorder, open_threshold, read_threshold, resume_threshold, search_of
+from isiw.session.threshold import ThresholdRecorder, open_threshold, resume_threshold, search_of
 from isiw.session.threshold_loops import open_simulated, run_by_hand, run_simulated, simulated_person
 from isiw.session.updates import SessionResult, SessionUpdate
 

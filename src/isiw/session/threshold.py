@@ -15,12 +15,13 @@ from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limited import require_real_time
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
-from isiw.errors import DamagedLogError, InvalidValueError, LogError, told
+from isiw.errors import DamagedLogError, InvalidValueError, told
 from isiw.log.durable import log_of
 from isiw.log.pulses import pulses_s
-from isiw.log.reader import SessionRecord, read_any
+from isiw.log.reader import SessionRecord
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Header, Intent, PulseOutcome, StrategyRecipe, ThresholdBelief
+from isiw.log.threshold import outcomes, read_threshold_salvaged
 from isiw.log.writer import LogWriter
 from isiw.session.header import versions
 from isiw.signals.judgement import SignalLimits
@@ -28,7 +29,7 @@ from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
 
-__all__ = ["ThresholdRecorder", "open_threshold", "outcomes", "read_threshold", "resume_threshold", "search_of"]
+__all__ = ["ThresholdRecorder", "open_threshold", "resume_threshold", "search_of"]
 
 UNKNOWN = "outcome unknown"
 BY_HAND = DeviceInfo("a stimulator that is set by hand", "impact")
@@ -101,7 +102,7 @@ def resume_threshold(log: str | Path, clock: Clock | None = None) -> ThresholdRe
         LogError: no such log, or one of something else.
     """
     salvaged = salvage(log)
-    record = read_threshold(log)
+    record = read_threshold_salvaged(salvaged)
     clock = _clock_for(record.header.device, clock)
     if record.end_lost:
         raise DamagedLogError(
@@ -116,25 +117,6 @@ def resume_threshold(log: str | Path, clock: Clock | None = None) -> ThresholdRe
     return recorder
 
 
-def read_threshold(log: str | Path) -> SessionRecord:
-    """Read the log of a search for the motor threshold.
-
-    Args:
-        log: the log, finished or not.
-
-    Raises:
-        LogError: no such log, or one of something else.
-    """
-    record = read_any(salvage(log))
-    if record.header.intensities is None:
-        raise LogError(
-            "the log is of a search for a window, not of a motor threshold",
-            got=str(record.path),
-            remedy=f"isiw show {record.path} says what was found.",
-        )
-    return record
-
-
 def search_of(record: SessionRecord) -> ThresholdSearch:
     """The search of a log, which has learnt its pulses.
 
@@ -147,19 +129,6 @@ def search_of(record: SessionRecord) -> ThresholdSearch:
     search = make_threshold_search(recipe.name.removeprefix("threshold/"), space, **recipe.settings)
     search.pulses = tuple(_pulse(each) for each in outcomes(record) if not each.reason)
     return search
-
-
-def outcomes(record: SessionRecord) -> tuple[PulseOutcome, ...]:
-    """What came of each pulse, as it counts after what an operator said about it.
-
-    Args:
-        record: the log.
-    """
-    excluded = {event.trial: event.text for event in record.events if event.kind == "exclusion"}
-    found = [entry for entry in record.history if isinstance(entry, PulseOutcome)]
-    return tuple(
-        each.model_copy(update={"reason": excluded[each.trial]}) if each.trial in excluded else each for each in found
-    )
 
 
 def _a_reason(reason: str) -> str:

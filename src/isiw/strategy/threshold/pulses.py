@@ -88,8 +88,10 @@ class IntensityRange:
         """Raise where an intensity must not be delivered.
 
         Raises:
-            LimitExceededError: it is beyond the range, off the grid, or not a number.
+            InvalidValueError: it is not a finite number.
+            LimitExceededError: it is beyond the range, or off the grid.
         """
+        intensity_pct_mso = number("an intensity [% MSO]", intensity_pct_mso)
         within = self.low_pct_mso <= intensity_pct_mso <= self.high_pct_mso
         if not (within and abs(self.snap(intensity_pct_mso) - intensity_pct_mso) <= _GRID_TOLERANCE):
             raise LimitExceededError(

@@ -114,7 +114,7 @@ class ThresholdSearch:
             InvalidValueError: as for `tell`.
             LimitExceededError: as for `tell`.
         """
-        self.space.require(number("intensity_pct_mso", intensity_pct_mso))
+        self.space.require(intensity_pct_mso)
         if mep_mv is not None:
             require_plausible(mep_mv)
         return Pulse(intensity_pct_mso, mep_mv, response)
