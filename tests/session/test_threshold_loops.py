@@ -46,7 +46,13 @@ def test_amplitudes_are_taken_with_their_unit(text: str, mep_mv: float) -> None:
 
 @pytest.mark.parametrize(
     ("text", "complaint"),
-    [("80", "needs its unit"), ("", "no answer"), ("-1", "no answer"), ("nan", "no answer"), ("0.1 V", "no answer")],
+    [
+        ("80", "needs its unit"),
+        ("", "no answer"),
+        ("-1", "no answer"),
+        ("nan", "no answer"),
+        ("0.1 V", "no answer"),
+    ],
 )
 def test_what_is_no_amplitude_is_refused(text: str, complaint: str) -> None:
     with pytest.raises(InvalidValueError, match=complaint):

@@ -20,6 +20,7 @@ from isiw.checks import check_numbers, choice, number, whole
 from isiw.errors import InvalidValueError
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.responses import RecruitmentResponse, TrialNoise
+from isiw.types import FloatArray
 
 __all__ = ["CRITERION_MV", "THRESHOLD_COHORTS", "HotSpot", "StimulatedPerson", "StimulatedResponder", "people"]
 
@@ -104,7 +105,7 @@ class StimulatedPerson:
         object.__setattr__(self, "response", replace(self.response, x50_pct_rmt=_x50(self.response)))
 
     @cached_property
-    def _evoked_nodes_pct(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    def _evoked_nodes_pct(self) -> FloatArray:
         return _criterion_drive(self.response)
 
     def response_probability(self, intensity_pct_mso: float) -> float:
@@ -121,7 +122,7 @@ class StimulatedPerson:
         return StimulatedResponder(self, seed)
 
 
-def _criterion_drive(response: RecruitmentResponse) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _criterion_drive(response: RecruitmentResponse) -> FloatArray:
     """How far above x50 the input must be for an MEP of 50 µV [% RMT], by nodes of output noise and of the floor."""
     output = np.exp(response.sigma_y * _NODES)[:, None]
     floor_mv = response.floor.median_mv * np.exp(response.floor.log_sd * _NODES)
@@ -129,7 +130,7 @@ def _criterion_drive(response: RecruitmentResponse) -> np.ndarray[tuple[int], np
     return np.asarray(logit(np.clip(share, 0.0, 1.0)) / response.slope_per_pct)
 
 
-def _exceeding(drive: float, needed: np.ndarray[tuple[int], np.dtype[np.float64]], sigma_x: float) -> float:
+def _exceeding(drive: float, needed: FloatArray, sigma_x: float) -> float:
     with np.errstate(divide="ignore"):
         probability = ndtr(np.divide(drive - needed, sigma_x))
     return float(_WEIGHTS @ probability @ _WEIGHTS)

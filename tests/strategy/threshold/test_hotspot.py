@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -18,8 +19,10 @@ def distance_mm(method: BayesHotSpot | WalkedHotSpot, person: StimulatedPerson, 
     return math.hypot(found.x_mm - person.hot_spot.x_mm, found.y_mm - person.hot_spot.y_mm)
 
 
-def test_eight_pulses_come_near_the_hot_spot() -> None:
-    assert distance_mm(BayesHotSpot(step_mm=6.0), people("hand", 1, 6)[0], 8) < 8
+def test_without_noise_ten_pulses_find_the_hot_spot_to_a_step_of_the_grid() -> None:
+    (person,) = people("hand", 1, 6)
+    quiet = replace(person, response=replace(person.response, sigma_x_pct_rmt=0.0, sigma_y=0.0))
+    assert distance_mm(BayesHotSpot(), quiet, 10) < 5
 
 
 @pytest.mark.slow

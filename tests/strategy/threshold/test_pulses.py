@@ -41,7 +41,7 @@ def test_a_response_is_more_than_50_microvolts() -> None:
 @pytest.mark.parametrize(
     ("mep_mv", "response"), [(None, None), (0.1, True), (-0.1, None), (math.nan, None), (None, 1), (2000.0, None)]
 )
-def test_an_outcome_that_cannot_be_is_refused(mep_mv: float | None, response: bool | None) -> None:
+def test_an_outcome_that_cannot_be_is_refused(*, mep_mv: float | None, response: bool | None) -> None:
     with pytest.raises(InvalidValueError):
         Pulse(50, mep_mv, response)
 

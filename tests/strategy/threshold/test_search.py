@@ -22,7 +22,7 @@ METHODS = list(list_threshold_methods())
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("answer", "advice"), [(True, "begins too high, at 30 %"), (False, "ends too low, at 70 %")])
-def test_answers_of_one_kind_never_give_a_number(method: str, answer: bool, advice: str) -> None:
+def test_answers_of_one_kind_never_give_a_number(*, method: str, answer: bool, advice: str) -> None:
     search = make_threshold_search(method, SPACE)
     while not search.decision().stop:
         assert search.estimate().threshold_pct_mso is None
