@@ -24,7 +24,8 @@ import typer
 import isiw
 from isiw.strategy.threshold import IntensityRange, ThresholdSearch, make_threshold_search
 from isiw.strategy.threshold.hotspot import BayesHotSpot, CoilPulse, WalkedHotSpot
-from isiw.subjects.thresholds import CRITERION_MV, StimulatedPerson, people
+from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
+from isiw.trials import RESPONSE_MV
 
 SPACE = IntensityRange(20, 100)
 MOST_PULSES = 200
@@ -74,7 +75,7 @@ def sought(way: Way, person: StimulatedPerson, seed: int) -> dict[str, float | N
         intensity = search.ask()
         mep_mv = responder.respond(intensity)
         if way.seen_only:
-            search.tell(intensity, response=mep_mv > CRITERION_MV)
+            search.tell(intensity, response=mep_mv > RESPONSE_MV)
         else:
             search.tell(intensity, mep_mv)
     found = search.estimate()
@@ -93,7 +94,9 @@ def threshold_row(cohort: str, way: Way, n: int, seed: int) -> dict[str, object]
         n: how many people.
         seed: of the people and their noise.
     """
-    rows = pd.DataFrame(sought(way, person, seed + i) for i, person in enumerate(people(cohort, n, seed))).astype(float)
+    rows = pd.DataFrame(
+        sought(way, person, seed + i) for i, person in enumerate(threshold_cohort(cohort, n, seed))
+    ).astype(float)
     error = rows["error"].abs()
     return {
         "people": cohort,
@@ -122,7 +125,7 @@ def spot_errors(method: BayesHotSpot | WalkedHotSpot, person: StimulatedPerson, 
     for _ in range(pulses):
         x_mm, y_mm = method.ask(told)
         told.append(CoilPulse(x_mm, y_mm, responder.respond(intensity, x_mm, y_mm)))
-    if all(pulse.mep_mv <= CRITERION_MV for pulse in told):
+    if all(pulse.mep_mv <= RESPONSE_MV for pulse in told):
         return float("nan")
     found = method.estimate(told)
     return float(np.hypot(found.x_mm - person.hot_spot.x_mm, found.y_mm - person.hot_spot.y_mm))
@@ -140,7 +143,10 @@ def spot_rows(cohort: str, n: int, seed: int) -> Iterable[dict[str, object]]:
     ways = [("bayes", BayesHotSpot(), pulses) for pulses in (10, 20)]
     for name, method, pulses in [*ways, *(("walk of the grid", walk, walk.pulses) for walk in walks)]:
         errors = pd.Series(
-            [spot_errors(method, person, pulses, seed + i) for i, person in enumerate(people(cohort, n, seed))]
+            [
+                spot_errors(method, person, pulses, seed + i)
+                for i, person in enumerate(threshold_cohort(cohort, n, seed))
+            ]
         )
         yield {
             "people": cohort,

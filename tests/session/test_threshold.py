@@ -24,8 +24,8 @@ from isiw.session import (
     run_simulated,
     search_of,
 )
-from isiw.strategy.threshold import IntensityRange, ThresholdSearch, make_threshold_search
-from scripted import FakeRealClock, scripted_strategy
+from isiw.strategy.threshold import IntensityRange, MaximumLikelihood, ThresholdSearch, make_threshold_search
+from scripted import FakeRealClock, ScriptedDevice, scripted_strategy
 
 SIMULATED = DeviceInfo("nobody", "impact", simulated=True)
 SPACE = IntensityRange(20, 80)
@@ -163,7 +163,7 @@ def test_no_window_is_learnt_from_the_log_of_a_threshold_and_no_threshold_from_t
     with pytest.raises(LogError, match="isiw threshold"):
         isiw.read_session(log)
     with pytest.raises(LogError, match="isiw threshold"):
-        isiw.resume(log, isiw.SimulatedDevice(isiw.SimulatedPerson(lambda _: None, "impact")))  # type: ignore[arg-type,return-value]
+        isiw.resume(log, ScriptedDevice())
     window = tmp_path / "w.mcap"
     open_session(scripted_strategy(3), window).close()
     with pytest.raises(LogError, match="search for a window"):
@@ -206,3 +206,18 @@ def test_a_search_with_pulses_of_its_own_is_refused(log: Path) -> None:
     used.tell(50, 0.1)
     with pytest.raises(InvalidValueError, match="not this log's"):
         open_threshold(used, log)
+
+
+def test_a_method_of_ones_own_is_logged_and_needed_again(log: Path) -> None:
+    def own() -> ThresholdSearch:
+        return ThresholdSearch("my own", MaximumLikelihood(), SPACE)
+
+    with open_threshold(own(), log, device=SIMULATED) as recorder:
+        answer(recorder, 3)
+        expected = recorder.ask()
+    with pytest.raises(InvalidValueError, match="method is unknown"):
+        resume_threshold(log)
+    with pytest.raises(InvalidValueError, match="another range"):
+        resume_threshold(log, ThresholdSearch("my own", MaximumLikelihood(), IntensityRange(20, 90)))
+    with resume_threshold(log, own()) as resumed:
+        assert resumed.ask() == expected

@@ -89,16 +89,20 @@ def _clock_for(device: DeviceInfo, clock: Clock | None) -> Clock:
     return clock
 
 
-def resume_threshold(log: str | Path, clock: Clock | None = None) -> ThresholdRecorder:
+def resume_threshold(
+    log: str | Path, search: ThresholdSearch | None = None, *, clock: Clock | None = None
+) -> ThresholdRecorder:
     """Go on with a search where its log ends. A pulse without an outcome in it counts, and nothing is learnt from it.
 
     Args:
         log: the log, finished or not.
+        search: needed where the method is one of your own: the same again.
         clock: as for `open_threshold`.
 
     Raises:
         DamagedLogError: the end of the log is missing, so that nobody knows how many pulses were given.
         DeviceError: a virtual clock for a device that is not simulated.
+        InvalidValueError: a search with another range than the log's, or none for a method of one's own.
         LogError: no such log, or one of something else.
     """
     salvaged = salvage(log)
@@ -110,23 +114,27 @@ def resume_threshold(log: str | Path, clock: Clock | None = None) -> ThresholdRe
             got=str(record.path),
             remedy="Begin a new log, with the pulses that the stimulator has counted taken off max_pulses.",
         )
-    known = outcomes(record)
+    search, known = search_of(record, search), outcomes(record)
     writer = LogWriter.continuing(log, salvaged, record.header)
-    recorder = ThresholdRecorder(search_of(record), writer, record.header, clock, known, pulses_s(salvaged))
+    recorder = ThresholdRecorder(search, writer, record.header, clock, known, pulses_s(salvaged))
     recorder.conclude_open(record.intents)
     return recorder
 
 
-def search_of(record: SessionRecord) -> ThresholdSearch:
+def search_of(record: SessionRecord, search: ThresholdSearch | None = None) -> ThresholdSearch:
     """The search of a log, which has learnt its pulses.
 
     Args:
         record: the log.
+        search: as for `resume_threshold`.
+
+    Raises:
+        InvalidValueError: as for `resume_threshold`.
     """
     recipe, space = record.header.strategy, record.header.intensities
-    if space is None:
-        raise InvalidValueError("the log has no range of intensities", got=str(record.path))
-    search = make_threshold_search(recipe.name.removeprefix("threshold/"), space, **recipe.settings)
+    if space is None or (search is not None and search.space != space):
+        raise InvalidValueError("the log has another range of intensities", got=space)
+    search = search or make_threshold_search(recipe.name.removeprefix("threshold/"), space, **recipe.settings)
     search.pulses = tuple(_pulse(each) for each in outcomes(record) if not each.reason)
     return search
 

@@ -14,7 +14,7 @@ from isiw.log.schema import Header
 from isiw.session.threshold import ThresholdRecorder, open_threshold
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.search import ThresholdSearch
-from isiw.subjects.thresholds import StimulatedPerson, people
+from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
 
 __all__ = ["ANSWERS", "amplitude_of", "open_simulated", "run_by_hand", "run_simulated", "simulated_person"]
 
@@ -48,7 +48,7 @@ def open_simulated(
         InvalidValueError: an unknown cohort or a negative seed, or as for `open_threshold`.
         LogError: as for `open_threshold`.
     """
-    people(cohort, 1, seed)
+    threshold_cohort(cohort, 1, seed)
     config = {_SIMULATED: {"cohort": cohort, "seed": seed}}
     return open_threshold(
         search, log, device=DeviceInfo("a simulated person", "impact", simulated=True), config=config, **options
@@ -62,7 +62,7 @@ def simulated_person(header: Header) -> StimulatedPerson | None:
         header: of the log.
     """
     drawn = header.config.get(_SIMULATED) if header.device.simulated else None
-    return None if drawn is None else people(drawn["cohort"], 1, drawn["seed"])[0]
+    return None if drawn is None else threshold_cohort(drawn["cohort"], 1, drawn["seed"])[0]
 
 
 def run_simulated(recorder: ThresholdRecorder, say: Callable[[str], None]) -> StopDecision:

@@ -6,7 +6,7 @@ from isiw.subjects.labs import LABS, Lab, lab
 from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.subjects.subject import Drift, Responder, Response, SimulatedSubject
-from isiw.subjects.thresholds import THRESHOLD_COHORTS, HotSpot, StimulatedPerson, StimulatedResponder, people
+from isiw.subjects.thresholds import THRESHOLD_COHORTS, HotSpot, StimulatedPerson, StimulatedResponder, threshold_cohort
 
 __all__ = [
     "COHORTS",
@@ -32,5 +32,5 @@ __all__ = [
     "another_day",
     "cohort",
     "lab",
-    "people",
+    "threshold_cohort",
 ]

@@ -20,12 +20,10 @@ from isiw.checks import check_numbers, choice, number, whole
 from isiw.errors import InvalidValueError
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.responses import RecruitmentResponse, TrialNoise
+from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
-__all__ = ["CRITERION_MV", "THRESHOLD_COHORTS", "HotSpot", "StimulatedPerson", "StimulatedResponder", "people"]
-
-CRITERION_MV: Final = 0.05
-"""A larger MEP is a response [mV] [Rossini2015]."""
+__all__ = ["THRESHOLD_COHORTS", "HotSpot", "StimulatedPerson", "StimulatedResponder", "threshold_cohort"]
 
 RMT_PCT_MSO: Final = (30.0, 80.0)
 """Between these the thresholds of simulated people are uniform [% MSO]."""
@@ -105,13 +103,13 @@ class StimulatedPerson:
         object.__setattr__(self, "response", replace(self.response, x50_pct_rmt=_x50(self.response)))
 
     @cached_property
-    def _evoked_nodes_pct(self) -> FloatArray:
+    def _needed_drive_pct(self) -> FloatArray:
         return _criterion_drive(self.response)
 
     def response_probability(self, intensity_pct_mso: float) -> float:
         """Probability of an MEP above 50 µV at the hot spot, by intensity [% MSO]."""
         drive = 100 * intensity_pct_mso / self.rmt_pct_mso - self.response.x50_pct_rmt
-        return _exceeding(drive, self._evoked_nodes_pct, self.response.sigma_x_pct_rmt)
+        return _exceeding(drive, self._needed_drive_pct, self.response.sigma_x_pct_rmt)
 
     def begin(self, seed: int) -> StimulatedResponder:
         """What answers stimuli.
@@ -126,7 +124,7 @@ def _criterion_drive(response: RecruitmentResponse) -> FloatArray:
     """How far above x50 the input must be for an MEP of 50 µV [% RMT], by nodes of output noise and of the floor."""
     output = np.exp(response.sigma_y * _NODES)[:, None]
     floor_mv = response.floor.median_mv * np.exp(response.floor.log_sd * _NODES)
-    share = (CRITERION_MV - floor_mv) / (response.amplitude_mv * output)
+    share = (RESPONSE_MV - floor_mv) / (response.amplitude_mv * output)
     return np.asarray(logit(np.clip(share, 0.0, 1.0)) / response.slope_per_pct)
 
 
@@ -178,7 +176,7 @@ class StimulatedResponder:
         return at.sample_evoked_mv(0.0, TrialNoise(self._input_z), rng) + floor_mv
 
 
-def people(name: str, n: int, seed: int) -> list[StimulatedPerson]:
+def threshold_cohort(name: str, n: int, seed: int) -> list[StimulatedPerson]:
     """The first n people with the recruitment curves of a cohort, and thresholds of 30–80 % MSO.
 
     Args:

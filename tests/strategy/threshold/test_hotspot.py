@@ -7,7 +7,7 @@ import pytest
 
 from isiw.errors import InvalidValueError
 from isiw.strategy.threshold.hotspot import BayesHotSpot, CoilPulse, WalkedHotSpot
-from isiw.subjects.thresholds import StimulatedPerson, people
+from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
 
 
 def distance_mm(method: BayesHotSpot | WalkedHotSpot, person: StimulatedPerson, pulses: int) -> float:
@@ -20,14 +20,14 @@ def distance_mm(method: BayesHotSpot | WalkedHotSpot, person: StimulatedPerson, 
 
 
 def test_without_noise_ten_pulses_find_the_hot_spot_to_a_step_of_the_grid() -> None:
-    (person,) = people("hand", 1, 6)
+    (person,) = threshold_cohort("hand", 1, 6)
     quiet = replace(person, response=replace(person.response, sigma_x_pct_rmt=0.0, sigma_y=0.0))
     assert distance_mm(BayesHotSpot(), quiet, 10) < 5
 
 
 @pytest.mark.slow
 def test_twelve_pulses_find_the_hot_spot_nearer_than_a_walk_of_25() -> None:
-    somebody = people("hand", 4, 6)
+    somebody = threshold_cohort("hand", 4, 6)
     assert all(distance_mm(BayesHotSpot(), person, 12) < 8 for person in somebody)
     walked = [distance_mm(WalkedHotSpot(repeats=1), person, 25) for person in somebody]
     assert sum(walked) > sum(distance_mm(BayesHotSpot(), person, 12) for person in somebody)

@@ -19,7 +19,7 @@ from isiw.strategy.threshold import (
     make_threshold_search,
 )
 from isiw.strategy.threshold.bayes import THRESHOLDS_PCT_MSO
-from isiw.subjects.thresholds import people
+from isiw.subjects.thresholds import threshold_cohort
 
 SPACE = IntensityRange(20, 100)
 
@@ -123,7 +123,7 @@ def test_settings_that_cannot_be_are_refused(wrong: Callable[[], object]) -> Non
 @pytest.mark.parametrize("cohort", ["recruitment", "hand"])
 def test_within_twelve_pulses_the_mean_error_is_at_most_2_pct_mso_and_intervals_cover(cohort: str) -> None:
     errors, covered = [], []
-    for number, person in enumerate(people(cohort, 40, 2)):
+    for number, person in enumerate(threshold_cohort(cohort, 40, 2)):
         search, responder = make_threshold_search("bayes", SPACE, stop_sd_pct_mso=0.01), person.begin(number)
         for _ in range(12):
             intensity = search.ask()

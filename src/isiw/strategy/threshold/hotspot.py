@@ -16,8 +16,8 @@ from scipy.special import softmax
 
 from isiw.checks import check_amplitude, check_numbers, check_wholes
 from isiw.errors import InvalidValueError
-from isiw.strategy.threshold.pulses import CRITERION_MV
 from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief, log_likelihood
+from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
 __all__ = ["BayesHotSpot", "CoilPulse", "HotSpotEstimate", "WalkedHotSpot"]
@@ -68,11 +68,11 @@ class HotSpotEstimate(NamedTuple):
 
 
 def _require_a_response(pulses: Sequence[CoilPulse]) -> None:
-    if not any(pulse.mep_mv > CRITERION_MV for pulse in pulses):
+    if not any(pulse.mep_mv > RESPONSE_MV for pulse in pulses):
         raise InvalidValueError(
             "no pulse was answered, so nobody can say where the hot spot is",
             got=len(pulses),
-            expected=f"at least one MEP above {1000 * CRITERION_MV:g} µV",
+            expected=f"at least one MEP above {1000 * RESPONSE_MV:g} µV",
             remedy="Search with a higher intensity, or in another area.",
         )
 
@@ -208,7 +208,7 @@ def _distances(settings: BayesHotSpot, coil: FloatArray) -> FloatArray:
 @lru_cache(maxsize=256)
 def _told(settings: BayesHotSpot, pulse: CoilPulse) -> FloatArray:
     """Log-likelihood of a pulse by the hot spot's place, what else is unknown, and recruitment curve."""
-    table = log_likelihood(settings.curves, pulse.mep_mv, responded=pulse.mep_mv > CRITERION_MV)
+    table = log_likelihood(settings.curves, pulse.mep_mv, responded=pulse.mep_mv > RESPONSE_MV)
     distances = _distances(settings, np.array([[pulse.x_mm, pulse.y_mm]]))[0]
     rows = np.clip(np.rint(distances - DISTANCES_PCT[0]).astype(int), 0, len(DISTANCES_PCT) - 1)
     return np.asarray(table[rows])

@@ -24,8 +24,8 @@ _DROP: Final = 0.5 * float(chi2.ppf(0.9, 1))  # of the log-likelihood at the end
 class MaximumLikelihood:
     """Uses only whether there was a response, whose probability is a cumulative normal of the intensity.
 
-    A response at the highest intensity and none at the lowest are taken for granted at first, so that there is a
-    maximum before both have been seen.
+    When it asks it takes a response at the highest intensity and none at the lowest for granted, so that there is a
+    maximum from the first pulse on; when it estimates it does not.
 
     Args:
         relative_spread: SD of the cumulative normal, as a share of the threshold.

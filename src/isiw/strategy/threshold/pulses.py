@@ -14,12 +14,10 @@ import numpy as np
 from isiw.checks import check_amplitude, check_numbers, number
 from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.strategy.stopping import StopDecision
+from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
-__all__ = ["CRITERION_MV", "IntensityRange", "Pulse", "ThresholdEstimate", "ThresholdMethod", "one_sided"]
-
-CRITERION_MV: Final = 0.05
-"""A larger MEP is a response [mV]."""
+__all__ = ["IntensityRange", "Pulse", "ThresholdEstimate", "ThresholdMethod", "one_sided"]
 
 ENOUGH_AT_THE_END: Final = 6
 NEAR_THE_END_PCT_MSO: Final = 3.0
@@ -133,7 +131,7 @@ class Pulse:
     @property
     def responded(self) -> bool:
         """Whether there was a response: an MEP above 50 µV."""
-        return bool(self.response) if self.mep_mv is None else self.mep_mv > CRITERION_MV
+        return bool(self.response) if self.mep_mv is None else self.mep_mv > RESPONSE_MV
 
 
 @dataclass(frozen=True)

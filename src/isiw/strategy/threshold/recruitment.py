@@ -16,7 +16,7 @@ from scipy.special import log_expit, ndtr
 from scipy.stats import norm
 
 from isiw.checks import ascending, check_numbers
-from isiw.strategy.threshold.pulses import CRITERION_MV
+from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
 __all__ = ["DISTANCES_PCT", "RecruitmentBelief", "log_likelihood"]
@@ -62,7 +62,7 @@ class RecruitmentBelief:
         for name in ("slopes_per_pct", "sigmas_x_pct", "amplitudes_mv"):
             object.__setattr__(self, name, ascending(name, getattr(self, name), above=0))
         check_numbers(self, "sigma_y", "floor_mv", "floor_log_sd", above=0)
-        check_numbers(self, "visible_mv", above=0, most=CRITERION_MV)
+        check_numbers(self, "visible_mv", above=0, most=RESPONSE_MV)
 
 
 @lru_cache(maxsize=256)
@@ -77,7 +77,7 @@ def log_likelihood(belief: RecruitmentBelief, mep_mv: float | None, *, responded
     if mep_mv is not None and mep_mv >= belief.visible_mv:
         density = _with_input_noise(belief, _density(belief, mep_mv))
         return np.asarray(np.log((1 - ODD) * density + ODD * _ODD_DENSITY))
-    larger = _with_input_noise(belief, _exceeding(belief, CRITERION_MV if mep_mv is None else belief.visible_mv))
+    larger = _with_input_noise(belief, _exceeding(belief, RESPONSE_MV if mep_mv is None else belief.visible_mv))
     return np.asarray(np.log((1 - ODD) * (larger if responded else 1 - larger) + 0.5 * ODD))
 
 
@@ -116,7 +116,7 @@ def _with_input_noise(belief: RecruitmentBelief, by_input: FloatArray) -> FloatA
 def _input_noise(belief: RecruitmentBelief) -> FloatArray:
     """How likely each input is, by input noise, slope, amplitude and distance."""
     sigmas, centres = np.array(belief.sigmas_x_pct), _INPUTS_PCT[::4]
-    larger = np.einsum("stx,xka->skat", _weights(centres, sigmas[:, None]), _exceeding(belief, CRITERION_MV))
+    larger = np.einsum("stx,xka->skat", _weights(centres, sigmas[:, None]), _exceeding(belief, RESPONSE_MV))
     thresholds = np.array([np.interp(0.5, curve, centres) for curve in larger.reshape(-1, len(centres))])
     return _weights(thresholds.reshape(larger.shape[:-1])[..., None] + DISTANCES_PCT, sigmas[:, None, None, None])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, is_dataclass
 from typing import Any, Final
 
 from isiw.checks import choice, number
@@ -75,8 +75,9 @@ class ThresholdSearch:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of the method, as plain values."""
-        return asdict(self.method)  # type: ignore[call-overload,no-any-return]  # methods are dataclasses
+        """The settings of the method, as plain values; of one's own, which is no dataclass, there are none."""
+        own = is_dataclass(self.method) and not isinstance(self.method, type)
+        return asdict(self.method) if own else {}
 
     def ask(self) -> float:
         """The next intensity [% MSO], on the grid and within the range; the same until the next `tell`.
