@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shutil
 from pathlib import Path
 
@@ -40,8 +41,8 @@ def search(method: str = "maximum-likelihood") -> ThresholdSearch:
     return make_threshold_search(method, SPACE)
 
 
-def opened(log: Path, method: str = "maximum-likelihood", **options: int) -> ThresholdRecorder:
-    return open_threshold(search(method), log, device=SIMULATED, subject="P1", **options)
+def opened(log: Path, method: str = "maximum-likelihood", max_pulses: int = 100) -> ThresholdRecorder:
+    return open_threshold(search(method), log, device=SIMULATED, subject="P1", max_pulses=max_pulses)
 
 
 def answer(recorder: ThresholdRecorder, pulses: int) -> list[float]:
@@ -94,6 +95,20 @@ def test_a_pulse_without_an_outcome_counts_and_is_not_learnt(log: Path) -> None:
         assert resumed.given == 3
         assert resumed.outcomes[-1].reason == "outcome unknown"
         assert len(resumed.search.pulses) == 2
+
+
+def test_pulses_that_a_damaged_log_has_lost_count(log: Path) -> None:
+    with opened(log) as recorder:
+        answer(recorder, 4)
+    content = bytearray(log.read_bytes())
+    blocks = [*re.finditer(b"\x04\x00\x00\x00zstd", content)]  # a header, then intent, outcome and belief of each
+    for block in blocks[10:13]:
+        content[block.end() + 20] ^= 0xFF
+    log.write_bytes(content)
+    assert len(read_threshold(log).losses) >= 3
+    with resume_threshold(log) as resumed:
+        assert resumed.given == 4
+        assert (resumed.outcomes[-1].reason, resumed.outcomes[-1].intensity_pct_mso) == ("outcome unknown", None)
 
 
 def test_no_more_pulses_are_given_than_the_limit(log: Path) -> None:

@@ -117,10 +117,13 @@ class Intent(_Record):
 
 
 class PulseOutcome(_Record):
-    """What came of a pulse on the way to a motor threshold; with a `reason`, nothing was learnt from it."""
+    """What came of a pulse on the way to a motor threshold; with a `reason`, nothing was learnt from it.
+
+    The intensity is None where the log has lost it.
+    """
 
     trial: TrialNumber
-    intensity_pct_mso: float
+    intensity_pct_mso: float | None
     mep_mv: float | None = None
     response: bool | None = None
     reason: str = ""

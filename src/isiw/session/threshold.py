@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, Self
 
 import isiw
-from isiw.checks import text
+from isiw.checks import number, text
 from isiw.design import VALVE_SPACE
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limited import require_real_time
@@ -117,7 +117,7 @@ def resume_threshold(
     search, known = search_of(record, search), outcomes(record)
     writer = LogWriter.continuing(log, salvaged, record.header)
     recorder = ThresholdRecorder(search, writer, record.header, clock, known, pulses_s(salvaged))
-    recorder.conclude_open(record.intents)
+    recorder.conclude_open(record.unknown)
     return recorder
 
 
@@ -146,7 +146,7 @@ def _a_reason(reason: str) -> str:
 
 
 def _pulse(outcome: PulseOutcome) -> Pulse:
-    return Pulse(outcome.intensity_pct_mso, outcome.mep_mv, outcome.response)
+    return Pulse(number("intensity_pct_mso", outcome.intensity_pct_mso), outcome.mep_mv, outcome.response)
 
 
 class ThresholdRecorder:
@@ -191,13 +191,12 @@ class ThresholdRecorder:
         """Log that nobody knows the outcome of pulses that were about to be given.
 
         Args:
-            intents: all of the log.
+            intents: what was given by the log, or may have been.
         """
         for intent in intents:
-            if intent.trial not in self._outcomes and intent.intensity_pct_mso is not None:
-                self._conclude(
-                    PulseOutcome(trial=intent.trial, intensity_pct_mso=intent.intensity_pct_mso, reason=UNKNOWN)
-                )
+            if intent.trial not in self._outcomes:
+                at = intent.intensity_pct_mso
+                self._conclude(PulseOutcome(trial=intent.trial, intensity_pct_mso=at, reason=UNKNOWN))
         self._log.append(Event(kind="resume", text=f"Went on after {self.given} pulses."))
         self._log.sync()
 

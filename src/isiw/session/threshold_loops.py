@@ -81,7 +81,8 @@ def run_simulated(recorder: ThresholdRecorder, say: Callable[[str], None]) -> St
         raise ConfigError("the log is of no simulated person", got=recorder.header.device.name)
     responder = person.begin(recorder.header.config[_SIMULATED]["seed"])
     for outcome in recorder.outcomes:  # so that the person's noise goes on where it was
-        responder.respond(outcome.intensity_pct_mso)
+        if outcome.intensity_pct_mso is not None:
+            responder.respond(outcome.intensity_pct_mso)
     while not (decision := recorder.decision()).stop:
         intensity = recorder.ask()
         mep_mv = responder.respond(intensity)

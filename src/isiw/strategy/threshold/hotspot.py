@@ -205,7 +205,7 @@ def _distances(settings: BayesHotSpot, coil: FloatArray) -> FloatArray:
     return np.asarray(acting[..., None] * np.array(INTENSITIES_PCT) - 100).reshape(*squared.shape, -1)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)  # a megabyte each
 def _told(settings: BayesHotSpot, pulse: CoilPulse) -> FloatArray:
     """Log-likelihood of a pulse by the hot spot's place, what else is unknown, and recruitment curve."""
     table = log_likelihood(settings.curves, pulse.mep_mv, responded=pulse.mep_mv > RESPONSE_MV)

@@ -22,7 +22,7 @@ class FiveOfTen:
 
     Args:
         start_pct_mso: the first intensity [% MSO].
-        large_step_pct_mso: the large step [% MSO]; the small one is that of the range.
+        large_step_pct_mso: the large step [% MSO]; the small one is that of the range, which it is never below.
         of: pulses at each intensity.
         enough: responses that suffice.
 
@@ -74,7 +74,9 @@ class FiveOfTen:
                 stop=True, reason=f"{enough:g} % MSO suffices, and the range has no less: it begins too high."
             )
         if short is None:
-            return space.snap(enough - self.large_step_pct_mso), _on(f"{enough:g} % MSO suffices.")
+            return space.snap(enough - max(self.large_step_pct_mso, space.step_pct_mso)), _on(
+                f"{enough:g} % MSO suffices."
+            )
         if enough - short > 1.5 * space.step_pct_mso:
             return space.snap(enough - space.step_pct_mso), _on(f"It is between {short:g} and {enough:g} % MSO.")
         return enough, StopDecision(stop=True, reason=f"{enough:g} % MSO suffices, and {short:g} % MSO does not.")
@@ -86,7 +88,9 @@ class FiveOfTen:
             return short, StopDecision(
                 stop=True, reason=f"{short:g} % MSO does not suffice, and the range has no more: it ends too low."
             )
-        return space.snap(short + self.large_step_pct_mso), _on(f"{short:g} % MSO does not suffice.")
+        return space.snap(short + max(self.large_step_pct_mso, space.step_pct_mso)), _on(
+            f"{short:g} % MSO does not suffice."
+        )
 
 
 def _on(reason: str) -> StopDecision:

@@ -76,8 +76,8 @@ class ThresholdSearch:
     @property
     def settings(self) -> dict[str, Any]:
         """The settings of the method, as plain values; of one's own, which is no dataclass, there are none."""
-        own = is_dataclass(self.method) and not isinstance(self.method, type)
-        return asdict(self.method) if own else {}
+        method: object = self.method
+        return asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
 
     def ask(self) -> float:
         """The next intensity [% MSO], on the grid and within the range; the same until the next `tell`.
