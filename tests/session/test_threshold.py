@@ -223,6 +223,11 @@ def test_a_search_with_pulses_of_its_own_is_refused(log: Path) -> None:
         open_threshold(used, log)
 
 
+def test_something_else_than_a_search_is_refused(log: Path) -> None:
+    with pytest.raises(InvalidValueError, match="cannot use this search"):
+        open_threshold(MaximumLikelihood(), log)  # type: ignore[arg-type] # what is tested
+
+
 def test_a_method_of_ones_own_is_logged_and_needed_again(log: Path) -> None:
     def own() -> ThresholdSearch:
         return ThresholdSearch("my own", MaximumLikelihood(), SPACE)

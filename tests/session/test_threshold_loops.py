@@ -102,6 +102,12 @@ def test_a_simulated_person_is_stimulated_to_the_end(tmp_path: Path) -> None:
     assert (recorder.estimate().sd_pct_mso or 9.0) <= 2.0
 
 
+def test_a_log_that_does_not_say_who_is_simulated_is_refused(recorder: ThresholdRecorder) -> None:
+    recorder.header = recorder.header.model_copy(update={"config": {"isiw_threshold": {"seed": 3}}})
+    with pytest.raises(ConfigError, match="who is simulated"):
+        run_simulated(recorder, print)
+
+
 def test_where_nobody_is_simulated_nobody_answers(recorder: ThresholdRecorder) -> None:
     with pytest.raises(ConfigError, match="no simulated person"):
         run_simulated(recorder, print)

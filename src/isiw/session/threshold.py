@@ -16,14 +16,13 @@ from isiw.devices.limited import require_real_time
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, InvalidValueError, told
-from isiw.log.durable import log_of
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Header, Intent, PulseOutcome, StrategyRecipe, ThresholdBelief
 from isiw.log.threshold import outcomes, read_threshold_salvaged
 from isiw.log.writer import LogWriter
-from isiw.session.header import versions
+from isiw.session.header import require_parts, versions
 from isiw.signals.judgement import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
@@ -60,9 +59,10 @@ def open_threshold(
 
     Raises:
         DeviceError: a virtual clock for a device that is not simulated.
-        InvalidValueError: a search that knows of pulses already, or limits that limit nothing.
+        InvalidValueError: no search, one that knows of pulses already, or limits that limit nothing.
         LogError: there is a log already, or it cannot be written.
     """
+    path = require_parts(log, search=(search, ThresholdSearch), device=(device, DeviceInfo))
     if search.pulses:
         raise InvalidValueError("the search knows of pulses that are not this log's", got=len(search.pulses))
     header = Header(
@@ -80,7 +80,7 @@ def open_threshold(
         intensities=search.space,
     )
     clock = _clock_for(device, clock)
-    return ThresholdRecorder(search, LogWriter.create(log_of(Path(log)), header), header, clock)
+    return ThresholdRecorder(search, LogWriter.create(path, header), header, clock)
 
 
 def _clock_for(device: DeviceInfo, clock: Clock | None) -> Clock:

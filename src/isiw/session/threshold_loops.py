@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -60,9 +60,16 @@ def simulated_person(header: Header) -> StimulatedPerson | None:
 
     Args:
         header: of the log.
+
+    Raises:
+        ConfigError: the log says that somebody is simulated, but not who.
     """
     drawn = header.config.get(_SIMULATED) if header.device.simulated else None
-    return None if drawn is None else threshold_cohort(drawn["cohort"], 1, drawn["seed"])[0]
+    if drawn is None:
+        return None
+    if not isinstance(drawn, Mapping) or not {"cohort", "seed"} <= set(drawn):
+        raise ConfigError("the log does not say who is simulated", got=drawn, expected="a cohort and a seed")
+    return threshold_cohort(drawn["cohort"], 1, drawn["seed"])[0]
 
 
 def run_simulated(recorder: ThresholdRecorder, say: Callable[[str], None]) -> StopDecision:
