@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Final
 
 import numpy as np
 import pandas as pd
@@ -15,7 +16,20 @@ from isiw.checks import check_amplitude, check_numbers, check_wholes
 from isiw.errors import InvalidValueError
 from isiw.types import FloatArray
 
-__all__ = ["Channel", "Measurement", "MistrialReason", "Status", "Stimulus", "Sweep", "Trial", "TrialTable"]
+__all__ = [
+    "RESPONSE_MV",
+    "Channel",
+    "Measurement",
+    "MistrialReason",
+    "Status",
+    "Stimulus",
+    "Sweep",
+    "Trial",
+    "TrialTable",
+]
+
+RESPONSE_MV: Final = 0.05
+"""A larger MEP is a response where a motor threshold is sought [mV] [Rossini2015]."""
 
 
 class Status(StrEnum):

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.log.schema import Estimate, Event, Header, Intent, Record, Waveform
+from isiw.log.schema import Estimate, Event, Header, Intent, PulseOutcome, Record, ThresholdBelief, Waveform
 from isiw.log.topics import CHANNEL_IDS, decode, encode, json_schema, topic_of
 from isiw.strategy.stopping import StopDecision
+from isiw.strategy.threshold import ThresholdEstimate
 from isiw.trials import Channel, MistrialReason, Status, Trial
 from isiw.window import Window, WindowEstimate
 from known import instance
@@ -24,6 +25,14 @@ from known import instance
         Trial(1, Status.MISTRIAL, None, MistrialReason.OUTCOME_UNKNOWN),
         Estimate(trial=1, probability=None, start_ms=-math.inf, end_ms=math.inf, stop=True, reason="µ"),
         Event(kind="fault", text="line one\nline two"),
+        Intent(trial=3, isi_ms=None, intensity_pct_mso=62.0),
+        PulseOutcome(trial=3, intensity_pct_mso=62.0, mep_mv=0.08),
+        PulseOutcome(trial=3, intensity_pct_mso=62.0, reason="lost"),
+        ThresholdBelief(
+            trial=3,
+            estimate=ThresholdEstimate(None, 50.0, 60.0, 3.0, "why"),
+            decision=StopDecision(stop=True, reason="r"),
+        ),
     ],
 )
 def test_a_record_survives_being_written_and_read(record: Record) -> None:

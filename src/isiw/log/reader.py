@@ -25,7 +25,7 @@ from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial, TrialTable
 from isiw.window import ENOUGH_PAIRS
 
-__all__ = ["SessionRecord", "read_salvaged", "read_session"]
+__all__ = ["SessionRecord", "read_any", "read_salvaged", "read_session"]
 
 MOST_CONFIGURATION: Final = 2**20
 """Of a configuration as TOML [bytes]; the default's is 2 kB."""
@@ -145,7 +145,23 @@ def read_session(path: str | Path) -> SessionRecord:
 
 
 def read_salvaged(salvaged: Salvage) -> SessionRecord:
-    """The session in what was salvaged from a log."""
+    """The search for a window in what was salvaged from a log.
+
+    Raises:
+        LogError: the log is of a motor threshold, from which no window can be learnt.
+    """
+    record = read_any(salvaged)
+    if record.header.intensities is not None:
+        raise LogError(
+            "the log is of a motor threshold, not of a search for a window",
+            got=str(record.path),
+            remedy=f"isiw threshold {record.path} --show says what was found.",
+        )
+    return record
+
+
+def read_any(salvaged: Salvage) -> SessionRecord:
+    """What was salvaged from a log, be it of a search for a window or of a motor threshold."""
     records = _Records()
     for message in salvaged.messages:
         records.take(message)

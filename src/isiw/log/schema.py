@@ -7,6 +7,11 @@
     /estimate   what was believed after the trial, and what is asked next
     /event      what happened: an exclusion, a limit, a fault, a resumption, a pause, a note … (`EventKind`)
 
+A log of a motor threshold has intents with an intensity, and in place of trials and estimates
+
+    /threshold/pulse    what came of a pulse
+    /threshold/belief   what was believed of the threshold after it
+
 JSON knows no infinity: where a number is not finite it is one of the strings "Infinity", "-Infinity" and "NaN".
 """
 
@@ -24,6 +29,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.signals.judgement import SignalLimits
 from isiw.strategy.stopping import StopDecision
+from isiw.strategy.threshold.pulses import IntensityRange, ThresholdEstimate
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
 from isiw.visit import Visit, VisitProtocol
@@ -37,8 +43,10 @@ __all__ = [
     "EventKind",
     "Header",
     "Intent",
+    "PulseOutcome",
     "Record",
     "StrategyRecipe",
+    "ThresholdBelief",
     "Waveform",
 ]
 
@@ -74,7 +82,8 @@ class StrategyRecipe(_Record):
 class Header(_Record):
     """What a session is, written before anything else, and again before it goes on: the last one holds.
 
-    `asks_from` is the first trial that was asked with these versions.
+    `asks_from` is the first trial that was asked with these versions. `intensities` is given where the motor threshold
+    is sought: then every pulse is TMS alone, and `space` has no meaning.
     """
 
     schema_version: int = SCHEMA_VERSION
@@ -94,6 +103,7 @@ class Header(_Record):
     versions: dict[str, str] = Field(default_factory=dict)
     asks_from: int = 0
     config: dict[str, Any] = Field(default_factory=dict)
+    intensities: IntensityRange | None = None
 
 
 class Intent(_Record):
@@ -103,6 +113,28 @@ class Intent(_Record):
     isi_ms: float | None
     t_s: float = 0.0
     tap_alone: bool = False
+    intensity_pct_mso: float | None = None
+
+
+class PulseOutcome(_Record):
+    """What came of a pulse on the way to a motor threshold; with a `reason`, nothing was learnt from it.
+
+    The intensity is None where the log has lost it.
+    """
+
+    trial: TrialNumber
+    intensity_pct_mso: float | None
+    mep_mv: float | None = None
+    response: bool | None = None
+    reason: str = ""
+
+
+class ThresholdBelief(_Record):
+    """What was believed of a motor threshold after a pulse, and whether to stop."""
+
+    trial: TrialNumber
+    estimate: ThresholdEstimate
+    decision: StopDecision
 
 
 class Waveform(_Record):
@@ -270,4 +302,4 @@ class Event(_Record):
     text: str = ""
 
 
-Record: TypeAlias = Header | Intent | Trial | Waveform | Estimate | Event
+Record: TypeAlias = Header | Intent | Trial | Waveform | Estimate | Event | PulseOutcome | ThresholdBelief

@@ -12,7 +12,17 @@ from pydantic import TypeAdapter
 from pydantic_core import PydanticSerializationError
 
 from isiw.errors import InvalidValueError, told
-from isiw.log.schema import MOST_TRIALS, Estimate, Event, Header, Intent, Record, Waveform
+from isiw.log.schema import (
+    MOST_TRIALS,
+    Estimate,
+    Event,
+    Header,
+    Intent,
+    PulseOutcome,
+    Record,
+    ThresholdBelief,
+    Waveform,
+)
 from isiw.trials import Trial
 
 __all__ = [
@@ -33,6 +43,8 @@ _KINDS: dict[str, type[Any]] = {
     "/trial": Trial,
     "/estimate": Estimate,
     "/event": Event,
+    "/threshold/pulse": PulseOutcome,
+    "/threshold/belief": ThresholdBelief,
 }
 _TOPIC_OF_KIND = {kind: topic for topic, kind in _KINDS.items()}
 

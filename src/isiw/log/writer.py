@@ -278,6 +278,8 @@ def _way_on(existing: Path) -> str:
         return "Choose another path; this is no log that can be continued."
     if not any(message.topic == "/header" for message in found.messages):
         return "Choose another path; nothing of this log can be continued."
+    if any(message.topic.startswith("/threshold/") for message in found.messages):
+        return f"Choose another path, or go on with it: isiw threshold {log_of(existing)} --resume"
     return (
         f"Choose another path, or go on with it: isiw resume {log_of(existing)}, if isiw run has made it; otherwise "
         "isiw.resume(path, device).run() in your own software."

@@ -1,9 +1,12 @@
 """A session: the closed loop from the first ask to the decision, and going on with one from its log."""
 
+from isiw.log.threshold import read_threshold
 from isiw.session.loop import Session
 from isiw.session.progress import PROGRESS_HEADINGS, aligned, progress_row
 from isiw.session.recorder import Recorder, open_session
 from isiw.session.resume import exclude, include, resume
+from isiw.session.threshold import ThresholdRecorder, open_threshold, resume_threshold, search_of
+from isiw.session.threshold_loops import open_simulated, run_by_hand, run_simulated, simulated_person
 from isiw.session.updates import SessionResult, SessionUpdate
 
 __all__ = [
@@ -12,10 +15,19 @@ __all__ = [
     "Session",
     "SessionResult",
     "SessionUpdate",
+    "ThresholdRecorder",
     "aligned",
     "exclude",
     "include",
     "open_session",
+    "open_simulated",
+    "open_threshold",
     "progress_row",
+    "read_threshold",
     "resume",
+    "resume_threshold",
+    "run_by_hand",
+    "run_simulated",
+    "search_of",
+    "simulated_person",
 ]

@@ -2,6 +2,7 @@ from . import catalogue as catalogue
 from . import choosing as choosing
 from . import settings as settings
 from . import stopping as stopping
+from . import threshold as threshold
 from .catalogue import list_strategies as list_strategies
 from .catalogue import make_strategy as make_strategy
 from .strategy import Recipe as Recipe

@@ -6,14 +6,17 @@ from isiw.subjects.labs import LABS, Lab, lab
 from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.subjects.subject import Drift, Responder, Response, SimulatedSubject
+from isiw.subjects.thresholds import THRESHOLD_COHORTS, HotSpot, StimulatedPerson, StimulatedResponder, threshold_cohort
 
 __all__ = [
     "COHORTS",
     "LABS",
+    "THRESHOLD_COHORTS",
     "WIDTHS_KIM_MS",
     "Drift",
     "EmgFloor",
     "GainResponse",
+    "HotSpot",
     "Lab",
     "PeakProfile",
     "Profile",
@@ -22,9 +25,12 @@ __all__ = [
     "Response",
     "ResponseCurve",
     "SimulatedSubject",
+    "StimulatedPerson",
+    "StimulatedResponder",
     "TrialNoise",
     "TwoPeakProfile",
     "another_day",
     "cohort",
     "lab",
+    "threshold_cohort",
 ]

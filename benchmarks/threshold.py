@@ -1,0 +1,188 @@
+"""The resting motor threshold and the hot spot: how near, after how many pulses, by which method.
+
+    python -m benchmarks.threshold > benchmarks/results/threshold.md
+
+Every person has a resting motor threshold of 30-80 % MSO and the recruitment curve and the noise of a cohort: forearm
+(`recruitment`), hand, and two whose noise is outside of what was measured, and of what the Bayesian method believes.
+"""
+
+from __future__ import annotations
+
+import platform
+import shlex
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+import scipy
+import typer
+
+import isiw
+from isiw.strategy.threshold import IntensityRange, ThresholdSearch, make_threshold_search
+from isiw.strategy.threshold.hotspot import BayesHotSpot, CoilPulse, WalkedHotSpot
+from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
+from isiw.trials import RESPONSE_MV
+
+SPACE = IntensityRange(20, 100)
+MOST_PULSES = 200
+ABOVE_THRESHOLD = (1.1, 1.3)
+"""Between these the intensity for the hot spot is uniform, as a multiple of the threshold, which nobody knows yet."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to the threshold.
+
+    Args:
+        name: of its row.
+        make: makes the search.
+        seen_only: whether it is told only whether there was a response.
+    """
+
+    name: str
+    make: Callable[[], ThresholdSearch]
+    seen_only: bool = False
+
+
+def _made(method: str, **settings: float) -> Callable[[], ThresholdSearch]:
+    return partial(make_threshold_search, method, SPACE, **settings)
+
+
+WAYS = (
+    Way("bayes, until ± 2 % MSO", _made("bayes")),
+    Way("bayes, 12 pulses", _made("bayes", stop_sd_pct_mso=0.01, max_pulses=12)),
+    Way("bayes, until ± 2 % MSO, yes or no only", _made("bayes"), seen_only=True),
+    Way("maximum likelihood, 12 pulses", _made("maximum-likelihood", pulses=12)),
+    Way("maximum likelihood, 17 pulses", _made("maximum-likelihood")),
+    Way("five of ten", _made("five-of-ten")),
+)
+
+
+def sought(way: Way, person: StimulatedPerson, seed: int) -> dict[str, float | None]:
+    """One search: pulses, error, and whether the interval has the truth.
+
+    Args:
+        way: how.
+        person: whose threshold.
+        seed: of the noise.
+    """
+    search, responder = way.make(), person.begin(seed)
+    while not search.decision().stop and len(search.pulses) < MOST_PULSES:
+        intensity = search.ask()
+        mep_mv = responder.respond(intensity)
+        if way.seen_only:
+            search.tell(intensity, response=mep_mv > RESPONSE_MV)
+        else:
+            search.tell(intensity, mep_mv)
+    found = search.estimate()
+    error = None if found.threshold_pct_mso is None else found.threshold_pct_mso - person.rmt_pct_mso
+    low, high = found.low_pct_mso, found.high_pct_mso
+    covered = None if low is None or high is None else float(low <= person.rmt_pct_mso <= high)
+    return {"pulses": len(search.pulses), "error": error, "covered": covered}
+
+
+def threshold_row(cohort: str, way: Way, n: int, seed: int) -> dict[str, object]:
+    """A row of the table: one way on the people of a cohort.
+
+    Args:
+        cohort: one of `isiw.subjects.THRESHOLD_COHORTS`.
+        way: how.
+        n: how many people.
+        seed: of the people and their noise.
+    """
+    rows = pd.DataFrame(
+        sought(way, person, seed + i) for i, person in enumerate(threshold_cohort(cohort, n, seed))
+    ).astype(float)
+    error = rows["error"].abs()
+    return {
+        "people": cohort,
+        "method": way.name,
+        "pulses": f"{rows['pulses'].mean():.1f}",
+        "most": f"{rows['pulses'].max():.0f}",
+        "mean error": f"{error.mean():.2f} ± {error.sem():.2f}",
+        "95th percentile": f"{error.quantile(0.95):.2f}",
+        "bias": f"{rows['error'].mean():+.2f}",
+        "90 % interval has the truth": "–" if rows["covered"].isna().all() else f"{rows['covered'].mean():.2f}",
+        "no number": int(error.isna().sum()),
+    }
+
+
+def spot_errors(method: BayesHotSpot | WalkedHotSpot, person: StimulatedPerson, pulses: int, seed: int) -> float:
+    """The distance of the hot spot that was found from the true one [mm]; NaN where no pulse was answered.
+
+    Args:
+        method: how it is sought.
+        person: whose.
+        pulses: how many.
+        seed: of the intensity and the noise.
+    """
+    intensity = float(min(100.0, person.rmt_pct_mso * np.random.default_rng(seed).uniform(*ABOVE_THRESHOLD)))
+    responder, told = person.begin(seed), list[CoilPulse]()
+    for _ in range(pulses):
+        x_mm, y_mm = method.ask(told)
+        told.append(CoilPulse(x_mm, y_mm, responder.respond(intensity, x_mm, y_mm)))
+    if all(pulse.mep_mv <= RESPONSE_MV for pulse in told):
+        return float("nan")
+    found = method.estimate(told)
+    return float(np.hypot(found.x_mm - person.hot_spot.x_mm, found.y_mm - person.hot_spot.y_mm))
+
+
+def spot_rows(cohort: str, n: int, seed: int) -> Iterable[dict[str, object]]:
+    """Rows of the table about the hot spot.
+
+    Args:
+        cohort: one of `isiw.subjects.THRESHOLD_COHORTS`.
+        n: how many people.
+        seed: of the people and their noise.
+    """
+    walks = [WalkedHotSpot(repeats=repeats) for repeats in (1, 3, 10)]
+    ways = [("bayes", BayesHotSpot(), pulses) for pulses in (10, 20)]
+    for name, method, pulses in [*ways, *(("walk of the grid", walk, walk.pulses) for walk in walks)]:
+        errors = pd.Series(
+            [
+                spot_errors(method, person, pulses, seed + i)
+                for i, person in enumerate(threshold_cohort(cohort, n, seed))
+            ]
+        )
+        yield {
+            "people": cohort,
+            "method": name,
+            "pulses": pulses,
+            "mean distance [mm]": f"{errors.mean():.1f} ± {errors.sem():.1f}",
+            "95th percentile": f"{errors.quantile(0.95):.1f}",
+            "no answer at all": int(errors.isna().sum()),
+        }
+
+
+def main(
+    n: Annotated[int, typer.Option(help="People of each cohort.")] = 200,
+    spots: Annotated[int, typer.Option(help="People of each cohort whose hot spot is sought.")] = 40,
+    seed: Annotated[int, typer.Option(help="Of the people and their noise.")] = 10_000,
+) -> None:
+    """Print both tables."""
+    rows = [threshold_row(cohort, way, n, seed) for cohort in isiw.subjects.THRESHOLD_COHORTS for way in WAYS]
+    found = [row for cohort in ("recruitment", "hand") for row in spot_rows(cohort, spots, seed)]
+    print(f"""# The resting motor threshold and the hot spot
+
+Command: `python -m benchmarks.threshold {shlex.join(sys.argv[1:])}`, seed {seed}, isiw {isiw.__version__}, Python
+{platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}.
+
+{n} people of each cohort, range {SPACE}. Errors in % MSO, mean ± standard error. "± 2 % MSO" is the posterior's SD.
+
+{pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True)}
+
+## The hot spot
+
+{spots} people of each cohort, one intensity of 110-130 % of the threshold, a square of ± 25 mm; the hot spot lies
+within ± 20 mm. The walk has 25 places, 10 mm apart. The coil's effect falls off as a Gaussian, as the Bayesian method
+believes.
+
+{pd.DataFrame(found).to_markdown(index=False, disable_numparse=True)}""")
+
+
+if __name__ == "__main__":
+    typer.run(main)

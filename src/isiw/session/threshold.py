@@ -1,0 +1,320 @@
+"""A logged search for the motor threshold: what is about to be given is on disk first, and what came of it at once."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import isiw
+from isiw.checks import number, text
+from isiw.design import VALVE_SPACE
+from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
+from isiw.devices.limited import require_real_time
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import DeviceInfo
+from isiw.errors import DamagedLogError, InvalidValueError, told
+from isiw.log.pulses import pulses_s
+from isiw.log.reader import SessionRecord
+from isiw.log.salvage import salvage
+from isiw.log.schema import Event, Header, Intent, PulseOutcome, StrategyRecipe, ThresholdBelief
+from isiw.log.threshold import outcomes, read_threshold_salvaged
+from isiw.log.writer import LogWriter
+from isiw.session.header import require_parts, versions
+from isiw.signals.judgement import SignalLimits
+from isiw.strategy.stopping import StopDecision
+from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
+from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
+
+__all__ = ["ThresholdRecorder", "open_threshold", "resume_threshold", "search_of"]
+
+UNKNOWN = "outcome unknown"
+BY_HAND = DeviceInfo("a stimulator that is set by hand", "impact")
+
+
+def open_threshold(
+    search: ThresholdSearch,
+    log: str | Path,
+    *,
+    device: DeviceInfo = BY_HAND,
+    min_iti_s: float = 5.0,
+    max_pulses: int = 100,
+    clock: Clock | None = None,
+    subject: str = "",
+    config: Mapping[str, Any] | None = None,
+) -> ThresholdRecorder:
+    """Open a search for the motor threshold: ask it for intensities, and tell it what came of them.
+
+    Args:
+        search: proposes intensities and learns; before its first pulse.
+        log: where the log is; it must not exist yet.
+        device: what stimulates.
+        min_iti_s: shortest time between two pulses, which `ask` waits for [s].
+        max_pulses: most pulses, lost ones included.
+        clock: tells the time, and waits; a virtual one for a simulated device only, where it is the default.
+        subject: the person's code, for the log.
+        config: anything that should be kept in the log, as TOML values.
+
+    Raises:
+        DeviceError: a virtual clock for a device that is not simulated.
+        InvalidValueError: no search, one that knows of pulses already, or limits that limit nothing.
+        LogError: there is a log already, or it cannot be written.
+    """
+    path = require_parts(log, search=(search, ThresholdSearch), device=(device, DeviceInfo))
+    if search.pulses:
+        raise InvalidValueError("the search knows of pulses that are not this log's", got=len(search.pulses))
+    header = Header(
+        isiw_version=isiw.__version__,
+        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+        subject=text("subject", subject),
+        seed=0,
+        strategy=StrategyRecipe(name=f"threshold/{search.name}", seed=0, settings=search.settings),
+        space=VALVE_SPACE,
+        limits=Limits.of_space(VALVE_SPACE, min_iti_s=min_iti_s, max_pulses=max_pulses),
+        device=device,
+        signals=SignalLimits(),
+        versions={name: version for name, version in versions().items() if name != "isiw"},
+        config=dict(config or {}),
+        intensities=search.space,
+    )
+    clock = _clock_for(device, clock)
+    return ThresholdRecorder(search, LogWriter.create(path, header), header, clock)
+
+
+def _clock_for(device: DeviceInfo, clock: Clock | None) -> Clock:
+    clock = clock or (VirtualClock() if device.simulated else MonotonicClock())
+    require_real_time(device, clock)
+    return clock
+
+
+def resume_threshold(
+    log: str | Path, search: ThresholdSearch | None = None, *, clock: Clock | None = None
+) -> ThresholdRecorder:
+    """Go on with a search where its log ends. A pulse without an outcome in it counts, and nothing is learnt from it.
+
+    Args:
+        log: the log, finished or not.
+        search: needed where the method is one of your own: the same again.
+        clock: as for `open_threshold`.
+
+    Raises:
+        DamagedLogError: the end of the log is missing, so that nobody knows how many pulses were given.
+        DeviceError: a virtual clock for a device that is not simulated.
+        InvalidValueError: a search with another range than the log's, or none for a method of one's own.
+        LogError: no such log, or one of something else.
+    """
+    salvaged = salvage(log)
+    record = read_threshold_salvaged(salvaged)
+    clock = _clock_for(record.header.device, clock)
+    if record.end_lost:
+        raise DamagedLogError(
+            "the log's end is missing, so nobody knows how many pulses were given",
+            got=str(record.path),
+            remedy="Begin a new log, with the pulses that the stimulator has counted taken off max_pulses.",
+        )
+    search, known = search_of(record, search), outcomes(record)
+    writer = LogWriter.continuing(log, salvaged, record.header)
+    recorder = ThresholdRecorder(search, writer, record.header, clock, known, pulses_s(salvaged))
+    recorder.conclude_open(record.unknown)
+    return recorder
+
+
+def search_of(record: SessionRecord, search: ThresholdSearch | None = None) -> ThresholdSearch:
+    """The search of a log, which has learnt its pulses.
+
+    Args:
+        record: the log.
+        search: as for `resume_threshold`.
+
+    Raises:
+        InvalidValueError: as for `resume_threshold`.
+    """
+    recipe, space = record.header.strategy, record.header.intensities
+    if space is None or (search is not None and search.space != space):
+        raise InvalidValueError("the log has another range of intensities", got=space)
+    search = search or make_threshold_search(recipe.name.removeprefix("threshold/"), space, **recipe.settings)
+    search.pulses = tuple(_pulse(each) for each in outcomes(record) if not each.reason)
+    return search
+
+
+def _a_reason(reason: str) -> str:
+    if not text("reason", reason).strip():
+        raise InvalidValueError("nothing is left out without a reason", got=reason, expected="a few words")
+    return reason
+
+
+def _pulse(outcome: PulseOutcome) -> Pulse:
+    return Pulse(number("intensity_pct_mso", outcome.intensity_pct_mso), outcome.mep_mv, outcome.response)
+
+
+class ThresholdRecorder:
+    """An open search; `open_threshold` opens one. As a context manager it closes its log.
+
+    Args:
+        search: proposes intensities and learns.
+        log: the open log.
+        header: what the session is: who stimulates, and how often and how fast at most.
+        clock: tells the time, and waits.
+        earlier: what came of the pulses before; the search has learnt them.
+        ages_s: how long ago these were [s].
+    """
+
+    def __init__(
+        self,
+        search: ThresholdSearch,
+        log: LogWriter,
+        header: Header,
+        clock: Clock,
+        earlier: Iterable[PulseOutcome] = (),
+        ages_s: Sequence[float] = (),
+    ) -> None:
+        self.search, self.header, self._log, self._clock = search, header, log, clock
+        self._limits = header.limits
+        self._outcomes = {outcome.trial: outcome for outcome in earlier}
+        self._made_s = clock.now_s()
+        self._times_s = [self._made_s - age_s for age_s in sorted(ages_s, reverse=True)]
+        self._asked: float | None = None
+
+    @property
+    def outcomes(self) -> tuple[PulseOutcome, ...]:
+        """What came of each pulse so far, as it counts now, in order."""
+        return tuple(self._outcomes[trial] for trial in sorted(self._outcomes))
+
+    @property
+    def given(self) -> int:
+        """How many pulses were given, or may have been; also the number of the next one."""
+        return max(self._outcomes, default=-1) + 1
+
+    def conclude_open(self, intents: Sequence[Intent]) -> None:
+        """Log that nobody knows the outcome of pulses that were about to be given.
+
+        Args:
+            intents: what was given by the log, or may have been.
+        """
+        for intent in intents:
+            if intent.trial not in self._outcomes:
+                at = intent.intensity_pct_mso
+                self._conclude(PulseOutcome(trial=intent.trial, intensity_pct_mso=at, reason=UNKNOWN))
+        self._log.append(Event(kind="resume", text=f"Went on after {self.given} pulses."))
+        self._log.sync()
+
+    def ask(self) -> float:
+        """The next intensity [% MSO], the same until its outcome; on disk as about to be given before this returns.
+
+        Raises:
+            LimitExceededError: a limit is reached; deliver nothing.
+            LogError: the log cannot be written; deliver nothing.
+        """
+        if self._asked is None:
+            self._limits.require_left(self.given)
+            intensity = self.search.ask()
+            earliest_s = max(self._made_s + self._limits.min_iti_s, self._limits.earliest_s(self._times_s))
+            self._clock.sleep_s(earliest_s - self._clock.now_s())
+            now_s = self._clock.now_s()
+            self._log.append(Intent(trial=self.given, isi_ms=None, t_s=now_s, intensity_pct_mso=intensity))
+            self._log.sync()
+            self._asked = intensity
+        return self._asked
+
+    def tell(self, mep_mv: float | None = None, *, response: bool | None = None) -> None:
+        """What came of the intensity that was asked; it is on disk before the search learns it.
+
+        Args:
+            mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 is below the detection limit.
+            response: whether a response was seen, instead of an amplitude.
+
+        Raises:
+            InvalidValueError: nothing was asked, or a value that cannot be; nothing is logged, and the right value can
+                be told.
+            LogError: the log cannot be written.
+        """
+        pulse = self.search.checked(self._require_asked(), mep_mv, response=response)
+        self._conclude(self._outcome(mep_mv=pulse.mep_mv, response=pulse.response))
+
+    def lost(self, reason: str) -> None:
+        """That nothing can be learnt from the pulse that was asked; it counts as given.
+
+        Args:
+            reason: why.
+
+        Raises:
+            InvalidValueError: nothing was asked, or there is no reason.
+            LogError: the log cannot be written.
+        """
+        self._require_asked()
+        self._conclude(self._outcome(reason=_a_reason(reason)))
+
+    def exclude(self, trial: int, reason: str) -> None:
+        """Let a pulse not count from here on: an event is appended, nothing is erased.
+
+        Args:
+            trial: its number.
+            reason: why.
+
+        Raises:
+            InvalidValueError: no pulse that counts has this number, or there is no reason.
+            LogError: the log cannot be written.
+        """
+        counting = [outcome.trial for outcome in self.outcomes if not outcome.reason]
+        if trial not in counting:
+            raise InvalidValueError("there is no such pulse to exclude", got=trial, expected=f"one of {counting}")
+        self._log.append(Event(kind="exclusion", trial=trial, text=_a_reason(reason)))
+        self._outcomes[trial] = self._outcomes[trial].model_copy(update={"reason": reason})
+        self._learn()
+
+    def estimate(self) -> ThresholdEstimate:
+        """What is believed about the threshold now."""
+        return self.search.estimate()
+
+    def decision(self) -> StopDecision:
+        """Whether to stop now, and why."""
+        return self.search.decision()
+
+    def close(self) -> None:
+        """Close the log; calling it again is harmless."""
+        self._log.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if error is not None:
+                self._log.append(Event(kind="fault", text=told(error)))
+        finally:
+            self.close()
+
+    def _require_asked(self) -> float:
+        if self._asked is None:
+            raise InvalidValueError(
+                "nothing was asked whose outcome this could be", remedy="Call ask() first, then deliver, then tell()."
+            )
+        return self._asked
+
+    def _outcome(self, mep_mv: float | None = None, response: bool | None = None, reason: str = "") -> PulseOutcome:  # noqa: FBT001 - as `tell` was told
+        return PulseOutcome(
+            trial=self.given,
+            intensity_pct_mso=self._require_asked(),
+            mep_mv=mep_mv,
+            response=response,
+            reason=reason,
+        )
+
+    def _conclude(self, outcome: PulseOutcome) -> None:
+        """Put a pulse on disk, then learn it, then put on disk what is believed."""
+        self._log.append(outcome)
+        self._log.sync()
+        self._outcomes[outcome.trial] = outcome
+        self._asked = None
+        self._times_s.append(self._clock.now_s())
+        self._learn()
+
+    def _learn(self) -> None:
+        self.search.pulses = tuple(_pulse(outcome) for outcome in self.outcomes if not outcome.reason)
+        belief = ThresholdBelief(trial=self.given - 1, estimate=self.estimate(), decision=self.decision())
+        self._log.append(belief)
+        self._log.sync()

@@ -1,0 +1,161 @@
+"""Two loops around a logged search for the motor threshold: a simulated person, and an operator at the keyboard."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from isiw.checks import text
+from isiw.devices.protocol import DeviceInfo
+from isiw.errors import ConfigError, InvalidValueError
+from isiw.log.schema import Header
+from isiw.session.threshold import ThresholdRecorder, open_threshold
+from isiw.strategy.stopping import StopDecision
+from isiw.strategy.threshold.search import ThresholdSearch
+from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
+
+__all__ = ["ANSWERS", "amplitude_of", "open_simulated", "run_by_hand", "run_simulated", "simulated_person"]
+
+_SIMULATED = "isiw_threshold"
+"""The name under which a log keeps who is simulated."""
+
+ANSWERS: Final = (
+    "After each pulse type the MEP's amplitude in mV (0.08, or 80 uV), y or n where you only saw whether there was one "
+    "above 50 uV, x where the pulse was lost, u to take the last answer back, q to end here and go on later."
+)
+
+SURELY_MV: Final = 2.0
+"""More than this [mV] needs its unit: it is more likely an amplitude in µV."""
+
+_AMPLITUDE: Final = re.compile(r"(\d+(?:[.,]\d*)?|[.,]\d+)\s*(mv|uv|µv|μv)?", re.IGNORECASE)
+
+
+def open_simulated(
+    search: ThresholdSearch, log: str | Path, *, cohort: str, seed: int, **options: Any
+) -> ThresholdRecorder:
+    """Open a search for the threshold of a simulated person, who is kept in the log.
+
+    Args:
+        search: as for `open_threshold`.
+        log: as for `open_threshold`.
+        cohort: whose recruitment curve it is: one of `isiw.subjects.THRESHOLD_COHORTS`.
+        seed: of the person and the noise.
+        **options: further ones of `open_threshold`.
+
+    Raises:
+        InvalidValueError: an unknown cohort or a negative seed, or as for `open_threshold`.
+        LogError: as for `open_threshold`.
+    """
+    threshold_cohort(cohort, 1, seed)
+    config = {_SIMULATED: {"cohort": cohort, "seed": seed}}
+    return open_threshold(
+        search, log, device=DeviceInfo("a simulated person", "impact", simulated=True), config=config, **options
+    )
+
+
+def simulated_person(header: Header) -> StimulatedPerson | None:
+    """The simulated person of a log; None where nobody, or somebody else's person, was simulated.
+
+    Args:
+        header: of the log.
+
+    Raises:
+        ConfigError: the log says that somebody is simulated, but not who.
+    """
+    drawn = header.config.get(_SIMULATED) if header.device.simulated else None
+    if drawn is None:
+        return None
+    if not isinstance(drawn, Mapping) or not {"cohort", "seed"} <= set(drawn):
+        raise ConfigError("the log does not say who is simulated", got=drawn, expected="a cohort and a seed")
+    return threshold_cohort(drawn["cohort"], 1, drawn["seed"])[0]
+
+
+def run_simulated(recorder: ThresholdRecorder, say: Callable[[str], None]) -> StopDecision:
+    """Stimulate the simulated person of a log until the search is over.
+
+    Args:
+        recorder: as `open_simulated` or `resume_threshold` opened it.
+        say: shows a text.
+
+    Raises:
+        ConfigError: nobody is simulated in this log.
+        LimitExceededError: a limit is reached before the search is over.
+    """
+    person = simulated_person(recorder.header)
+    if person is None:
+        raise ConfigError("the log is of no simulated person", got=recorder.header.device.name)
+    responder = person.begin(recorder.header.config[_SIMULATED]["seed"])
+    for outcome in recorder.outcomes:  # so that the person's noise goes on where it was
+        if outcome.intensity_pct_mso is not None:
+            responder.respond(outcome.intensity_pct_mso)
+    while not (decision := recorder.decision()).stop:
+        intensity = recorder.ask()
+        mep_mv = responder.respond(intensity)
+        recorder.tell(mep_mv)
+        say(f"Pulse {recorder.given}: {intensity:g} % MSO, MEP {mep_mv:.3f} mV. {recorder.estimate()}")
+    return decision
+
+
+def run_by_hand(recorder: ThresholdRecorder, read: Callable[[str], str], say: Callable[[str], None]) -> StopDecision:
+    """Let an operator set each intensity and type what came of it, until the search is over or the operator ends it.
+
+    Args:
+        recorder: the open search.
+        read: shows a question and returns what was typed; raises EOFError where nobody types any more.
+        say: shows a text.
+
+    Raises:
+        LimitExceededError: a limit is reached before the search is over.
+    """
+    say(ANSWERS)
+    while not (decision := recorder.decision()).stop:
+        question = f"Pulse {recorder.given + 1}: set {recorder.ask():g} % MSO, give one pulse. MEP: "
+        try:
+            going_on = _take(recorder, read(question).strip())
+        except EOFError:
+            return decision
+        except InvalidValueError as error:
+            say(f"{error}\nNothing was logged; type it again.")
+            continue
+        if not going_on:
+            return decision
+        say(str(recorder.estimate()))
+    return decision
+
+
+def _take(recorder: ThresholdRecorder, typed: str) -> bool:
+    """Log what was typed; False where the operator ends the search here."""
+    if typed.lower() in {"q", "quit"}:
+        return False
+    if typed.lower() in {"y", "n"}:
+        recorder.tell(response=typed.lower() == "y")
+    elif typed.lower() == "x":
+        recorder.lost("lost, said the operator")
+    elif typed.lower() == "u":
+        counting = [outcome.trial for outcome in recorder.outcomes if not outcome.reason]
+        recorder.exclude(counting[-1] if counting else -1, "taken back by the operator")
+    else:
+        recorder.tell(amplitude_of(typed))
+    return True
+
+
+def amplitude_of(typed: str) -> float:
+    """An amplitude as somebody types it [mV].
+
+    Args:
+        typed: a number in mV, or with its unit, mV or µV.
+
+    Raises:
+        InvalidValueError: no such number, or a large one without its unit.
+    """
+    found = _AMPLITUDE.fullmatch(text("an amplitude", typed).strip())
+    if found is None:
+        raise InvalidValueError("this is no answer", got=typed, expected="an amplitude in mV, or y, n, x, u or q")
+    value, unit = float(found[1].replace(",", ".")), (found[2] or "").lower()
+    if unit == "" and value > SURELY_MV:
+        raise InvalidValueError(
+            "so large an amplitude needs its unit", got=typed, remedy=f"Type {value:g} uV, or {value:g} mV if it is so."
+        )
+    return value if unit in {"", "mv"} else value / 1000

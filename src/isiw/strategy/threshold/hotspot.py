@@ -1,0 +1,214 @@
+"""The hot spot: where the coil evokes an MEP at the lowest intensity, sought with pulses of one intensity.
+
+In simulation: no log, and nobody moves a coil. The effect of the coil falls off as a Gaussian of its distance from the
+hot spot; an MEP then says how far the pulse was above or below the threshold, as on the way to the threshold itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.special import softmax
+
+from isiw.checks import check_amplitude, check_numbers, check_wholes
+from isiw.errors import InvalidValueError
+from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief, log_likelihood
+from isiw.trials import RESPONSE_MV
+from isiw.types import FloatArray
+
+__all__ = ["BayesHotSpot", "CoilPulse", "HotSpotEstimate", "WalkedHotSpot"]
+
+INTENSITIES_PCT: Final = (95.0, 105.0, 115.0, 125.0, 135.0, 150.0)
+"""What the intensity may be at the hot spot [% of the threshold there], which nobody knows yet."""
+
+SPREADS_MM: Final = (18.0, 24.0, 30.0, 37.0)
+"""SDs of the fall-off that are believed possible [mm]."""
+
+_USEFUL_PCT: Final = (-25.0, 30.0)  # beyond these distances from the threshold an MEP says little
+
+
+@dataclass(frozen=True)
+class CoilPulse:
+    """One pulse and what came of it, by the coil's place.
+
+    Args:
+        x_mm: the coil's place from the middle of the searched area [mm].
+        y_mm: the same, across [mm].
+        mep_mv: peak-to-peak amplitude of the MEP [mV].
+
+    Raises:
+        InvalidValueError: a place that is not finite, or an amplitude that cannot be.
+    """
+
+    x_mm: float
+    y_mm: float
+    mep_mv: float
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "x_mm", "y_mm")
+        check_amplitude(self, "mep_mv")
+
+
+class HotSpotEstimate(NamedTuple):
+    """Where the hot spot is believed to be.
+
+    Args:
+        x_mm: its place [mm].
+        y_mm: the same, across [mm].
+        sd_mm: root of the mean squared distance from there [mm]; None where the method has none.
+    """
+
+    x_mm: float
+    y_mm: float
+    sd_mm: float | None
+
+
+def _require_a_response(pulses: Sequence[CoilPulse]) -> None:
+    if not any(pulse.mep_mv > RESPONSE_MV for pulse in pulses):
+        raise InvalidValueError(
+            "no pulse was answered, so nobody can say where the hot spot is",
+            got=len(pulses),
+            expected=f"at least one MEP above {1000 * RESPONSE_MV:g} µV",
+            remedy="Search with a higher intensity, or in another area.",
+        )
+
+
+@dataclass(frozen=True)
+class WalkedHotSpot:
+    """The classical way: the same number of pulses at every place of a grid; the largest mean MEP is the hot spot.
+
+    Args:
+        half_width_mm: of the searched square [mm].
+        step_mm: between two places [mm].
+        repeats: pulses at each place.
+
+    Raises:
+        InvalidValueError: values that are not positive.
+    """
+
+    half_width_mm: float = 25.0
+    step_mm: float = 10.0
+    repeats: int = 3
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "half_width_mm", "step_mm", above=0)
+        check_wholes(self, "repeats", least=1)
+
+    @property
+    def pulses(self) -> int:
+        """How many pulses it takes."""
+        return self.repeats * len(_places(self.half_width_mm, self.step_mm))
+
+    def ask(self, pulses: Sequence[CoilPulse]) -> tuple[float, float]:
+        """The next place of the coil [mm].
+
+        Args:
+            pulses: what was told so far.
+        """
+        places = _places(self.half_width_mm, self.step_mm)
+        x_mm, y_mm = places[len(pulses) // self.repeats % len(places)].tolist()
+        return x_mm, y_mm
+
+    def estimate(self, pulses: Sequence[CoilPulse]) -> HotSpotEstimate:
+        """The place with the largest mean MEP.
+
+        Args:
+            pulses: what was told so far.
+
+        Raises:
+            InvalidValueError: no pulse was answered.
+        """
+        _require_a_response(pulses)
+        by_place: dict[tuple[float, float], list[float]] = {}
+        for pulse in pulses:
+            by_place.setdefault((pulse.x_mm, pulse.y_mm), []).append(pulse.mep_mv)
+        return HotSpotEstimate(*max(by_place, key=lambda place: float(np.mean(by_place[place]))), None)
+
+
+@dataclass(frozen=True)
+class BayesHotSpot:
+    """A posterior on a grid of places, spreads, intensities and recruitment curves.
+
+    It asks where the posterior knows least how much the coil acts.
+
+    Args:
+        half_width_mm: of the searched square [mm].
+        step_mm: between two places [mm].
+        curves: which recruitment curves are believed in.
+
+    Raises:
+        InvalidValueError: values that are not positive.
+    """
+
+    half_width_mm: float = 25.0
+    step_mm: float = 5.0
+    curves: RecruitmentBelief = field(default_factory=RecruitmentBelief)
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "half_width_mm", "step_mm", above=0)
+
+    def posterior(self, pulses: Sequence[CoilPulse]) -> FloatArray:
+        """Probabilities by place, and by what else is unknown: spread and intensity, shape (t, c).
+
+        Args:
+            pulses: what was told so far.
+        """
+        log = sum((_told(self, pulse) for pulse in pulses), start=np.zeros((1, 1, 1)))
+        shape = (len(_places(self.half_width_mm, self.step_mm)), len(SPREADS_MM) * len(INTENSITIES_PCT))
+        return np.asarray(softmax(np.broadcast_to(log, (*shape, log.shape[-1]))).sum(axis=-1))
+
+    def ask(self, pulses: Sequence[CoilPulse]) -> tuple[float, float]:
+        """The next place of the coil [mm].
+
+        Args:
+            pulses: what was told so far.
+        """
+        places, posterior = _places(self.half_width_mm, self.step_mm), self.posterior(pulses)
+        acting = np.clip(_distances(self, places), *_USEFUL_PCT)
+        mean = np.einsum("tc,ptc->p", posterior, acting)
+        variance = np.einsum("tc,ptc->p", posterior, acting**2) - mean**2
+        x_mm, y_mm = places[int(np.argmax(variance))].tolist()
+        return x_mm, y_mm
+
+    def estimate(self, pulses: Sequence[CoilPulse]) -> HotSpotEstimate:
+        """The posterior's mean, and how far from it the hot spot may be.
+
+        Args:
+            pulses: what was told so far.
+
+        Raises:
+            InvalidValueError: no pulse was answered.
+        """
+        _require_a_response(pulses)
+        places, belief = _places(self.half_width_mm, self.step_mm), self.posterior(pulses).sum(axis=1)
+        mean = belief @ places
+        sd_mm = float(np.sqrt(belief @ ((places - mean) ** 2).sum(axis=1)))
+        return HotSpotEstimate(float(mean[0]), float(mean[1]), sd_mm)
+
+
+def _places(half_width_mm: float, step_mm: float) -> FloatArray:
+    """All places of a square, row by row [mm], shape (p, 2)."""
+    steps = int(half_width_mm / step_mm + 1e-9)
+    axis = step_mm * np.arange(-steps, steps + 1)
+    return np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def _distances(settings: BayesHotSpot, coil: FloatArray) -> FloatArray:
+    """Distances from the threshold [% of it] by the coil's place, the hot spot's, and what else is unknown."""
+    spots = _places(settings.half_width_mm, settings.step_mm)
+    squared = ((coil[:, None] - spots) ** 2).sum(axis=-1)
+    acting = np.exp(-0.5 * squared[..., None] / np.square(SPREADS_MM))
+    return np.asarray(acting[..., None] * np.array(INTENSITIES_PCT) - 100).reshape(*squared.shape, -1)
+
+
+@lru_cache(maxsize=64)  # a megabyte each
+def _told(settings: BayesHotSpot, pulse: CoilPulse) -> FloatArray:
+    """Log-likelihood of a pulse by the hot spot's place, what else is unknown, and recruitment curve."""
+    table = log_likelihood(settings.curves, pulse.mep_mv, responded=pulse.mep_mv > RESPONSE_MV)
+    distances = _distances(settings, np.array([[pulse.x_mm, pulse.y_mm]]))[0]
+    rows = np.clip(np.rint(distances - DISTANCES_PCT[0]).astype(int), 0, len(DISTANCES_PCT) - 1)
+    return np.asarray(table[rows])

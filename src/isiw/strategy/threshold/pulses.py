@@ -1,0 +1,222 @@
+"""Single pulses of TMS by intensity: which may be asked, what came of them, and what they say about the threshold.
+
+The resting motor threshold is the intensity at which half of the pulses evoke an MEP above 50 µV [Rossini2015].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
+
+import numpy as np
+
+from isiw.checks import check_amplitude, check_numbers, number
+from isiw.errors import InvalidValueError, LimitExceededError
+from isiw.strategy.stopping import StopDecision
+from isiw.trials import RESPONSE_MV
+from isiw.types import FloatArray
+
+__all__ = ["IntensityRange", "Pulse", "ThresholdEstimate", "ThresholdMethod", "one_sided"]
+
+ENOUGH_AT_THE_END: Final = 6
+NEAR_THE_END_PCT_MSO: Final = 3.0
+"""After so many pulses so near to the end of the range, none of which changed anything, the range is wrong."""
+
+_GRID_TOLERANCE: Final = 1e-6
+
+
+@dataclass(frozen=True)
+class IntensityRange:
+    """The intensities that may be asked: a grid from the lowest to the highest, both included; nothing exceeds it.
+
+    Args:
+        low_pct_mso: the lowest [% of the maximum stimulator output].
+        high_pct_mso: the highest [% MSO].
+        step_pct_mso: the distance between two [% MSO]; the range must hold a whole number of steps.
+
+    Raises:
+        InvalidValueError: bounds outside 1–100 % or that do not ascend, or a step that does not fit.
+    """
+
+    low_pct_mso: float
+    high_pct_mso: float
+    step_pct_mso: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "low_pct_mso", "high_pct_mso", least=1, most=100)
+        check_numbers(self, "step_pct_mso", least=0.1)
+        steps = (self.high_pct_mso - self.low_pct_mso) / self.step_pct_mso
+        if steps < 1 or abs(steps - round(steps)) > _GRID_TOLERANCE:
+            raise InvalidValueError(
+                "the range of intensities is not a whole number of steps",
+                got=(self.low_pct_mso, self.high_pct_mso, self.step_pct_mso),
+                expected="low_pct_mso < high_pct_mso, apart by whole steps",
+            )
+
+    def __str__(self) -> str:
+        return f"{self.low_pct_mso:g}–{self.high_pct_mso:g} % MSO, every {self.step_pct_mso:g} %"
+
+    @property
+    def grid_pct_mso(self) -> FloatArray:
+        """All intensities that may be asked [% MSO], ascending."""
+        return np.linspace(self.low_pct_mso, self.high_pct_mso, 1 + self._steps(self.high_pct_mso))
+
+    def snap(self, intensity_pct_mso: float) -> float:
+        """The nearest intensity on the grid [% MSO]."""
+        inside = min(max(number("an intensity [% MSO]", intensity_pct_mso), self.low_pct_mso), self.high_pct_mso)
+        return float(self.grid_pct_mso[self._steps(inside)])
+
+    def beyond(self, threshold_pct_mso: float) -> str | None:
+        """On which side of the range a threshold is, in words; None where it is within.
+
+        Args:
+            threshold_pct_mso: the threshold [% MSO].
+        """
+        if threshold_pct_mso > self.high_pct_mso:
+            return f"above the highest intensity, {self.high_pct_mso:g} % MSO"
+        if threshold_pct_mso < self.low_pct_mso:
+            return f"below the lowest intensity, {self.low_pct_mso:g} % MSO"
+        return None
+
+    def _steps(self, intensity_pct_mso: float) -> int:
+        return round((intensity_pct_mso - self.low_pct_mso) / self.step_pct_mso)
+
+    def require(self, intensity_pct_mso: float) -> None:
+        """Raise where an intensity must not be delivered.
+
+        Raises:
+            InvalidValueError: it is not a finite number.
+            LimitExceededError: it is beyond the range, or off the grid.
+        """
+        intensity_pct_mso = number("an intensity [% MSO]", intensity_pct_mso)
+        within = self.low_pct_mso <= intensity_pct_mso <= self.high_pct_mso
+        if not (within and abs(self.snap(intensity_pct_mso) - intensity_pct_mso) <= _GRID_TOLERANCE):
+            raise LimitExceededError(
+                "the intensity is beyond the limits, or not on their grid",
+                got=intensity_pct_mso,
+                expected=str(self),
+                remedy="Nothing was delivered. Ask for an intensity of the range.",
+            )
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """One pulse of TMS and what came of it.
+
+    Args:
+        intensity_pct_mso: its intensity [% MSO].
+        mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 is below the detection limit. None where it was only seen
+            whether there was a response.
+        response: whether there was a response; None where the amplitude says it.
+
+    Raises:
+        InvalidValueError: not exactly one of the two, or a value that cannot be.
+    """
+
+    intensity_pct_mso: float
+    mep_mv: float | None = None
+    response: bool | None = None
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "intensity_pct_mso", above=0, most=100)
+        check_amplitude(self, "mep_mv", optional=True)
+        if (self.mep_mv is None) == (self.response is None) or not isinstance(self.response, bool | None):
+            raise InvalidValueError(
+                "a pulse has either an amplitude or a response that was seen or not",
+                got=(self.mep_mv, self.response),
+                expected="mep_mv in mV, or response True or False",
+            )
+
+    @property
+    def responded(self) -> bool:
+        """Whether there was a response: an MEP above 50 µV."""
+        return bool(self.response) if self.mep_mv is None else self.mep_mv > RESPONSE_MV
+
+
+@dataclass(frozen=True)
+class ThresholdEstimate:
+    """What is believed about the resting motor threshold.
+
+    Args:
+        threshold_pct_mso: the threshold [% MSO]; None where there is no number to report, and `reason` says why.
+        low_pct_mso: lower end of its 90 % interval; None where the method has none.
+        high_pct_mso: upper end of its 90 % interval.
+        sd_pct_mso: SD of what is believed; None where the method has none.
+        reason: why there is no number; empty where there is one.
+    """
+
+    threshold_pct_mso: float | None
+    low_pct_mso: float | None = None
+    high_pct_mso: float | None = None
+    sd_pct_mso: float | None = None
+    reason: str = ""
+
+    def __str__(self) -> str:
+        if self.threshold_pct_mso is None:
+            return f"No resting motor threshold. {self.reason}"
+        told = f"Resting motor threshold: {self.threshold_pct_mso:.1f} % MSO"
+        if self.low_pct_mso is None or self.high_pct_mso is None:
+            return f"{told}."
+        return f"{told} (90 % interval {self.low_pct_mso:.1f}–{self.high_pct_mso:.1f})."
+
+    def within(self, space: IntensityRange) -> ThresholdEstimate:
+        """The same, without its number where that is beyond the range.
+
+        Args:
+            space: the intensities that may be asked.
+        """
+        side = None if self.threshold_pct_mso is None else space.beyond(self.threshold_pct_mso)
+        return replace(self, threshold_pct_mso=None, reason=f"It is probably {side}.") if side else self
+
+
+class ThresholdMethod(Protocol):
+    """A way to a threshold: settings that answer from the pulses so far, and remember nothing themselves."""
+
+    def ask(self, pulses: Sequence[Pulse], space: IntensityRange) -> float:
+        """The next intensity [% MSO], on the grid.
+
+        Args:
+            pulses: what was told so far, in order.
+            space: the intensities that may be asked.
+        """
+
+    def estimate(self, pulses: Sequence[Pulse], space: IntensityRange) -> ThresholdEstimate:
+        """What is believed now; only asked for where there were responses and pulses without one.
+
+        Args:
+            pulses: what was told so far, in order.
+            space: the intensities that may be asked.
+        """
+
+    def decision(self, pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision:
+        """Whether to stop, and why.
+
+        Args:
+            pulses: what was told so far, in order.
+            space: the intensities that may be asked.
+        """
+
+
+def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | None:
+    """That pulses of one kind only give no number, and whether the range can still change that; None with both kinds.
+
+    Args:
+        pulses: what was told so far.
+        space: the intensities that may be asked.
+    """
+    kinds = {pulse.responded for pulse in pulses}
+    if len(kinds) == 2:
+        return None
+    if not kinds:
+        return StopDecision(stop=False, reason="Nothing was told yet.")
+    answered = kinds == {True}
+    end = space.low_pct_mso if answered else space.high_pct_mso
+    at_end = sum(abs(pulse.intensity_pct_mso - end) <= NEAR_THE_END_PCT_MSO for pulse in pulses)
+    if answered:
+        seen = f"Every pulse was answered, down to {min(pulse.intensity_pct_mso for pulse in pulses):g} % MSO."
+        advice = f"The range begins too high, at {end:g} %. Or is the muscle not at rest, or the EMG not quiet?"
+    else:
+        seen = f"No pulse was answered, up to {max(pulse.intensity_pct_mso for pulse in pulses):g} % MSO."
+        advice = f"The range ends too low, at {end:g} %. Or is the coil off the hot spot, or the amplifier off?"
+    return StopDecision(at_end >= ENOUGH_AT_THE_END, f"{seen} {advice}" if at_end >= ENOUGH_AT_THE_END else seen)

@@ -1,0 +1,132 @@
+"""The search for a threshold: proposes intensities, learns from pulses, and says when it is over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, is_dataclass
+from typing import Any, Final
+
+from isiw.checks import choice, number
+from isiw.errors import InvalidValueError
+from isiw.signals.plausibility import implausible_amplitude
+from isiw.strategy.stopping import StopDecision
+from isiw.strategy.threshold.bayes import BayesThreshold
+from isiw.strategy.threshold.hunting import MaximumLikelihood
+from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate, ThresholdMethod, one_sided
+from isiw.strategy.threshold.relative import FiveOfTen
+from isiw.text.toml_files import checked
+
+__all__ = ["METHODS", "ThresholdSearch", "list_threshold_methods", "make_threshold_search", "require_plausible"]
+
+METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen]]] = {
+    "bayes": BayesThreshold,
+    "maximum-likelihood": MaximumLikelihood,
+    "five-of-ten": FiveOfTen,
+}
+
+
+def list_threshold_methods() -> dict[str, str]:
+    """The named ways to a threshold and what each does in a sentence."""
+    return {name: (method.__doc__ or "").split("\n", 1)[0] for name, method in METHODS.items()}
+
+
+def make_threshold_search(name: str, space: IntensityRange, **settings: Any) -> ThresholdSearch:
+    """Make a named search.
+
+    Args:
+        name: one of `list_threshold_methods()`.
+        space: the intensities that may be asked.
+        **settings: what differs from the defaults of the method.
+
+    Raises:
+        ConfigError: a setting that the method does not have, or an invalid one.
+        InvalidValueError: an unknown name.
+    """
+    choice("the method", name, METHODS)
+    return ThresholdSearch(name, checked(METHODS[name], settings, f"the settings of {name}"), space)
+
+
+def require_plausible(mep_mv: float) -> None:
+    """Raise where an amplitude cannot be an MEP's.
+
+    Args:
+        mep_mv: the amplitude [mV].
+
+    Raises:
+        InvalidValueError: it cannot; the message names the likely slip of unit.
+    """
+    if (wrong := implausible_amplitude(number("mep_mv", mep_mv, least=0))) is not None:
+        what, _, remedy = wrong.partition(". ")
+        raise InvalidValueError(f"the amplitude cannot be an MEP's: {what}", got=mep_mv, remedy=remedy)
+
+
+class ThresholdSearch:
+    """Proposes the next intensity and learns from each pulse. What it knows are the pulses, and nothing else.
+
+    Args:
+        name: of the method, for the log.
+        method: how the threshold is sought.
+        space: the intensities that may be asked.
+    """
+
+    def __init__(self, name: str, method: ThresholdMethod, space: IntensityRange) -> None:
+        self.name, self.method, self.space = name, method, space
+        self.pulses: tuple[Pulse, ...] = ()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings of the method, as plain values; of one's own, which is no dataclass, there are none."""
+        method: object = self.method
+        return asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
+
+    def ask(self) -> float:
+        """The next intensity [% MSO], on the grid and within the range; the same until the next `tell`.
+
+        Raises:
+            LimitExceededError: a method of one's own proposes an intensity that must not be delivered.
+        """
+        intensity = self.method.ask(self.pulses, self.space)
+        self.space.require(intensity)
+        return intensity
+
+    def tell(self, intensity_pct_mso: float, mep_mv: float | None = None, *, response: bool | None = None) -> None:
+        """Learn from one pulse.
+
+        Args:
+            intensity_pct_mso: the intensity at which it was given [% MSO].
+            mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 is below the detection limit.
+            response: whether a response was seen, instead of an amplitude.
+
+        Raises:
+            InvalidValueError: NaN, a negative amplitude, one that no muscle gives, or not exactly one outcome.
+            LimitExceededError: an intensity beyond the range or off its grid.
+        """
+        self.pulses = (*self.pulses, self.checked(intensity_pct_mso, mep_mv, response=response))
+
+    def checked(self, intensity_pct_mso: float, mep_mv: float | None = None, *, response: bool | None = None) -> Pulse:
+        """What `tell` would learn from, without learning it.
+
+        Args:
+            intensity_pct_mso: as for `tell` [% MSO].
+            mep_mv: as for `tell` [mV].
+            response: as for `tell`.
+
+        Raises:
+            InvalidValueError: as for `tell`.
+            LimitExceededError: as for `tell`.
+        """
+        self.space.require(intensity_pct_mso)
+        if mep_mv is not None:
+            require_plausible(mep_mv)
+        return Pulse(intensity_pct_mso, mep_mv, response)
+
+    def estimate(self) -> ThresholdEstimate:
+        """What is believed now; no number before there were both responses and pulses without one."""
+        refused = one_sided(self.pulses, self.space)
+        if refused is not None:
+            return ThresholdEstimate(None, reason=refused.reason)
+        return self.method.estimate(self.pulses, self.space)
+
+    def decision(self) -> StopDecision:
+        """Whether to stop now, and why; not before there were both kinds of pulses, unless the range is wrong."""
+        return one_sided(self.pulses, self.space) or self.method.decision(self.pulses, self.space)

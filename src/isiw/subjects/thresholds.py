@@ -1,0 +1,206 @@
+"""Simulated people for whom the intensity and the place of the coil are varied, before any window is sought.
+
+Their recruitment curves are those of the cohorts. The curve is moved along the intensity so that half of the MEPs
+exceed 50 µV at the person's resting motor threshold, which is its definition [Rossini2015].
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import logit, ndtr
+
+from isiw.checks import check_numbers, choice, number, whole
+from isiw.errors import InvalidValueError
+from isiw.subjects.cohorts import cohort
+from isiw.subjects.responses import RecruitmentResponse, TrialNoise
+from isiw.trials import RESPONSE_MV
+from isiw.types import FloatArray
+
+__all__ = ["THRESHOLD_COHORTS", "HotSpot", "StimulatedPerson", "StimulatedResponder", "threshold_cohort"]
+
+RMT_PCT_MSO: Final = (30.0, 80.0)
+"""Between these the thresholds of simulated people are uniform [% MSO]."""
+
+SMALLEST_AMPLITUDE_MV: Final = 0.08
+"""Of the largest MEP [mV]: of somebody with less, hardly half of the MEPs exceed 50 µV at any intensity."""
+
+SPOT_RANGE_MM: Final = 20.0
+SPREAD_MM: Final = (20.0, 35.0)
+
+THRESHOLD_COHORTS: Final = ("recruitment", "hand", "steep", "flat")
+"""Whose recruitment curves these people may have: forearm, hand, and less and more noise than was measured."""
+
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(15)
+_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+
+
+@dataclass(frozen=True)
+class HotSpot:
+    """Where the coil acts most, and how its effect falls off: as a Gaussian of the distance.
+
+    Args:
+        x_mm: its place from the middle of the searched area [mm].
+        y_mm: the same, across [mm].
+        spread_mm: at this distance the intensity acts like 61 % of it [mm].
+
+    Raises:
+        InvalidValueError: a place that is not finite, or a spread that is not positive.
+    """
+
+    x_mm: float = 0.0
+    y_mm: float = 0.0
+    spread_mm: float = 28.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "x_mm", "y_mm")
+        check_numbers(self, "spread_mm", above=0)
+
+    def effect(self, x_mm: float, y_mm: float) -> float:
+        """The share of the intensity that acts with the coil at a place.
+
+        Args:
+            x_mm: the coil's place [mm].
+            y_mm: the same, across [mm].
+        """
+        return math.exp(-0.5 * ((x_mm - self.x_mm) ** 2 + (y_mm - self.y_mm) ** 2) / self.spread_mm**2)
+
+
+@dataclass(frozen=True)
+class StimulatedPerson:
+    """One simulated person, by intensity.
+
+    Args:
+        rmt_pct_mso: resting motor threshold at the hot spot [% of the maximum stimulator output].
+        response: the recruitment curve by intensity in % RMT; `x50_pct_rmt` is put where 100 % is the threshold.
+        input_correlation: lag-1 correlation of the input noise.
+        hot_spot: where the coil acts most.
+
+    Raises:
+        InvalidValueError: a threshold that is not positive, or an MEP that never exceeds the criterion.
+    """
+
+    rmt_pct_mso: float
+    response: RecruitmentResponse
+    input_correlation: float = 0.0
+    hot_spot: HotSpot = HotSpot()
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "rmt_pct_mso", above=0)
+        check_numbers(self, "input_correlation", least=0, below=1)
+        if self.response.amplitude_mv < SMALLEST_AMPLITUDE_MV:
+            raise InvalidValueError(
+                "a person with such small MEPs has no threshold",
+                got=self.response.amplitude_mv,
+                expected=f"an amplitude_mv of at least {SMALLEST_AMPLITUDE_MV:g}",
+            )
+        object.__setattr__(self, "response", replace(self.response, x50_pct_rmt=_x50(self.response)))
+
+    @cached_property
+    def _needed_drive_pct(self) -> FloatArray:
+        return _criterion_drive(self.response)
+
+    def response_probability(self, intensity_pct_mso: float) -> float:
+        """Probability of an MEP above 50 µV at the hot spot, by intensity [% MSO]."""
+        drive = 100 * intensity_pct_mso / self.rmt_pct_mso - self.response.x50_pct_rmt
+        return _exceeding(drive, self._needed_drive_pct, self.response.sigma_x_pct_rmt)
+
+    def begin(self, seed: int) -> StimulatedResponder:
+        """What answers stimuli.
+
+        Args:
+            seed: of the noise of the trials.
+        """
+        return StimulatedResponder(self, seed)
+
+
+def _criterion_drive(response: RecruitmentResponse) -> FloatArray:
+    """How far above x50 the input must be for an MEP of 50 µV [% RMT], by nodes of output noise and of the floor."""
+    output = np.exp(response.sigma_y * _NODES)[:, None]
+    floor_mv = response.floor.median_mv * np.exp(response.floor.log_sd * _NODES)
+    share = (RESPONSE_MV - floor_mv) / (response.amplitude_mv * output)
+    return np.asarray(logit(np.clip(share, 0.0, 1.0)) / response.slope_per_pct)
+
+
+def _exceeding(drive: float, needed: FloatArray, sigma_x: float) -> float:
+    with np.errstate(divide="ignore"):
+        probability = ndtr(np.divide(drive - needed, sigma_x))
+    return float(_WEIGHTS @ probability @ _WEIGHTS)
+
+
+def _x50(response: RecruitmentResponse) -> float:
+    """Where the half-maximal MEP is [% RMT], if half of the MEPs exceed 50 µV at 100 %."""
+    needed, sigma_x = _criterion_drive(response), response.sigma_x_pct_rmt
+    drive = brentq(lambda above: _exceeding(above, needed, sigma_x) - 0.5, -200.0, 200.0)
+    return 100.0 - float(drive)
+
+
+class StimulatedResponder:
+    """A simulated person who answers stimuli; it holds what has a memory.
+
+    Args:
+        person: who answers.
+        seed: of the noise of the trials.
+    """
+
+    def __init__(self, person: StimulatedPerson, seed: int) -> None:
+        self.person = person
+        self._rng = np.random.default_rng([zlib.crc32(b"threshold"), whole("seed", seed, least=0)])
+        self._input_z = float(self._rng.standard_normal())
+
+    def respond(self, intensity_pct_mso: float, x_mm: float | None = None, y_mm: float | None = None) -> float:
+        """Peak-to-peak amplitude of the MEP of one pulse [mV].
+
+        Args:
+            intensity_pct_mso: of the pulse [% MSO].
+            x_mm: the coil's place [mm]; None is the hot spot.
+            y_mm: the same, across [mm].
+
+        Raises:
+            InvalidValueError: an intensity that is not positive.
+        """
+        intensity = number("intensity_pct_mso", intensity_pct_mso, above=0)
+        person, rng = self.person, self._rng
+        spot, floor = person.hot_spot, person.response.floor
+        acting = spot.effect(spot.x_mm if x_mm is None else x_mm, spot.y_mm if y_mm is None else y_mm)
+        at = replace(person.response, intensity_pct_rmt=100 * intensity * acting / person.rmt_pct_mso)
+        keeps = person.input_correlation
+        self._input_z = keeps * self._input_z + math.sqrt(1 - keeps**2) * rng.standard_normal()
+        floor_mv = floor.median_mv * math.exp(floor.log_sd * rng.standard_normal())
+        return at.sample_evoked_mv(0.0, TrialNoise(self._input_z), rng) + floor_mv
+
+
+def threshold_cohort(name: str, n: int, seed: int) -> list[StimulatedPerson]:
+    """The first n people with the recruitment curves of a cohort, and thresholds of 30–80 % MSO.
+
+    Args:
+        name: one of `THRESHOLD_COHORTS`.
+        n: how many.
+        seed: of the people; 0–999 are for development, reported figures use 10,000 and above.
+
+    Raises:
+        InvalidValueError: an unknown name, or a negative number.
+    """
+    choice("the cohort", name, THRESHOLD_COHORTS)
+    subjects = cohort(name, whole("n", n, least=0), seed)
+    return [
+        _person(name, seed, index, subject.response, subject.input_correlation)
+        for index, subject in enumerate(subjects)
+    ]
+
+
+def _person(name: str, seed: int, index: int, response: object, correlation: float) -> StimulatedPerson:
+    rng = np.random.default_rng([zlib.crc32(f"threshold-{name}".encode()), seed, index])
+    rmt = float(rng.uniform(*RMT_PCT_MSO))
+    x_mm, y_mm = rng.uniform(-SPOT_RANGE_MM, SPOT_RANGE_MM, 2).tolist()
+    spot = HotSpot(x_mm, y_mm, float(rng.uniform(*SPREAD_MM)))
+    if not isinstance(response, RecruitmentResponse):
+        raise TypeError(response)
+    usable = replace(response, amplitude_mv=max(response.amplitude_mv, SMALLEST_AMPLITUDE_MV))
+    return StimulatedPerson(rmt, usable, correlation, spot)

@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from isiw.cli import app
+
+
+def run(*arguments: object, typed: str | None = None) -> Result:
+    return CliRunner().invoke(app, ["threshold", *map(str, arguments)], input=typed)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    log = tmp_path_factory.mktemp("threshold") / "t.mcap"
+    result = run(log, "--method", "maximum-likelihood", "--seed", 3)
+    assert result.exit_code == 0, result.output
+    return log
+
+
+def test_a_simulated_persons_threshold_is_found_and_told_beside_the_true_one(finished: Path) -> None:
+    result = run(finished, "--show")
+    assert result.exit_code == 0
+    assert "Resting motor threshold: " in result.output
+    assert "true threshold is" in result.output
+    assert "17 pulses, 17 of them count" in result.output
+
+
+def test_resuming_what_is_over_changes_nothing(finished: Path) -> None:
+    before = run(finished, "--show").output
+    result = run(finished, "--resume")
+    assert result.exit_code == 0
+    assert run(finished, "--show").output == before
+
+
+def test_by_hand_the_highest_intensity_has_to_be_given(tmp_path: Path) -> None:
+    result = run(tmp_path / "t.mcap", "--by-hand")
+    assert result.exit_code == 1
+    assert "--high" in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_by_hand_what_is_typed_is_logged_and_nothing_beyond_the_limit_is_asked(tmp_path: Path) -> None:
+    log = tmp_path / "t.mcap"
+    options = ("--by-hand", "--high", 60, "--min-iti-s", 0, "--subject", "P1")
+    result = run(log, *options, typed="n\n" * 20)
+    assert result.exit_code == 0, result.output
+    assert "set 61 % MSO" not in result.output
+    assert "set 60 % MSO" in result.output
+    assert "The range ends too low, at 60 %" in result.output
+    again = run(log, *options)
+    assert again.exit_code == 1
+    assert "--resume" in again.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [(("--high", "120"), "from 1 to 100"), (("--method", "best"), "unknown"), (("--cohort", "gaussian"), "unknown")],
+)
+def test_what_cannot_be_is_an_error(tmp_path: Path, arguments: tuple[str, str], complaint: str) -> None:
+    result = run(tmp_path / "t.mcap", *arguments)
+    assert result.exit_code == 1
+    assert complaint in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_log_of_a_threshold_is_not_shown_as_a_session(finished: Path) -> None:
+    result = CliRunner().invoke(app, ["show", str(finished)])
+    assert result.exit_code == 1
+    assert "isiw threshold" in result.output

@@ -1,0 +1,113 @@
+"""An operator at the keyboard: what is typed is taken as it is meant, or refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from isiw.devices.protocol import DeviceInfo
+from isiw.errors import ConfigError, InvalidValueError
+from isiw.session import ThresholdRecorder, open_simulated, open_threshold, resume_threshold, run_by_hand, run_simulated
+from isiw.session.threshold_loops import amplitude_of
+from isiw.strategy.threshold import IntensityRange, make_threshold_search
+
+
+@pytest.fixture
+def recorder(tmp_path: Path) -> Iterator[ThresholdRecorder]:
+    search = make_threshold_search("maximum-likelihood", IntensityRange(20, 80), pulses=4)
+    with open_threshold(search, tmp_path / "t.mcap", device=DeviceInfo("nobody", "impact", simulated=True)) as opened:
+        yield opened
+
+
+def typed(recorder: ThresholdRecorder, *answers: str) -> tuple[list[str], list[str]]:
+    """The questions and what was said, where an operator types these answers."""
+    questions, said, left = list[str](), list[str](), iter(answers)
+
+    def read(question: str) -> str:
+        questions.append(question)
+        try:
+            return next(left)
+        except StopIteration:
+            raise EOFError from None
+
+    run_by_hand(recorder, read, said.append)
+    return questions, said
+
+
+@pytest.mark.parametrize(
+    ("text", "mep_mv"),
+    [("0.08", 0.08), ("80 uV", 0.08), ("80µV", 0.08), (" .5 mV ", 0.5), ("0,12", 0.12), ("5 mv", 5.0), ("0", 0.0)],
+)
+def test_amplitudes_are_taken_with_their_unit(text: str, mep_mv: float) -> None:
+    assert amplitude_of(text) == pytest.approx(mep_mv)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("80", "needs its unit"),
+        ("", "no answer"),
+        ("-1", "no answer"),
+        ("nan", "no answer"),
+        ("0.1 V", "no answer"),
+    ],
+)
+def test_what_is_no_amplitude_is_refused(text: str, complaint: str) -> None:
+    with pytest.raises(InvalidValueError, match=complaint):
+        amplitude_of(text)
+
+
+def test_the_operator_answers_until_the_search_is_over(recorder: ThresholdRecorder) -> None:
+    questions, said = typed(recorder, "n", "Y", "0.02", "200 uV")
+    assert [outcome.mep_mv for outcome in recorder.outcomes] == [None, None, 0.02, 0.2]
+    assert [outcome.response for outcome in recorder.outcomes] == [False, True, None, None]
+    assert recorder.decision().stop
+    assert questions[0] == "Pulse 1: set 45 % MSO, give one pulse. MEP: "
+    assert "Resting motor threshold" in said[-1]
+
+
+def test_a_slip_is_told_and_asked_again(recorder: ThresholdRecorder) -> None:
+    questions, said = typed(recorder, "80", "0.00001", "what", "80 uV")
+    assert len(recorder.outcomes) == 1
+    assert questions[0] == questions[1] == questions[2] == questions[3]
+    assert sum("Nothing was logged" in text for text in said) == 3
+
+
+def test_an_answer_can_be_taken_back_and_a_pulse_can_be_lost(recorder: ThresholdRecorder) -> None:
+    typed(recorder, "u", "0.01", "u", "x", "q", "0.01")
+    assert [outcome.reason for outcome in recorder.outcomes] == [
+        "taken back by the operator",
+        "lost, said the operator",
+    ]
+    assert recorder.search.pulses == ()
+
+
+def test_without_anybody_at_the_keyboard_it_ends_and_goes_on_later(recorder: ThresholdRecorder, tmp_path: Path) -> None:
+    typed(recorder, "n")
+    recorder.close()
+    with resume_threshold(tmp_path / "t.mcap") as resumed:
+        assert [outcome.reason for outcome in resumed.outcomes] == ["", "outcome unknown"]
+
+
+def test_a_simulated_person_is_stimulated_to_the_end(tmp_path: Path) -> None:
+    said = list[str]()
+    with open_simulated(
+        make_threshold_search("bayes", IntensityRange(20, 100)), tmp_path / "s.mcap", cohort="hand", seed=3
+    ) as recorder:
+        decision = run_simulated(recorder, said.append)
+    assert decision.stop
+    assert len(said) == recorder.given
+    assert (recorder.estimate().sd_pct_mso or 9.0) <= 2.0
+
+
+def test_a_log_that_does_not_say_who_is_simulated_is_refused(recorder: ThresholdRecorder) -> None:
+    recorder.header = recorder.header.model_copy(update={"config": {"isiw_threshold": {"seed": 3}}})
+    with pytest.raises(ConfigError, match="who is simulated"):
+        run_simulated(recorder, print)
+
+
+def test_where_nobody_is_simulated_nobody_answers(recorder: ThresholdRecorder) -> None:
+    with pytest.raises(ConfigError, match="no simulated person"):
+        run_simulated(recorder, print)
