@@ -145,7 +145,21 @@ def read_session(path: str | Path) -> SessionRecord:
 
 
 def read_salvaged(salvaged: Salvage) -> SessionRecord:
-    """The session in what was salvaged from a log."""
+    """The session in what was salvaged from a log.
+
+    Args:
+        salvaged: what was read.
+
+    Raises:
+        LogError: the log of an interval production task, or one from a newer version.
+        DamagedLogError: not even the header can be read.
+    """
+    if any(message.topic in {"/production_header", "/production"} for message in salvaged.messages):
+        raise LogError(
+            "this log is of an interval production task, and holds no session",
+            got=str(salvaged.path),
+            remedy="Look at it with: isiw interval LOG --show",
+        )
     records = _Records()
     for message in salvaged.messages:
         records.take(message)

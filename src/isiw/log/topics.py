@@ -12,6 +12,7 @@ from pydantic import TypeAdapter
 from pydantic_core import PydanticSerializationError
 
 from isiw.errors import InvalidValueError, told
+from isiw.log.production import Production, ProductionHeader
 from isiw.log.schema import MOST_TRIALS, Estimate, Event, Header, Intent, Record, Waveform
 from isiw.trials import Trial
 
@@ -33,6 +34,8 @@ _KINDS: dict[str, type[Any]] = {
     "/trial": Trial,
     "/estimate": Estimate,
     "/event": Event,
+    "/production_header": ProductionHeader,
+    "/production": Production,
 }
 _TOPIC_OF_KIND = {kind: topic for topic, kind in _KINDS.items()}
 
