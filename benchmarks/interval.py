@@ -31,7 +31,7 @@ import isiw
 from isiw.interval import Block, LightSearch, Producer, produce, score_pct, search_light
 
 SEED, FIT_SEED = 10_000, 0
-GROUPS, GROUP = 1000, 4
+GROUPS, GROUP = 2500, 4
 RUNS, RUN_TRIALS, BRIEF_RUNS = 60, 45, 12
 TABLE_62 = {
     (300.0, 1): (294, 68), (300.0, 2): (311, 64), (300.0, 3): (300, 36), (300.0, 4): (282, 50),
@@ -129,7 +129,7 @@ def misfit(law: Producer, seed: int = FIT_SEED) -> float:
         for theirs, ours in zip(TABLE_62[300.0, mode], (times_ms.mean(), times_ms.std()), strict=True):
             total += float((ours / theirs - 1) / FITTED) ** 4
         if mode == 2:
-            total += ((near(300.0)(times_ms) - NEAR_SHARE) / 0.2) ** 2
+            total += ((near(300.0)(times_ms) - NEAR_SHARE) / 0.3) ** 2
     return total
 
 
@@ -142,7 +142,7 @@ def fit() -> Producer:
         return replace(begin, **dict(zip(FREE, (start * np.exp(shift)).tolist(), strict=True)))
 
     simplex = np.vstack([np.zeros(len(FREE)), 0.08 * np.eye(len(FREE))])
-    options = {"maxfev": 250, "initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-3}
+    options = {"maxfev": 120, "initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-3}
     return law(minimize(lambda shift: misfit(law(shift)), np.zeros(len(FREE)), method="Nelder-Mead", options=options).x)
 
 
@@ -226,7 +226,8 @@ def tables_63_64(full: Times, half: Times, runs: dict[float, Times]) -> Iterable
         their_mean, their_sd, low, high = HUMAN[scale_pct]
         yield within(where, f"Mean, people, A = {scale_pct:.0f}", their_mean, measured(times_ms, mean), "ms", reason)
         yield within(where, f"SD, people, A = {scale_pct:.0f}", their_sd, measured(times_ms, sd), "ms", reason)
-        yield _extremes(where, f"Range, people, A = {scale_pct:.0f}", (low, high), times_ms, GROUP)
+        reason = "the law searches as far below the target as above it, and has no presses that are simply missed"
+        yield _extremes(where, f"Range, people, A = {scale_pct:.0f}", (low, high), times_ms, GROUP, reason)
         their_mean, their_sd, low, high = COMPUTER[scale_pct]
         chosen = "the number of trials was chosen for this SD" if scale_pct == 100 else "trials as chosen at A = 100"
         reading = f"range 200 to 400 ms, {RUN_TRIALS} trials a run; {chosen}"
@@ -235,7 +236,9 @@ def tables_63_64(full: Times, half: Times, runs: dict[float, Times]) -> Iterable
             ours = _of_runs(runs[scale_pct], statistic)
             what = f"{name}, Bayesian optimisation, A = {scale_pct:.0f}"
             yield within(where, what, theirs, ours, "ms", reason, reading)
-        yield _extremes(where, f"Range, Bayesian optimisation, A = {scale_pct:.0f}", (low, high), runs[scale_pct], 1)
+        what = f"Range, Bayesian optimisation, A = {scale_pct:.0f}"
+        reason = "the ends of the range and the timing error there are not stated"
+        yield _extremes(where, what, (low, high), runs[scale_pct], 1, reason)
     for scale_pct, times_ms, where in ((100.0, full, "Fig. 6.9"), (50.0, half, "Fig. 6.10")):
         ours = f"SD {_of_runs(runs[scale_pct], sd).value:.0f} against {sd(times_ms):.0f} ms"
         holds = sd(runs[scale_pct]) < sd(times_ms)
@@ -248,16 +251,11 @@ def _of_runs(times_ms: Times, statistic: Statistic) -> Measured:
     return Measured(float(np.mean(values)), float(np.std(values, ddof=1)))
 
 
-def _extremes(where: str, what: str, theirs: tuple[float, float], times_ms: Times, group: int) -> Claim:
+def _extremes(where: str, what: str, theirs: tuple[float, float], times_ms: Times, group: int, reason: str) -> Claim:
     parts = np.split(times_ms, len(times_ms) // group)
     share = [np.mean([part.min() <= theirs[0] for part in parts]), np.mean([part.max() >= theirs[1] for part in parts])]
-    good = all(0.025 <= each <= 0.975 for each in share)
     difference = f"{share[0]:.0%} of ours reach as low, {share[1]:.0%} as high"
-    verdict = "reproduced" if good else "not, because an extreme of one sample depends on presses that no law foresees"
-    if not good and theirs[1] > 1000:
-        verdict = "not, because the law has no presses that are simply missed, and 1343 ms is one"
-    if not good and group == 1:
-        verdict = "not, because the first and last interval of the search and its timing error are not stated"
+    verdict = "reproduced" if all(0.05 <= each <= 0.95 for each in share) else f"not, because {reason}"
     return Claim(where, what, f"{theirs[0]} to {theirs[1]} ms", extremes(times_ms, group), difference, verdict)
 
 

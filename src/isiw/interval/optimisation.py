@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 import torch
-from botorch.acquisition import UpperConfidenceBound
+from botorch.acquisition.analytic import UpperConfidenceBound
 from botorch.models import SingleTaskGP
 from gpytorch.kernels import RBFKernel, ScaleKernel
 

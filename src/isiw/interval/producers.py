@@ -59,14 +59,14 @@ class Producer:
         InvalidValueError: an SD that is negative, or a share that is not between 0 and 1.
     """
 
-    timing_cv: float = 0.1097
+    timing_cv: float = 0.111
     motor_ms: float = 10.0
     offset_ms: float = -15.7
     offset_sd_ms: float = 38.6
-    start_sd_ms: float = 76.6
-    search_ms: float = 87.9
-    learning: float = 0.303
-    restlessness: float = 0.0113
+    start_sd_ms: float = 70
+    search_ms: float = 80
+    learning: float = 0.24
+    restlessness: float = 0.0105
 
     def __post_init__(self) -> None:
         check_numbers(self, "timing_cv", "motor_ms", "offset_sd_ms", "start_sd_ms", "search_ms", least=0.0)
@@ -139,7 +139,7 @@ def _trial(
     searching, pressing = rng.standard_normal((2, people))
     timing = rng.standard_t(TAIL, people) / np.sqrt(TAIL / (TAIL - 2))
     aim_ms = np.maximum(state.memory_ms + state.search_ms * searching, SHORTEST_AIM_MS)
-    produced_ms = aim_ms * (1 + law.timing_cv * timing) + law.motor_ms * pressing
-    produced_ms = np.clip(produced_ms, SHORTEST_MS, LONGEST_MS)
+    noisy_ms = aim_ms * (1 + law.timing_cv * timing) + law.motor_ms * pressing
+    produced_ms: FloatArray = np.clip(noisy_ms, SHORTEST_MS, LONGEST_MS)
     learn(aim_ms, produced_ms, rng.random(people))
     return produced_ms

@@ -13,7 +13,7 @@ from isiw.errors import InvalidValueError
 from isiw.log.production import Block, Production
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = ["SCORE_VARIANCE_MS2", "SESSIONS", "answer", "feedback", "score_pct", "session_blocks"]
+__all__ = ["SCORE_VARIANCE_MS2", "SESSIONS", "Block", "answer", "feedback", "score_pct", "session_blocks"]
 
 SCORE_VARIANCE_MS2: Final = 100.0
 """V of equation 6.1 [ms²]. The text prints ms; its own example, a score of 70 at 294 ms, is that of ms²."""
