@@ -280,7 +280,7 @@ def _way_on(existing: Path) -> str:
         return "Choose another path; this is no log that can be continued."
     topics = {message.topic for message in found.messages}
     if "/production_header" in topics:
-        return f"Choose another path, or go on with it: isiw interval {log_of(existing)} --resume."
+        return f"Choose another path, or go on with it: isiw interval {log_of(existing)} --resume"
     if "/header" not in topics:
         return "Choose another path; nothing of this log can be continued."
     return (
