@@ -34,11 +34,11 @@ def interval(  # noqa: PLR0913, PLR0917 - an option each
     trials: Annotated[int | None, typer.Option(help="In each mode; by default 200.", **NO_DEFAULT)] = None,
     subject: Annotated[str | None, typer.Option(help="Who produces the intervals.", **NO_DEFAULT)] = None,
     seed: Annotated[int | None, typer.Option(help="Of the lights; by default 0.", **NO_DEFAULT)] = None,
-    rest_s: Annotated[float, typer.Option(help="Between two modes [s].")] = 120.0,
+    rest_s: Annotated[float, typer.Option(help="Seconds of rest between two modes.")] = 120.0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with this log.")] = False,  # noqa: FBT002 - a flag
     look: Annotated[bool, typer.Option("--show", help="Print what is in this log.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
-    """Produce time intervals by two key presses, as people did whom a robot was compared to; needs a terminal."""
+    """Produce time intervals by two key presses, with feedback after each, at a terminal; see docs/interval.md."""
     given = {"session": session, "mode": mode, "trials": trials, "subject": subject, "seed": seed}
     settings = {name: value for name, value in given.items() if value not in (None, [])}
     with errors_reported(f"Interrupted. Every trial whose feedback was shown is kept; go on with: {_way_on(log)}"):
