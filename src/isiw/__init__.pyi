@@ -3,6 +3,7 @@ from . import config as config
 from . import devices as devices
 from . import errors as errors
 from . import export as export
+from . import interval as interval
 from . import log as log
 from . import metrics as metrics
 from . import models as models

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import isiw
-from isiw.cli import logs, prior, serve, study, threshold
+from isiw.cli import interval, logs, prior, serve, study, threshold
 from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show, show_entry
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ app.add_typer(prior.app, name="prior")
 app.add_typer(study.app, name="study")
 app.add_typer(serve.app)
 app.add_typer(logs.app)
+app.add_typer(interval.app)
 app.add_typer(threshold.app)
 new = typer.Typer(help="Write a starting point of your own.", no_args_is_help=True)
 app.add_typer(new, name="new")

@@ -147,8 +147,12 @@ def read_session(path: str | Path) -> SessionRecord:
 def read_salvaged(salvaged: Salvage) -> SessionRecord:
     """The search for a window in what was salvaged from a log.
 
+    Args:
+        salvaged: what was read.
+
     Raises:
-        LogError: the log is of a motor threshold, from which no window can be learnt.
+        LogError: the log holds no search for a window, or is from a newer version.
+        DamagedLogError: not even the header can be read.
     """
     record = read_any(salvaged)
     if record.header.intensities is not None:
@@ -161,7 +165,21 @@ def read_salvaged(salvaged: Salvage) -> SessionRecord:
 
 
 def read_any(salvaged: Salvage) -> SessionRecord:
-    """What was salvaged from a log, be it of a search for a window or of a motor threshold."""
+    """What was salvaged from a log, be it of a search for a window or of a motor threshold.
+
+    Args:
+        salvaged: what was read.
+
+    Raises:
+        LogError: the log of an interval production task, or one from a newer version.
+        DamagedLogError: not even the header can be read.
+    """
+    if any(message.topic in {"/production_header", "/production"} for message in salvaged.messages):
+        raise LogError(
+            "the log is of an interval production task, not of a search for a window",
+            got=str(salvaged.path),
+            remedy=f"isiw interval {salvaged.path} --show says what was produced.",
+        )
     records = _Records()
     for message in salvaged.messages:
         records.take(message)

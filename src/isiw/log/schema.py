@@ -27,6 +27,7 @@ from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
+from isiw.log.production import Production, ProductionHeader
 from isiw.signals.judgement import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import IntensityRange, ThresholdEstimate
@@ -38,6 +39,7 @@ from isiw.window import Window, WindowEstimate, finding
 __all__ = [
     "MOST_TRIALS",
     "SCHEMA_VERSION",
+    "AnyHeader",
     "Estimate",
     "Event",
     "EventKind",
@@ -302,4 +304,7 @@ class Event(_Record):
     text: str = ""
 
 
-Record: TypeAlias = Header | Intent | Trial | Waveform | Estimate | Event | PulseOutcome | ThresholdBelief
+AnyHeader: TypeAlias = Header | ProductionHeader
+Record: TypeAlias = (
+    AnyHeader | Intent | Trial | Waveform | Estimate | Event | PulseOutcome | ThresholdBelief | Production
+)

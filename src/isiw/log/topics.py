@@ -12,6 +12,7 @@ from pydantic import TypeAdapter
 from pydantic_core import PydanticSerializationError
 
 from isiw.errors import InvalidValueError, told
+from isiw.log.production import Production, ProductionHeader
 from isiw.log.schema import (
     MOST_TRIALS,
     Estimate,
@@ -45,6 +46,8 @@ _KINDS: dict[str, type[Any]] = {
     "/event": Event,
     "/threshold/pulse": PulseOutcome,
     "/threshold/belief": ThresholdBelief,
+    "/production_header": ProductionHeader,
+    "/production": Production,
 }
 _TOPIC_OF_KIND = {kind: topic for topic, kind in _KINDS.items()}
 

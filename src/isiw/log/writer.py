@@ -25,7 +25,7 @@ from isiw.log.durable import (
 )
 from isiw.log.locks import claimed, refuse_if_locked
 from isiw.log.salvage import Message, Salvage, holds, salvage_file
-from isiw.log.schema import Header, Record
+from isiw.log.schema import AnyHeader, Record
 from isiw.log.topics import CHANNEL_IDS, announcement, encode, json_schema, topic_of
 
 __all__ = ["CONFIGURATION", "LogWriter"]
@@ -62,7 +62,7 @@ class LogWriter:
             self._register(topic)
 
     @classmethod
-    def create(cls, path: str | Path, header: Header) -> Self:
+    def create(cls, path: str | Path, header: AnyHeader) -> Self:
         """Start a new log with its header.
 
         Args:
@@ -85,7 +85,9 @@ class LogWriter:
         return log
 
     @classmethod
-    def continuing(cls, path: str | Path, salvage: Salvage, header: Header, as_resumed: Header | None = None) -> Self:
+    def continuing(
+        cls, path: str | Path, salvage: Salvage, header: AnyHeader, as_resumed: AnyHeader | None = None
+    ) -> Self:
         """Go on with a log: everything that was salvaged, and then what comes.
 
         The old file keeps its place until the copy is durable. Where something was lost it is kept for good, as
@@ -116,9 +118,9 @@ class LogWriter:
                 file.move_to(part_of(target), replacing=True, source=source)
         return log
 
-    def _copy_all(self, salvage: Salvage, header: Header, as_resumed: Header | None) -> None:
+    def _copy_all(self, salvage: Salvage, header: AnyHeader, as_resumed: AnyHeader | None) -> None:
         self.begin(as_resumed or header)
-        if not any(message.topic == "/header" for message in salvage.messages):
+        if not any(message.topic == topic_of(header) for message in salvage.messages):
             self.append(header)
         for message in salvage.messages:
             self._copy(message)
@@ -126,7 +128,7 @@ class LogWriter:
             self.append(as_resumed)
         self.sync()
 
-    def begin(self, header: Header) -> None:
+    def begin(self, header: AnyHeader) -> None:
         """Write what is not a message: metadata for tools that list files, and the header as TOML.
 
         Raises:
@@ -276,7 +278,10 @@ def _way_on(existing: Path) -> str:
         found = salvage_file(existing)
     except LogError:
         return "Choose another path; this is no log that can be continued."
-    if not any(message.topic == "/header" for message in found.messages):
+    topics = {message.topic for message in found.messages}
+    if "/production_header" in topics:
+        return f"Choose another path, or go on with it: isiw interval {log_of(existing)} --resume"
+    if "/header" not in topics:
         return "Choose another path; nothing of this log can be continued."
     if any(message.topic.startswith("/threshold/") for message in found.messages):
         return f"Choose another path, or go on with it: isiw threshold {log_of(existing)} --resume"
@@ -324,7 +329,7 @@ def _foreign(path: Path, salvage: Salvage) -> LogError:
     )
 
 
-def _as_toml(header: Header) -> bytes:
+def _as_toml(header: AnyHeader) -> bytes:
     try:
         return tomli_w.dumps(header.model_dump(mode="json", exclude_none=True)).encode()
     except (TypeError, ValueError) as error:

@@ -1,0 +1,78 @@
+"""The command about manual interval production."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import isiw
+from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show
+
+if TYPE_CHECKING:
+    from isiw.interval import ProductionRecord
+
+__all__ = ["app"]
+
+app = typer.Typer()
+
+
+@app.command()
+def interval(  # noqa: PLR0913, PLR0917 - an option each
+    log: Annotated[Path, typer.Argument(help="The log's file.", **NO_DEFAULT)],
+    session: Annotated[
+        int | None,
+        typer.Option(help="1: 300 ms. 2: 500 ms. 3: 300 ms with half the score. By default 1.", **NO_DEFAULT),
+    ] = None,
+    mode: Annotated[
+        list[int] | None,
+        typer.Option(
+            help="Only this feedback: 1 score bar, 2 light, 3 produced time, 4 absolute error; may be repeated."
+        ),
+    ] = None,
+    trials: Annotated[int | None, typer.Option(help="In each mode; by default 200.", **NO_DEFAULT)] = None,
+    subject: Annotated[str | None, typer.Option(help="Who produces the intervals.", **NO_DEFAULT)] = None,
+    seed: Annotated[int | None, typer.Option(help="Of the lights; by default 0.", **NO_DEFAULT)] = None,
+    rest_s: Annotated[float, typer.Option(help="Seconds of rest between two modes.")] = 120.0,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with this log.")] = False,  # noqa: FBT002 - a flag
+    look: Annotated[bool, typer.Option("--show", help="Print what is in this log.")] = False,  # noqa: FBT002 - a flag
+) -> None:
+    """Produce time intervals by two key presses, with feedback after each, at a terminal; see docs/interval.md."""
+    given = {"session": session, "mode": mode, "trials": trials, "subject": subject, "seed": seed}
+    settings = {name: value for name, value in given.items() if value not in (None, [])}
+    with errors_reported(f"Interrupted. Every trial whose feedback was shown is kept; go on with: {_way_on(log)}"):
+        if settings and (resume or look):
+            raise isiw.errors.ConfigError(
+                "a task keeps what its log says", got=", ".join(settings), remedy="Leave these options out."
+            )
+        if look:
+            _say(isiw.interval.read_productions(log))
+        elif resume:
+            _end(isiw.interval.resume_task(log, rest_s=rest_s))
+        else:
+            blocks = isiw.interval.session_blocks(session or 1, mode or (), 200 if trials is None else trials)
+            _end(isiw.interval.run_task(log, blocks, subject=subject or "", seed=seed or 0, rest_s=rest_s))
+
+
+def _way_on(log: Path) -> str:
+    return f"isiw interval {log} --resume"
+
+
+def _end(record: ProductionRecord) -> None:
+    """What is said at the end; a hidden target stays hidden while trials are left."""
+    if record.left:
+        show(f"{len(record.left)} trials are left; go on with: {_way_on(record.path)}", style="bold")
+    else:
+        _say(record)
+
+
+def _say(record: ProductionRecord) -> None:
+    header = record.header
+    show(f"{header.subject or 'An unnamed subject'}, {header.created}", style="bold")
+    show(record.table.to_string(index=False, float_format=lambda value: f"{value:.4g}") if len(record.table) else "")
+    show(f"{len(record.productions)} trials, {len(record.left)} left. log: {record.path}")
+    for loss in record.losses:
+        show(loss, style="red")
+    if record.losses:
+        raise typer.Exit(DAMAGED)

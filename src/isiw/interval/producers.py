@@ -1,0 +1,139 @@
+"""Simulated people who produce intervals: a law of timing noise, and of what each kind of feedback teaches.
+
+A person aims at a time a = m + s·z around what they remember, m, searching with SD s, and produces
+
+    t = a·(1 + w·h) + b·z'
+
+z and z' are standard normal; h has Student's t distribution with three degrees of freedom, scaled to SD 1. Noise that
+grows with the interval is scalar timing [Gibbon1977]; b is the noise of the two presses, which does not [Wing1973].
+
+- Hidden target (modes 1 and 2): with the reward r, the score as a fraction or the light, 0 or 1,
+  m ← m + λ·r·(a − m) and s ← s − λ·r·s + ρ·(1 − r)·(S − s): a reward draws towards what was aimed at and ends the
+  search; without rewards the search begins again.
+- Target and produced time (mode 3): m ← m − λ·(t − M), with M the target.
+- Absolute error (mode 4): it does not say in which direction, so m stays at what the person takes for M.
+
+The law is ours; the dissertation has none. All but w is in ms, since the score's bell is equally wide at both targets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from isiw.checks import check_numbers, check_probabilities, whole
+from isiw.interval.task import score_pct
+from isiw.log.production import LONGEST_MS, Block
+from isiw.types import FloatArray
+
+__all__ = ["Producer", "produce"]
+
+SHORTEST_AIM_MS: Final = 50.0
+SHORTEST_MS: Final = 20.0
+TAIL: Final = 3
+"""Degrees of freedom of the timing noise: now and then a press comes far too early or too late."""
+
+
+@dataclass(frozen=True)
+class Producer:
+    """What people have in common who produce intervals.
+
+    The defaults are fitted to session 1 of [Kim2020, Table 6.2], target 300 ms, and the share of mode 2 within 20 ms
+    of the target [Kim2020, 6.3.2], by `python -m benchmarks.interval --fit`; but for `motor_ms`, which one target does
+    not identify, and which is chosen.
+
+    Args:
+        timing_cv: w, SD of the timing noise as a fraction of the time aimed at.
+        motor_ms: b, SD of the noise of the two presses [ms].
+        offset_ms: by how much people take another time for a told target, mean [ms].
+        offset_sd_ms: the same, SD over people [ms].
+        start_sd_ms: SD over people of the first aim about a hidden target [ms].
+        search_ms: S, SD of the search without rewards [ms].
+        learning: λ, the share of what feedback shows that is taken over.
+        restlessness: ρ, the share of the way back to searching after a trial without reward.
+
+    Raises:
+        InvalidValueError: an SD that is negative, or a share that is not between 0 and 1.
+    """
+
+    timing_cv: float = 0.1098
+    motor_ms: float = 10.0
+    offset_ms: float = -16.7
+    offset_sd_ms: float = 38.9
+    start_sd_ms: float = 69.7
+    search_ms: float = 83.2
+    learning: float = 0.233
+    restlessness: float = 0.0108
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "timing_cv", "motor_ms", "offset_sd_ms", "start_sd_ms", "search_ms", least=0.0)
+        check_numbers(self, "offset_ms")
+        check_probabilities(self, "learning", "restlessness")
+
+
+def produce(block: Block, people: int, seed: int, producer: Producer | None = None) -> FloatArray:
+    """Intervals that simulated people produce in a block.
+
+    Args:
+        block: target, feedback and trials.
+        people: how many, b.
+        seed: of the people and their trials; the same people take part in blocks of the same seed.
+        producer: their law; by default the fitted one.
+
+    Returns:
+        Produced intervals [ms], shape (b, n).
+
+    Raises:
+        InvalidValueError: no people, or a negative seed.
+    """
+    people, seed = whole("people", people, least=1), whole("seed", seed, least=0)
+    law = producer or Producer()
+    person = np.random.default_rng(seed).standard_normal(people)
+    rng = np.random.default_rng([seed, block.mode, round(block.target_ms), round(block.scale_pct)])
+    state, produced_ms = _begun(law, block, person), np.empty((people, block.trials))
+    for trial in range(block.trials):
+        aim_ms, produced_ms[:, trial] = _tried(law, state, rng)
+        state = _learnt(law, block, state, aim_ms, produced_ms[:, trial], rng.random(people))
+    return produced_ms
+
+
+class _State(NamedTuple):
+    """What people remember, m, and the SD of their search, s [ms], shape (b,)."""
+
+    memory_ms: FloatArray
+    search_ms: FloatArray
+
+
+def _begun(law: Producer, block: Block, person: FloatArray) -> _State:
+    """The state before the first trial, from a standard normal number a person."""
+    if block.mode in {3, 4}:
+        return _State(block.target_ms + law.offset_ms + law.offset_sd_ms * person, np.zeros_like(person))
+    return _State(block.target_ms + law.start_sd_ms * person, np.full_like(person, law.search_ms))
+
+
+def _tried(law: Producer, state: _State, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """What everybody aims at, and what they produce [ms], shape (b,) each."""
+    people = len(state.memory_ms)
+    searching, pressing = rng.standard_normal((2, people))
+    timing = rng.standard_t(TAIL, people) / np.sqrt(TAIL / (TAIL - 2))
+    aim_ms = np.maximum(state.memory_ms + state.search_ms * searching, SHORTEST_AIM_MS)
+    produced_ms = aim_ms * (1 + law.timing_cv * timing) + law.motor_ms * pressing
+    return aim_ms, np.clip(produced_ms, SHORTEST_MS, LONGEST_MS)
+
+
+def _learnt(
+    law: Producer, block: Block, state: _State, aim_ms: FloatArray, produced_ms: FloatArray, luck: FloatArray
+) -> _State:
+    """The state after a trial; luck is uniform in 0–1, shape (b,), and decides about the light."""
+    if block.mode == 4:
+        return state
+    if block.mode == 3:
+        return state._replace(memory_ms=state.memory_ms - law.learning * (produced_ms - block.target_ms))
+    score = score_pct(produced_ms, block.target_ms, block.scale_pct) / 100
+    reward = score if block.mode == 1 else np.where(luck < score, 1.0, 0.0)
+    learnt = law.learning * reward
+    back = law.restlessness * (1 - reward) * (law.search_ms - state.search_ms)
+    memory_ms = state.memory_ms + learnt * (aim_ms - state.memory_ms)
+    return _State(memory_ms, state.search_ms * (1 - learnt) + back)

@@ -1,0 +1,196 @@
+"""The log of a task: begun, continued, and read back."""
+
+from __future__ import annotations
+
+import datetime as dt
+import itertools
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import isiw
+from isiw.checks import text, whole
+from isiw.errors import DamagedLogError, InvalidValueError, LogError
+from isiw.log.production import PRODUCTION_VERSION, Block, Production, ProductionHeader
+from isiw.log.salvage import Message, Salvage, salvage
+from isiw.log.schema import Event
+from isiw.log.topics import decode
+from isiw.log.writer import CONFIGURATION, LogWriter
+from isiw.text.toml_files import parsed
+
+__all__ = ["NEAR_MS", "ProductionRecord", "begin_log", "continue_log", "read_productions"]
+
+NEAR_MS = 20.0
+"""Half of the 40 ms in which an interval counts as effective [Kim2020, 6.3.1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProductionRecord:
+    """A task as its log tells it.
+
+    Args:
+        path: the file that was read.
+        header: who, when, and which blocks.
+        productions: the produced intervals, in the order in which they were logged.
+        events: resumptions, and presses that do not count.
+        losses: what could not be read, a sentence each.
+    """
+
+    path: Path
+    header: ProductionHeader
+    productions: tuple[Production, ...] = field(repr=False)
+    events: tuple[Event, ...] = field(repr=False, default=())
+    losses: tuple[str, ...] = ()
+
+    @cached_property
+    def left(self) -> tuple[tuple[int, int], ...]:
+        """Trials that are not in the log yet, as the trial's and its block's number."""
+        blocks = [block for block, of in enumerate(self.header.blocks) for _ in range(of.trials)]
+        next_trial = max((production.trial for production in self.productions), default=-1) + 1
+        return tuple(itertools.islice(enumerate(blocks), next_trial, None))
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """A row a block that was begun.
+
+        Columns mode, target_ms, scale_pct, n, mean_ms, sd_ms (of the n trials; 0 for one), and near, the share within
+        20 ms of the target.
+        """
+        return pd.DataFrame([_row(block, self._produced_ms(index)) for index, block in self._begun()])
+
+    def _begun(self) -> list[tuple[int, Block]]:
+        begun = {production.block for production in self.productions}
+        return [(index, block) for index, block in enumerate(self.header.blocks) if index in begun]
+
+    def _produced_ms(self, block: int) -> list[float]:
+        return [production.produced_ms for production in self.productions if production.block == block]
+
+
+def _row(block: Block, produced_ms: list[float]) -> dict[str, float]:
+    times_ms = np.array(produced_ms)
+    return {
+        "mode": block.mode,
+        "target_ms": block.target_ms,
+        "scale_pct": block.scale_pct,
+        "n": len(times_ms),
+        "mean_ms": float(times_ms.mean()),
+        "sd_ms": float(times_ms.std()),
+        "near": float(np.mean(np.abs(times_ms - block.target_ms) <= NEAR_MS)),
+    }
+
+
+def begin_log(
+    path: str | Path, blocks: tuple[Block, ...], subject: str, seed: int
+) -> tuple[ProductionRecord, LogWriter]:
+    """A task that begins, and its open log.
+
+    Args:
+        path: the log, without `.part`.
+        blocks: what is to be produced.
+        subject: who produces it.
+        seed: of the lights.
+
+    Raises:
+        InvalidValueError: no blocks, a subject that is no text, or a negative seed.
+        LogError: there is a log already, or it cannot be created.
+    """
+    if not blocks:
+        raise InvalidValueError("a task needs at least one block", remedy="Take those of isiw.interval.session_blocks.")
+    header = ProductionHeader(
+        isiw_version=isiw.__version__,
+        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+        subject=text("subject", subject),
+        seed=whole("seed", seed, least=0),
+        blocks=blocks,
+    )
+    return ProductionRecord(Path(path), header, ()), LogWriter.create(path, header)
+
+
+def continue_log(path: str | Path) -> tuple[ProductionRecord, LogWriter]:
+    """A task that was interrupted, and its log, open again.
+
+    Args:
+        path: the log, with or without `.part`.
+
+    Raises:
+        InvalidValueError: the task is complete.
+        LogError: no such log, one that is still written, or of something else.
+        DamagedLogError: a log of which not even the header can be read.
+    """
+    found = salvage(path)
+    record = _record_of(found)
+    if not record.left:
+        raise InvalidValueError(
+            "this task is complete", got=str(record.path), remedy="Look at it with: isiw interval LOG --show"
+        )
+    log = LogWriter.continuing(path, found, record.header)
+    log.append(Event(kind="resume", trial=None, text=f"Resumed before trial {record.left[0][0]}."))
+    return record, log
+
+
+def read_productions(path: str | Path) -> ProductionRecord:
+    """Read the log of a task, finished or not, whole or damaged; `losses` says what is missing.
+
+    Args:
+        path: the log, with or without `.part`.
+
+    Raises:
+        LogError: no such file, not a log, or one of something else, or from a newer version.
+        DamagedLogError: a log of which not even the header can be read.
+    """
+    return _record_of(salvage(path))
+
+
+def _record_of(found: Salvage) -> ProductionRecord:
+    if any(message.topic == "/header" for message in found.messages):
+        raise LogError(
+            "this log is of a session, and not of an interval production task",
+            got=str(found.path),
+            remedy="Look at it with: isiw show LOG",
+        )
+    header: ProductionHeader | None = None
+    productions, events, losses = list[Production](), list[Event](), list(found.losses)
+    for message in found.messages:
+        match _decoded(message):
+            case ProductionHeader() as header:
+                pass
+            case Production() as production:
+                productions.append(production)
+            case Event() as event:
+                events.append(event)
+            case _:
+                losses.append(f"A record on {message.topic} makes no sense and is left out.")
+    header = _checked(header or _header_from_attachment(found), found.path)
+    return ProductionRecord(found.path, header, tuple(productions), tuple(events), tuple(losses))
+
+
+def _decoded(message: Message) -> object:
+    try:
+        return decode(message.topic, message.data)
+    except ValueError:
+        return None
+
+
+def _header_from_attachment(found: Salvage) -> ProductionHeader:
+    try:
+        return ProductionHeader.model_validate(parsed(found.attachments.get(CONFIGURATION, b"").decode()))
+    except (ValueError, RecursionError) as error:
+        raise DamagedLogError(
+            "the log's header is lost, or it is no log of an interval production task",
+            got=str(found.path),
+            remedy="Its records may still be readable with any MCAP tool.",
+        ) from error
+
+
+def _checked(header: ProductionHeader, path: Path) -> ProductionHeader:
+    if header.schema_version > PRODUCTION_VERSION:
+        raise LogError(
+            "the log was written by a newer isiw",
+            got=f"version {header.schema_version} in {path}",
+            expected=f"{PRODUCTION_VERSION} or older",
+            remedy="Upgrade isiw.",
+        )
+    return header
