@@ -159,7 +159,7 @@ def test_a_logged_session_is_studied_like_a_preset(tmp_path: Path) -> None:
     study = study_session(read_session(result.log))
     assert len(study.commanded_ms) == 12
     logged = [known(trial.t_hit_ms) for trial in result.trials]
-    np.testing.assert_allclose(study.events.hit_ms, logged, atol=0.01)
+    np.testing.assert_allclose(instance(TapEvents, study.events).hit_ms, logged, atol=0.01)
     apart = [known(trial.isi_ms) > 14 for trial in result.trials]  # sooner, the tap shows when the MEP does
     assert 0 < sum(apart) < 12
     assert study.event_table.loc["memg", "n"] == sum(apart)
@@ -237,6 +237,7 @@ def test_rotations_begin_within_a_few_milliseconds_of_each_other_and_end_within_
     assert np.degrees(max(turned)) < 1.5  # what noise of 0.2° hides
 
 
-def test_a_study_needs_rotations() -> None:
-    with pytest.raises(InvalidValueError, match="rotations"):
-        study_vane(rotations=0)
+@pytest.mark.parametrize(("rotations", "seed", "said"), [(0, 0, "rotations"), (10**6, 0, "rotations"), (1, -1, "seed")])
+def test_a_study_of_rotations_that_cannot_be_is_refused(rotations: int, seed: int, said: str) -> None:
+    with pytest.raises(InvalidValueError, match=said):
+        study_vane(rotations=rotations, seed=seed)

@@ -50,7 +50,7 @@ STUDY_ISI_MS = (10.0, 30.0, 50.0, 51.0, 52.0, 53.0, 54.0, 70.0, 90.0)
 TRIAL_MS = 1000.0
 CALIBRATION_TAPS = 21
 BATCH = 100
-MOST_ROTATIONS = 10_000
+MOST_ROTATIONS = 2000  # each keeps a second of angle, pressures and flows
 
 HIT_DELAY_SD_MS = 6.0
 """SD over people of the hit delay of one rig, as on the tapping robot (dissertation, 4.2) [ms]."""
@@ -200,7 +200,7 @@ def study_vane(vane: Vane | None = None, *, rotations: int = 100, seed: int = 0)
         seed: seed of the strokes and of the sensors' noise.
 
     Raises:
-        InvalidValueError: no rotations, or a negative seed.
+        InvalidValueError: no rotations or more than 2000, or a negative seed.
     """
     rotations, seed = whole("rotations", rotations, least=1, most=MOST_ROTATIONS), whole("seed", seed, least=0)
     rng = np.random.default_rng(seed)

@@ -118,7 +118,7 @@ class Supply:
     Args:
         reservoir_bar: absolute pressure of the reservoir [bar].
         valve_l_s_bar: sonic conductance of the valve, C_0 [l/(s bar)]; by default that of a small five-port valve
-            (SMC SY3000, catalogue EUS11-83).
+            [SMCSY].
         fitting_l_s_bar: sonic conductance of the fitting, C_f, with what the line's friction takes away [l/(s bar)].
         critical_ratio: pressure ratio below which either flow is choked, C_r; by default that of the same valve.
         line_m: length of a line [m].

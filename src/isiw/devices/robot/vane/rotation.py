@@ -81,7 +81,8 @@ def orifice_flow(conductance: ArrayLike, critical_ratio: ArrayLike, from_pa: Arr
     """
     one, other = np.asarray(from_pa, dtype=np.float64), np.asarray(to_pa, dtype=np.float64)
     high, low = np.maximum(one, other), np.minimum(one, other)
-    excess = np.maximum((low / high - critical_ratio) / (1 - np.asarray(critical_ratio)), 0.0)
+    ratio = np.asarray(critical_ratio, dtype=np.float64)
+    excess = np.maximum((low / high - ratio) / (1 - ratio), 0.0)
     flow: FloatArray = LITRE_PER_S_BAR * np.asarray(conductance) * np.sign(one - other) * high * np.sqrt(1 - excess**2)
     return flow
 
