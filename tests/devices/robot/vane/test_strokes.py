@@ -10,7 +10,7 @@ from isiw.errors import InvalidValueError
 
 def test_without_variation_all_strokes_are_one_and_without_noise_they_are_recorded_as_they_are() -> None:
     exact = Variation(friction_cv=0, reservoir_cv=0, angle_sd_deg=0, pressure_sd_kpa=0)
-    strokes = draw_strokes(Vane(), 2, np.random.default_rng(0), exact, step_ms=0.5)
+    strokes = draw_strokes(Vane(), 2, np.random.default_rng(0), exact)
     waves = record_strokes(strokes, np.random.default_rng(0), exact, rest_ms=100)
     assert set(waves) == set(UNITS)
     assert (waves["angle"][0] == waves["angle"][1]).all()
@@ -20,9 +20,7 @@ def test_without_variation_all_strokes_are_one_and_without_noise_they_are_record
 
 
 def test_more_friction_starts_later() -> None:
-    strokes = draw_strokes(
-        Vane(), 20, np.random.default_rng(1), Variation(friction_cv=0.3, reservoir_cv=0), step_ms=0.5
-    )
+    strokes = draw_strokes(Vane(), 20, np.random.default_rng(1), Variation(friction_cv=0.3, reservoir_cv=0))
     friction = 1 + 0.3 * np.random.default_rng(1).standard_normal((2, 20))[0]
     assert (np.argsort(strokes.delay_ms, kind="stable") == np.argsort(friction)).sum() > 10
     assert strokes.delay_ms.std() > 0.5

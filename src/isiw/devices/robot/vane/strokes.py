@@ -21,6 +21,7 @@ STROKE_S = 1.0
 UNITS = {"angle": "deg", "vane_pressure": "kPa"}
 """The unit of each channel; the pressure is that of the filled chamber less that of the other."""
 
+STEP_MS = 0.25  # within 1 ms of a step of 0.1 ms
 LEAST_SHARE = 0.1  # of the mean: neither friction nor pressure ever vanishes
 
 
@@ -47,9 +48,7 @@ class Variation:
         check_numbers(self, "friction_cv", "reservoir_cv", "angle_sd_deg", "pressure_sd_kpa", least=0)
 
 
-def draw_strokes(
-    vane: Vane, n: int, rng: np.random.Generator, variation: Variation | None = None, *, step_ms: float = 0.2
-) -> Rotations:
+def draw_strokes(vane: Vane, n: int, rng: np.random.Generator, variation: Variation | None = None) -> Rotations:
     """Strokes from one end of the range to the other, n of them.
 
     Args:
@@ -57,7 +56,6 @@ def draw_strokes(
         n: how many strokes.
         rng: what they are drawn from.
         variation: how they differ.
-        step_ms: step of the solver [ms].
 
     Raises:
         InvalidValueError: no strokes.
@@ -67,7 +65,7 @@ def draw_strokes(
     friction = np.maximum(1 + varied.friction_cv * z[0], LEAST_SHARE)
     reservoir = np.maximum(1 + varied.reservoir_cv * z[1], LEAST_SHARE)
     vanes = [_varied(vane, float(one), float(other)) for one, other in zip(friction, reservoir, strict=True)]
-    return rotate(vanes, duration_s=STROKE_S, half_wave_s=STROKE_S, start_rad=0.0, step_ms=step_ms)
+    return rotate(vanes, duration_s=STROKE_S, half_wave_s=STROKE_S, start_rad=0.0, step_ms=STEP_MS)
 
 
 def _varied(vane: Vane, friction: float, reservoir: float) -> Vane:

@@ -20,7 +20,6 @@ from isiw.trials import Channel, Stimulus, Sweep
 __all__ = ["RotatingTapper"]
 
 STROKES = 32
-STROKE_STEP_MS = 0.5
 STILL_MS = 1000.0  # as long as a usual sweep
 LATEST_MEP_MS = max(end for _, end in MEP_WINDOWS_MS.values())
 
@@ -29,9 +28,9 @@ class RotatingTapper:
     """A simulation of the tapping robot that turns the wrist by 180° after each tap; for `SimulatedDevice`.
 
     The actuator's valve opens a while after the impact, or after the pulse where that comes later, so that nothing
-    moves while the MEP is measured. A tap that misses, and TMS alone, are followed by no rotation. Before the next
-    trial the hand has been brought back. The sweep has two channels more: the shaft's angle, and the pressure
-    difference of the chambers.
+    moves while the MEP is measured. TMS alone is followed by no rotation, nor is a tap whose accelerometer shows no
+    impact; without an accelerometer the predicted impact counts. Before the next trial the hand has been brought back.
+    The sweep has two channels more: the shaft's angle, and the pressure difference of the chambers.
 
     Args:
         tapper: the tapping robot.
@@ -81,4 +80,4 @@ class RotatingTapper:
 @lru_cache(maxsize=8)
 def _strokes(vane: Vane, seed: int) -> Rotations:
     """Solved once for all devices of a session, since a stroke takes longer to solve than a trial to simulate."""
-    return draw_strokes(vane, STROKES, np.random.default_rng(seed), step_ms=STROKE_STEP_MS)
+    return draw_strokes(vane, STROKES, np.random.default_rng(seed))
