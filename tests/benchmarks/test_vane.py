@@ -29,11 +29,13 @@ def test_the_sweep_and_the_solver_are_as_fast_and_exact_as_asked_for() -> None:
     assert max(RESULTS["Errors of the solver [%]"][0].values()) < 0.5
 
 
-def test_the_closed_form_obeys_the_flow_that_it_was_derived_from() -> None:
-    supply, times_ms = Supply(), np.linspace(0, 120, 1201)
+@pytest.mark.parametrize("critical", [0.2, 0.35])
+def test_the_closed_form_obeys_the_flow_that_it_was_derived_from(critical: float) -> None:
+    supply, times_ms = Supply(critical_ratio=critical), np.linspace(0, 140, 1401)
     pressure = filled_bar(times_ms, 1e-4, supply)
     ratio = pressure[1:-1] / 4.0
-    excess = np.maximum((ratio - 0.28) / 0.72, 0)
-    expected = 1.1 * 4.0 * np.sqrt(np.maximum(1 - excess**2, 0)) / 100  # l/s bar by 100 ml [bar/ms]
+    excess = np.maximum((ratio - critical) / (1 - critical), 0)
+    expected = 0.99 * 4.0 * np.sqrt(np.maximum(1 - excess**2, 0)) / 100  # l/s bar by 100 ml [bar/ms]
     assert np.gradient(pressure, times_ms)[1:-1] == pytest.approx(expected, abs=2e-3)
+    assert pressure[0] == pytest.approx(1.0)
     assert pressure[-1] == pytest.approx(4.0)

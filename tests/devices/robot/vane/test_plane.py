@@ -17,7 +17,7 @@ def deep() -> Performance:
     """Actuators of 150 mm depth; at the end, h = 15 mm with the lightest and the heaviest load."""
     vanes = [Vane(Rotor(height_mm, 150)) for height_mm in HEIGHTS_MM]
     loaded = [Vane(Rotor(15, 150), Load(payload_n)) for payload_n in (1.0, 10.0)]
-    return performance([*vanes, *loaded], periods=2, step_ms=0.4)
+    return performance([*vanes, *loaded], periods=6, step_ms=0.5)
 
 
 def test_the_recommended_heights_reach_the_full_range_and_larger_and_smaller_ones_do_not(deep: Performance) -> None:
@@ -25,9 +25,9 @@ def test_the_recommended_heights_reach_the_full_range_and_larger_and_smaller_one
     assert list(np.array(HEIGHTS_MM)[full]) == [10, 12.5, 15, 17.5]
 
 
-def test_the_recommended_heights_break_away_near_80_to_100_ms(deep: Performance) -> None:
+def test_the_recommended_heights_break_away_within_80_to_100_ms(deep: Performance) -> None:
     recommended = deep.delay_ms[1:5]
-    assert recommended.min() == pytest.approx(80, abs=3)
+    assert recommended.min() > 80
     assert recommended.max() < 100
 
 
@@ -37,7 +37,7 @@ def test_the_delay_falls_with_height(deep: Performance) -> None:
 
 def test_the_payload_hardly_matters(deep: Performance) -> None:
     assert deep.delay_ms[-1] == pytest.approx(deep.delay_ms[-2], rel=0.02)
-    assert deep.range_share[-1] == pytest.approx(deep.range_share[-2], abs=0.02)
+    assert deep.range_share[-2:] == pytest.approx(1.0)
 
 
 def test_an_actuator_that_cannot_move_has_no_delay_and_no_range() -> None:

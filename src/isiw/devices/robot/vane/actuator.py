@@ -118,7 +118,7 @@ class Supply:
     Args:
         reservoir_bar: absolute pressure of the reservoir [bar].
         valve_l_s_bar: sonic conductance of the valve, C_0 [l/(s bar)]; by default that of a small five-port valve
-            [SMCSY].
+            [CKD2020].
         fitting_l_s_bar: sonic conductance of the fitting, C_f, with what the line's friction takes away [l/(s bar)].
         critical_ratio: pressure ratio below which either flow is choked, C_r; by default that of the same valve.
         line_m: length of a line [m].
@@ -130,9 +130,9 @@ class Supply:
     """
 
     reservoir_bar: float = 4.0
-    valve_l_s_bar: float = 1.1
+    valve_l_s_bar: float = 0.99
     fitting_l_s_bar: float = 0.75
-    critical_ratio: float = 0.28
+    critical_ratio: float = 0.2
     line_m: float = 7.5
     bore_mm: float = 6.0
 

@@ -29,7 +29,9 @@ class Performance:
     delay_ms: FloatArray
 
 
-def performance(vanes: Sequence[Vane], *, period_s: float = 1.0, periods: int = 3, step_ms: float = 0.1) -> Performance:
+def performance(
+    vanes: Sequence[Vane], *, period_s: float = 1.0, periods: int = 10, step_ms: float = 0.1
+) -> Performance:
     """Range and delay of actuators that are commanded to and fro.
 
     The text's "square wave excitation of 1 sec duration" is taken as one with a period of 1 s: a rotation there and
@@ -38,7 +40,8 @@ def performance(vanes: Sequence[Vane], *, period_s: float = 1.0, periods: int = 
     Args:
         vanes: the actuators, n of them.
         period_s: of the square wave [s].
-        periods: how many of them are run; the range is that of the last.
+        periods: how many of them are run, as in Fig. 7.11 by default; the range is that of the last, since sizes near
+            the limit take several to settle.
         step_ms: step of the solver [ms].
 
     Raises:
