@@ -13,7 +13,11 @@ from isiw.types import BoolArray, FloatArray
 FULL = 0.9999
 """A range that counts as full, as a share of 180°."""
 
-READING = "under reading C_0 = 0.99, C_f = 0.75 l/(s bar), C_r = 0.2, a bore of 6 mm, and a wave of 1 s there and back"
+_AIR = Vane().supply
+READING = (
+    f"under reading C_0 = {_AIR.valve_l_s_bar:g}, C_f = {_AIR.fitting_l_s_bar:g} l/(s bar), "
+    f"C_r = {_AIR.critical_ratio:g}, a bore of {_AIR.bore_mm:g} mm, and a wave of 1 s there and back"
+)
 RECOMMENDED_MM = (10.0, 12.5, 15.0, 17.5)
 
 Claim = dict[str, str]
@@ -98,7 +102,7 @@ def _of_the_model() -> Iterator[Claim]:
     yield _claim(
         "Table 7.1",
         "Friction, damping, inertia, weights and lengths of rotor and load.",
-        "17 values",
+        "15 values",
         "the same; the load is 5 N where no other is said",
         "C_0, C_f, C_r, the bore and the dead volume are not in the table",
         "reproduced",
