@@ -8,6 +8,8 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.devices.robot.tapper import Tapper, TapperSettings
+from isiw.devices.robot.vane.actuator import Vane
+from isiw.devices.robot.vane.strokes import draw_strokes
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session
@@ -19,10 +21,13 @@ from isiw.repeatability import (
     study_preset,
     study_session,
     study_sweeps,
+    study_vane,
     timing_report,
 )
 from isiw.session.loop import Session
 from isiw.signals import TapEvents
+from isiw.signals.impact import VALVE_MS
+from isiw.signals.rotation import RotationEvents
 from isiw.trials import Stimulus, Sweep
 from known import instance, known
 from scripted import scripted_strategy
@@ -154,7 +159,7 @@ def test_a_logged_session_is_studied_like_a_preset(tmp_path: Path) -> None:
     study = study_session(read_session(result.log))
     assert len(study.commanded_ms) == 12
     logged = [known(trial.t_hit_ms) for trial in result.trials]
-    np.testing.assert_allclose(study.events.hit_ms, logged, atol=0.01)
+    np.testing.assert_allclose(instance(TapEvents, study.events).hit_ms, logged, atol=0.01)
     apart = [known(trial.isi_ms) > 14 for trial in result.trials]  # sooner, the tap shows when the MEP does
     assert 0 < sum(apart) < 12
     assert study.event_table.loc["memg", "n"] == sum(apart)
@@ -212,3 +217,27 @@ def test_a_study_of_nothing_is_an_error() -> None:
 def test_an_invalid_seed_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="seed"):
         study_preset("subject1", taps=1, seed=-1)
+
+
+def test_rotations_begin_within_a_few_milliseconds_of_each_other_and_end_within_a_second() -> None:
+    study = study_vane(rotations=40, seed=3)
+    table = study.event_table
+    assert list(table.index) == ["fill", "motion", "end"]
+    assert (table["n"] == 40).all()
+    assert 500 + 22 < table["mean_ms"]["fill"] < table["mean_ms"]["motion"] < table["mean_ms"]["end"] < 1500
+    assert 1 < table["sd_ms"]["motion"] < 10
+    report = timing_report(study)
+    assert "vane: 40 rotations" in report
+    assert "hit_delay_ms" not in report
+    strokes = draw_strokes(Vane(), 40, np.random.default_rng(3))
+    assert isinstance(study.events, RotationEvents)
+    found_ms = study.events.motion_ms - VALVE_MS
+    turned = [np.interp(at, strokes.t_ms, angle) for at, angle in zip(found_ms, strokes.angle_rad, strict=True)]
+    assert (found_ms > strokes.delay_ms).all()
+    assert np.degrees(max(turned)) < 1.5  # what noise of 0.2° hides
+
+
+@pytest.mark.parametrize(("rotations", "seed", "said"), [(0, 0, "rotations"), (10**6, 0, "rotations"), (1, -1, "seed")])
+def test_a_study_of_rotations_that_cannot_be_is_refused(rotations: int, seed: int, said: str) -> None:
+    with pytest.raises(InvalidValueError, match=said):
+        study_vane(rotations=rotations, seed=seed)

@@ -35,6 +35,9 @@ from .devices.recorded import RecordedPerson as RecordedPerson
 from .devices.replay import RecordedTrials as RecordedTrials
 from .devices.robot.tapper import Tapper as Tapper
 from .devices.robot.tapper import TapperSettings as TapperSettings
+from .devices.robot.vane.actuator import Rotor as Rotor
+from .devices.robot.vane.actuator import Vane as Vane
+from .devices.robot.vane.tapper import RotatingTapper as RotatingTapper
 from .devices.simulated import SimulatedDevice as SimulatedDevice
 from .devices.simulated import SimulatedPerson as SimulatedPerson
 from .devices.transports.folder import FolderDevice as FolderDevice

@@ -25,6 +25,14 @@ def test_timing_of_a_preset_is_printed_and_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "timing.png").stat().st_size > 10_000
 
 
+def test_timing_of_the_vane_actuator_is_printed_and_drawn(tmp_path: Path) -> None:
+    result = run("vane", "--taps", 12, "--output", tmp_path / "vane.png")
+    assert result.exit_code == 0, result.output
+    assert "vane: 12 rotations" in result.output
+    assert "t_motion" in result.output
+    assert (tmp_path / "vane.png").stat().st_size > 10_000
+
+
 def test_the_same_seed_gives_the_same_study() -> None:
     assert run("cushion", "--taps", 5, "--seed", 3).output == run("cushion", "--taps", 5, "--seed", 3).output
     assert run("cushion", "--taps", 5, "--seed", 3).output != run("cushion", "--taps", 5, "--seed", 4).output

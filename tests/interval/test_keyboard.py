@@ -37,7 +37,7 @@ def test_each_trial_is_in_the_file_before_its_feedback_is_shown(log: Path, monke
     with somebody(monkeypatch, three_trials):
         record = run_task(log, session_blocks(1, [3], trials=3), subject="P07")
     assert record.left == ()
-    assert all(60 <= production.produced_ms < 2000 for production in record.productions)
+    assert all(0 < production.produced_ms < 2000 for production in record.productions)
 
 
 def test_who_leaves_goes_on_later_where_it_was_left(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:

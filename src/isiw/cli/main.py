@@ -15,6 +15,7 @@ from isiw.cli import interval, logs, prior, serve, study, threshold
 from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show, show_entry
 
 if TYPE_CHECKING:
+    from isiw.repeatability import TimingStudy
     from isiw.session.loop import Session
     from isiw.strategy.settings.described import DescribedSetting
 
@@ -251,22 +252,28 @@ def strategies(
 
 @app.command()
 def timing(
-    source: Annotated[str, typer.Argument(help="A preset of the tapping robot, or a session's log.", **NO_DEFAULT)],
-    taps: Annotated[int, typer.Option(help="Taps for each ISI, of a preset.")] = 100,
+    source: Annotated[
+        str, typer.Argument(help="A preset of the tapping robot, vane, or a session's log.", **NO_DEFAULT)
+    ],
+    taps: Annotated[int, typer.Option(help="Taps for each ISI of a preset; rotations of vane.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of a preset's taps.")] = 0,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
-    """Report how repeatable the taps are: events, ISI errors, mistrials."""
+    """Report how repeatable the taps are, or the rotations of the vane actuator: events, ISI errors, mistrials."""
     with errors_reported():
-        study = (
-            isiw.repeatability.study_session(isiw.read_session(source))
-            if _is_log(source)
-            else isiw.repeatability.study_preset(source, taps=taps, seed=seed)
-        )
+        study = _timing_study(source, taps, seed)
         show(isiw.repeatability.timing_report(study))
         if output is not None:
             show(f"picture: {isiw.plots.save_timing_plot(study, output, overwrite=overwrite)}")
+
+
+def _timing_study(source: str, taps: int, seed: int) -> TimingStudy:
+    if _is_log(source):
+        return isiw.repeatability.study_session(isiw.read_session(source))
+    if source == "vane":
+        return isiw.repeatability.study_vane(rotations=taps, seed=seed)
+    return isiw.repeatability.study_preset(source, taps=taps, seed=seed)
 
 
 def _heading(setting: DescribedSetting) -> str:

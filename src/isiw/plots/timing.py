@@ -18,13 +18,15 @@ if TYPE_CHECKING:
 
 __all__ = ["save_timing_plot", "timing_figure"]
 
-_COLOURS = {"fill": FAINT, "descent": GREEN, "hit": BLUE, "away": ORANGE, "memg": RED}
+_COLOURS = {"fill": FAINT, "descent": GREEN, "hit": BLUE, "away": ORANGE, "memg": RED, "motion": GREEN, "end": BLUE}
 _NAMES = {
     "fill": "chamber fills",
     "descent": "descent",
     "hit": "hit",
     "away": "rebound",
     "memg": "artefact in the EMG",
+    "motion": "rotation begins",
+    "end": "full range",
 }
 
 
@@ -64,8 +66,8 @@ def _draw_events(axes: Axes, study: TimingStudy) -> None:
             axes.hist(found, bins=bins, color=_COLOURS[name], alpha=0.8, label=label)
     axes.set_yscale("log")
     axes.set_xlabel("time after the valve command [ms]", fontsize=9)
-    axes.set_ylabel("taps per ms", fontsize=9)
-    title = plain(f"{study.name}: {len(study.commanded_ms)} taps")
+    axes.set_ylabel(f"{study.kind} per ms", fontsize=9)
+    title = plain(f"{study.name}: {len(study.commanded_ms)} {study.kind}")
     axes.set_title(title, fontsize=11, loc="left", color=INK, parse_math=False)
     axes.legend(fontsize=7.5, frameon=False, loc="upper left", bbox_to_anchor=(0.1, 1.0))
 

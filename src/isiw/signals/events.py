@@ -18,7 +18,7 @@ from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, is
 from isiw.trials import Channel, Sweep
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = ["TapEvents", "detect_events", "sweep_events", "tap_artefact_times"]
+__all__ = ["TapEvents", "detect_events", "first_rise", "sweep_events", "tap_artefact_times"]
 
 ONSET_SD = 3.0
 ARTEFACT_SEARCH_MS = (12.0, 30.0)  # four people: 18 to 23 ms after the impact, SD below 2 (Table 3.2)
@@ -78,7 +78,9 @@ def detect_events(
     nowhere = np.full(len(waves), math.nan)
     descent, away = _descent_and_away(waves, rate_hz, hit, valve_ms)
     return TapEvents(
-        fill_ms=nowhere if pressure is None else _fill(_like(pressure, waves, rate_hz, "pressure"), rate_hz, valve_ms),
+        fill_ms=nowhere
+        if pressure is None
+        else first_rise(_like(pressure, waves, rate_hz, "pressure"), rate_hz, valve_ms),
         descent_ms=descent,
         hit_ms=hit,
         away_ms=away,
@@ -127,6 +129,21 @@ def _same_samples(channel: Channel | None, other: Channel) -> FloatArray | None:
     return channel.values if channel.values.shape == other.values.shape and is_recording(channel.values) else None
 
 
+def first_rise(waves: FloatArray, rate_hz: float, valve_ms: float) -> FloatArray:
+    """When each waveform first rises above its noise after the valve command [ms], NaN where it does not, shape (n,).
+
+    Args:
+        waves: shape (n, w).
+        rate_hz: their sampling rate [Hz].
+        valve_ms: the valve command [ms from the first sample].
+    """
+    valve = round(valve_ms * rate_hz / 1000)
+    level, noise = rest_level(waves, valve, rate_hz)
+    risen = waves > level + HYSTERESIS_SD * noise
+    risen[:, :valve] = False
+    return crossing_before(waves, level + ONSET_SD * noise, first_true(risen)) * 1000 / rate_hz
+
+
 def _like(values: ArrayLike, waves: FloatArray, rate_hz: float, name: str) -> FloatArray:
     other = as_waveforms(values, rate_hz, name)
     if other.shape != waves.shape:
@@ -134,14 +151,6 @@ def _like(values: ArrayLike, waves: FloatArray, rate_hz: float, name: str) -> Fl
             f"the {name} and the acceleration must have one shape", got=other.shape, expected=str(waves.shape)
         )
     return other
-
-
-def _fill(pressure: FloatArray, rate_hz: float, valve_ms: float) -> FloatArray:
-    valve = round(valve_ms * rate_hz / 1000)
-    level, noise = rest_level(pressure, valve, rate_hz)
-    risen = pressure > level + HYSTERESIS_SD * noise
-    risen[:, :valve] = False
-    return crossing_before(pressure, level + ONSET_SD * noise, first_true(risen)) * 1000 / rate_hz
 
 
 def _descent_and_away(

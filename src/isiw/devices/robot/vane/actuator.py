@@ -1,0 +1,174 @@
+"""What a vane actuator is made of: the rotor and its chambers, what it carries, and the air that drives it.
+
+    reservoir ── valve ── line (7.5 m) ── fitting ──▶ chamber 1 │vane│ chamber 2 ──▶ fitting ── line ── valve ── room
+
+Values that the dissertation gives are those of its Table 7.1. It gives neither the conductances of valve and fitting,
+nor the critical ratio, the bore of the line, or the air that is left in a chamber when the vane is at its stop; what
+was chosen for them, and what they change, is in `docs/vane.md`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from isiw.checks import check_numbers
+from isiw.errors import InvalidValueError
+
+__all__ = ["ATMOSPHERE_BAR", "SOUND_M_S", "Load", "Rotor", "Supply", "Vane"]
+
+ATMOSPHERE_BAR = 1.0
+"""Pressure of the room, in which both chambers begin (Table 7.1), and the one that ISO 6358 refers flows to [bar]."""
+
+SOUND_M_S = 343.0  # in air of 293 K
+GRAVITY_M_S2 = 9.81
+PA_PER_BAR = 1e5
+
+
+@dataclass(frozen=True)
+class Rotor:
+    """The vane and its two chambers.
+
+    Args:
+        height_mm: from the shaft's surface to the vane's edge, h [mm].
+        depth_mm: along the shaft, d [mm].
+        radius_mm: of the shaft, r [mm].
+        friction_nm: moment that it takes to break away, and to keep moving against friction, M_f [N m].
+        damping_nm_s: moment by speed, B, which stands for air that leaks past the vane [N m s/rad].
+        leak_l_min: air that a chamber at the reservoir's pressure loses [l/min of free air].
+        dead_ml: air that is left in a chamber when the vane is at its stop [ml].
+
+    Raises:
+        InvalidValueError: a size that is not positive, or a negative friction, damping or leak.
+    """
+
+    height_mm: float
+    depth_mm: float
+    radius_mm: float = 12.5
+    friction_nm: float = 2.7
+    damping_nm_s: float = 0.3
+    leak_l_min: float = 0.5
+    dead_ml: float = 2.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "height_mm", "depth_mm", "radius_mm", "dead_ml", above=0)
+        check_numbers(self, "friction_nm", "damping_nm_s", "leak_l_min", least=0)
+
+    @property
+    def lever_m3(self) -> float:
+        """Moment by pressure difference, which is also the volume that a turn of 1 rad sweeps [m³].
+
+        It is h d (h/2 + r): pressure acts at the middle of the vane's height. Equation 7.8 prints d/2 for h/2, by which
+        a turn would do more work than the air that it takes in; and a friction of 2.7 N m, derived in the text from a
+        break-away pressure of 0.4 bar, is that of a vane with h = 20 mm and d = 150 mm with h/2, to the last digit.
+        """
+        return self.height_mm * self.depth_mm * (self.height_mm / 2 + self.radius_mm) * 1e-9
+
+    @property
+    def break_away_bar(self) -> float:
+        """Pressure difference at which the vane begins to move where nothing else turns it [bar]."""
+        return self.friction_nm / (self.lever_m3 * PA_PER_BAR)
+
+
+@dataclass(frozen=True)
+class Load:
+    """What the rotor turns. The text has the forearm as a cylinder of 0.9 kg and 40 mm that turns about its own axis.
+
+    Args:
+        payload_n: weight of the added load, G_load [N].
+        arm_n: weight of the forearm that hangs off the axis, G_arm [N].
+        shaft_n: weight of the shaft that holds the arm, G_shaft [N].
+        arm_mm: from the axis to the centre of forearm and load, l [mm].
+        shaft_mm: from the axis to the centre of the shaft, l_eq [mm].
+        arm_kg_m2: inertia of the forearm, I_arm [kg m²].
+        shaft_kg_m2: inertia of the shaft, I_shaft [kg m²].
+
+    Raises:
+        InvalidValueError: a negative weight or length, or an inertia that is not positive.
+    """
+
+    payload_n: float = 5.0
+    arm_n: float = 5.0
+    shaft_n: float = 2.0
+    arm_mm: float = 60.0
+    shaft_mm: float = 25.0
+    arm_kg_m2: float = 7.2e-4
+    shaft_kg_m2: float = 3.3e-4
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "payload_n", "arm_n", "shaft_n", "arm_mm", "shaft_mm", least=0)
+        check_numbers(self, "arm_kg_m2", "shaft_kg_m2", above=0)
+
+    @property
+    def inertia_kg_m2(self) -> float:
+        """Of everything that turns; the added load is a point [kg m²]."""
+        added = self.payload_n / GRAVITY_M_S2 * (self.arm_mm / 1000) ** 2
+        return self.arm_kg_m2 + self.shaft_kg_m2 + added
+
+    @property
+    def moment_nm(self) -> float:
+        """Moment of the weights with the arm level; it is this times sin(θ − π/2) (7.9) [N m]."""
+        return ((self.arm_n + self.payload_n) * self.arm_mm + self.shaft_n * self.shaft_mm) / 1000
+
+
+@dataclass(frozen=True)
+class Supply:
+    """The air: a reservoir, a valve with two outlets, and from each a line to one of the chambers.
+
+    Args:
+        reservoir_bar: absolute pressure of the reservoir [bar].
+        valve_l_s_bar: sonic conductance of the valve, C_0 [l/(s bar)]; by default that of a small five-port valve
+            [CKD2020].
+        fitting_l_s_bar: sonic conductance of the fitting, C_f, with what the line's friction takes away [l/(s bar)].
+        critical_ratio: pressure ratio below which either flow is choked, C_r; by default that of the same valve.
+        line_m: length of a line [m].
+        bore_mm: its inner diameter [mm].
+
+    Raises:
+        InvalidValueError: a reservoir at or below the room's pressure, a ratio outside 0 to 1, or a value that is not
+            positive.
+    """
+
+    reservoir_bar: float = 4.0
+    valve_l_s_bar: float = 0.99
+    fitting_l_s_bar: float = 0.75
+    critical_ratio: float = 0.2
+    line_m: float = 7.5
+    bore_mm: float = 6.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "valve_l_s_bar", "fitting_l_s_bar", "line_m", "bore_mm", above=0)
+        check_numbers(self, "critical_ratio", least=0, below=1)
+        check_numbers(self, "reservoir_bar")
+        if self.reservoir_bar <= ATMOSPHERE_BAR:
+            raise InvalidValueError(
+                "a reservoir at the room's pressure drives nothing",
+                got=self.reservoir_bar,
+                expected=f"more than {ATMOSPHERE_BAR:g} bar",
+                remedy="Pressures are absolute: add 1 bar to what a gauge shows.",
+            )
+
+    @property
+    def line_m3(self) -> float:
+        """Volume of a line [m³]."""
+        return math.pi / 4 * (self.bore_mm / 1000) ** 2 * self.line_m
+
+    @property
+    def delay_ms(self) -> float:
+        """What a line delays the valve's flow by, L/c (7.6) [ms]."""
+        return 1000 * self.line_m / SOUND_M_S
+
+
+@dataclass(frozen=True)
+class Vane:
+    """A vane actuator with what it carries and what drives it.
+
+    Args:
+        rotor: the vane and its chambers.
+        load: what it turns.
+        supply: the air that drives it.
+    """
+
+    rotor: Rotor = field(default_factory=lambda: Rotor(height_mm=15.0, depth_mm=150.0))
+    load: Load = field(default_factory=Load)
+    supply: Supply = field(default_factory=Supply)

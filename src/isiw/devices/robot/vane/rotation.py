@@ -1,0 +1,261 @@
+"""The equations of the vane actuator, solved for many actuators at once [Kim2020, 7.1–7.9].
+
+The air in a volume is counted as P V = m R T [J]; at one temperature everywhere that is a mass. A step of the solver:
+
+1. The valve's flow at this moment is put into a line of flows that are under way; what was put in L/c ago arrives.
+   The step is far shorter than that delay, so no equation has to be solved for it.
+2. The flow through the fitting is implicit: its conductance is that of the moment, its pressures are those after the
+   step. However small a chamber, the pressures on both sides meet and do not overshoot, and no air is lost.
+3. Speed under damping and dry friction is implicit too: a moment below the friction stops the vane within the step, and
+   a vane at rest stays there until the moment exceeds the friction. Stops end the motion.
+
+The text's equations were judged as follows. (7.2) prints the inequality the wrong way round: a flow is choked where the
+downstream pressure is *less* than C_r of the upstream one. (7.7) lacks R T, which (7.5) has. (7.3) lets no air flow
+back from the line into the reservoir; here it may, where the line's pressure is higher. (7.8) is judged at
+`Rotor.lever_m3`. The leak is proportional to what a chamber has above the room's pressure, so that none flows at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from isiw.checks import number
+from isiw.devices.robot.vane.actuator import ATMOSPHERE_BAR, PA_PER_BAR, Vane
+from isiw.errors import InvalidValueError
+from isiw.types import ArrayLike, FloatArray, IntArray
+
+__all__ = ["Rotations", "orifice_flow", "rotate"]
+
+ROOM_PA = ATMOSPHERE_BAR * PA_PER_BAR
+LITRE_PER_S_BAR = 1e-3  # a flow of 1 l/s of free air in J/s of P V, for each Pa: 1e-3 m³ · 1e5 Pa / 1e5 Pa
+LONGEST_STEP_MS = 1.0
+LONGEST_S = 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class Rotations:
+    """What n actuators did.
+
+    Args:
+        t_ms: times of the samples after the first command [ms], shape (w,).
+        angle_rad: θ, from 0 to π [rad], shape (n, w).
+        chamber_bar: pressures of the two chambers [bar], shape (n, 2, w).
+        line_bar: pressures of the two lines at the fitting [bar], shape (n, 2, w).
+        valve_l_s: what flows through the valve into each line [l/s of free air], shape (n, 2, w).
+        delay_ms: the break-away delay: from the first command to the first motion [ms], NaN without one, shape (n,).
+    """
+
+    t_ms: FloatArray
+    angle_rad: FloatArray
+    chamber_bar: FloatArray
+    line_bar: FloatArray
+    valve_l_s: FloatArray
+    delay_ms: FloatArray
+
+    def one(self, index: int) -> Rotations:
+        """One of them, as the only one."""
+        row = slice(index, index + 1)
+        return Rotations(
+            self.t_ms,
+            self.angle_rad[row],
+            self.chamber_bar[row],
+            self.line_bar[row],
+            self.valve_l_s[row],
+            self.delay_ms[row],
+        )
+
+
+def orifice_flow(conductance: ArrayLike, critical_ratio: ArrayLike, from_pa: ArrayLike, to_pa: ArrayLike) -> FloatArray:
+    """Flow from one side of an orifice to the other by ISO 6358 (7.1, 7.2), as P V in unit time [J/s].
+
+    Args:
+        conductance: sonic conductance [l/(s bar)].
+        critical_ratio: of the pressures, below which the flow is choked.
+        from_pa: pressure on one side [Pa].
+        to_pa: pressure on the other [Pa].
+    """
+    one, other = np.asarray(from_pa, dtype=np.float64), np.asarray(to_pa, dtype=np.float64)
+    high, low = np.maximum(one, other), np.minimum(one, other)
+    ratio = np.asarray(critical_ratio, dtype=np.float64)
+    excess = np.maximum((low / high - ratio) / (1 - ratio), 0.0)
+    flow: FloatArray = LITRE_PER_S_BAR * np.asarray(conductance) * np.sign(one - other) * high * np.sqrt(1 - excess**2)
+    return flow
+
+
+def rotate(
+    vanes: Sequence[Vane],
+    *,
+    duration_s: float = 1.0,
+    half_wave_s: float = 0.5,
+    start_rad: float = math.pi / 2,
+    step_ms: float = 0.1,
+    sample_ms: float = 1.0,
+) -> Rotations:
+    """Command actuators by a square wave: chamber 1 is filled and chamber 2 emptied, then the other way round.
+
+    All chambers and lines begin at the room's pressure, all vanes at rest.
+
+    Args:
+        vanes: the actuators, n of them.
+        duration_s: for how long they are followed [s].
+        half_wave_s: half a period of the square wave [s].
+        start_rad: where the vanes begin, from 0 to π [rad].
+        step_ms: step of the solver [ms].
+        sample_ms: time between the samples that are kept, a multiple of the step [ms].
+
+    Raises:
+        InvalidValueError: no actuator, a start outside the range, or a time that is not positive or too long.
+    """
+    duration_s = number("duration_s", duration_s, above=0, most=LONGEST_S)
+    half_wave_s = number("half_wave_s", half_wave_s, above=0)
+    start_rad = number("start_rad", start_rad, least=0, most=math.pi)
+    step_s = number("step_ms", step_ms, above=0, most=LONGEST_STEP_MS) / 1000
+    every = round(number("sample_ms", sample_ms, least=step_ms) / step_ms)
+    parts = _parts(vanes, step_s)
+    state = _at_rest(parts, start_rad)
+    under_way = np.zeros((int(parts.delay_steps.max()) + 1, *state.line_j.shape))
+    delay_s, kept = np.full(len(vanes), math.nan), []
+    for step in range(round(duration_s / step_s)):
+        filled = int(step * step_s / half_wave_s + 1e-9) % 2
+        valve = _valve_flow(parts, state, filled)
+        under_way[step % len(under_way)] = valve
+        arriving = under_way[(step - parts.delay_steps) % len(under_way), :, parts.columns].T
+        if step % every == 0:
+            kept.append((step, state, valve))
+        state = _advanced(parts, state, arriving, step_s)
+        delay_s = np.where(np.isnan(delay_s) & (state.speed_rad_s != 0), (step + 1) * step_s, delay_s)
+    return _rotations(parts, kept, step_ms, 1000 * delay_s)
+
+
+class _Parts(NamedTuple):
+    """The constants of n actuators as arrays of shape (n,), in SI units but for the conductances."""
+
+    lever_m3: FloatArray
+    dead_m3: FloatArray
+    friction_nm: FloatArray
+    damping_nm_s: FloatArray
+    leak_m3_s: FloatArray
+    inertia_kg_m2: FloatArray
+    weight_nm: FloatArray
+    reservoir_pa: FloatArray
+    valve: FloatArray
+    fitting: FloatArray
+    critical_ratio: FloatArray
+    line_m3: FloatArray
+    delay_steps: IntArray
+    columns: IntArray
+
+
+class _State(NamedTuple):
+    """Air in the lines and chambers [J], shape (2, n), volumes of the chambers, and the vanes' motion, shape (n,)."""
+
+    line_j: FloatArray
+    chamber_j: FloatArray
+    chamber_m3: FloatArray
+    angle_rad: FloatArray
+    speed_rad_s: FloatArray
+
+
+def _parts(vanes: Sequence[Vane], step_s: float) -> _Parts:
+    if not vanes:
+        raise InvalidValueError("there is no actuator to rotate", got=0, expected="at least one Vane")
+
+    def of_each(values: list[float]) -> FloatArray:
+        return np.array(values, dtype=np.float64)
+
+    rotors, loads, supplies = zip(*((vane.rotor, vane.load, vane.supply) for vane in vanes), strict=True)
+    reservoir_pa = PA_PER_BAR * of_each([supply.reservoir_bar for supply in supplies])
+    leak_w = LITRE_PER_S_BAR * PA_PER_BAR / 60 * of_each([rotor.leak_l_min for rotor in rotors])
+    return _Parts(
+        lever_m3=of_each([rotor.lever_m3 for rotor in rotors]),
+        dead_m3=1e-6 * of_each([rotor.dead_ml for rotor in rotors]),
+        friction_nm=of_each([rotor.friction_nm for rotor in rotors]),
+        damping_nm_s=of_each([rotor.damping_nm_s for rotor in rotors]),
+        leak_m3_s=leak_w / (reservoir_pa - ROOM_PA),
+        inertia_kg_m2=of_each([load.inertia_kg_m2 for load in loads]),
+        weight_nm=of_each([load.moment_nm for load in loads]),
+        reservoir_pa=reservoir_pa,
+        valve=of_each([supply.valve_l_s_bar for supply in supplies]),
+        fitting=of_each([supply.fitting_l_s_bar for supply in supplies]),
+        critical_ratio=of_each([supply.critical_ratio for supply in supplies]),
+        line_m3=of_each([supply.line_m3 for supply in supplies]),
+        delay_steps=np.rint([supply.delay_ms / 1000 / step_s for supply in supplies]).astype(np.int64),
+        columns=np.arange(len(vanes)),
+    )
+
+
+def _at_rest(parts: _Parts, start_rad: float) -> _State:
+    angle = np.full(len(parts.columns), start_rad)
+    volumes = _chamber_m3(parts, angle)
+    return _State(
+        line_j=ROOM_PA * np.stack([parts.line_m3, parts.line_m3]),
+        chamber_j=ROOM_PA * volumes,
+        chamber_m3=volumes,
+        angle_rad=angle,
+        speed_rad_s=np.zeros_like(angle),
+    )
+
+
+def _chamber_m3(parts: _Parts, angle_rad: FloatArray) -> FloatArray:
+    return parts.dead_m3 + parts.lever_m3 * np.stack([angle_rad, math.pi - angle_rad])
+
+
+def _valve_flow(parts: _Parts, state: _State, filled: int) -> FloatArray:
+    """What flows through the valve into each line [J/s], shape (2, n) (7.3)."""
+    outside_pa = np.full_like(state.line_j, ROOM_PA)
+    outside_pa[filled] = parts.reservoir_pa
+    return orifice_flow(parts.valve, parts.critical_ratio, outside_pa, state.line_j / parts.line_m3)
+
+
+def _advanced(parts: _Parts, state: _State, arriving: FloatArray, step_s: float) -> _State:
+    """The state a step later, with what arrives through the lines [J/s], shape (2, n)."""
+    through = _fitting_flow(parts, state, step_s)
+    leak = parts.leak_m3_s * (state.chamber_j / state.chamber_m3 - ROOM_PA)
+    line_j = state.line_j + step_s * (arriving - through)
+    chamber_j = state.chamber_j + step_s * (through - leak)
+    one_pa, other_pa = chamber_j / state.chamber_m3
+    angle, speed = _turned(parts, state, (one_pa - other_pa) * parts.lever_m3, step_s)
+    return _State(line_j, chamber_j, _chamber_m3(parts, angle), angle, speed)
+
+
+def _fitting_flow(parts: _Parts, state: _State, step_s: float) -> FloatArray:
+    """What flows from each line into its chamber within a step [J/s], shape (2, n) (7.4)."""
+    line_pa, chamber_pa = state.line_j / parts.line_m3, state.chamber_j / state.chamber_m3
+    flow = orifice_flow(parts.fitting, parts.critical_ratio, line_pa, chamber_pa)
+    difference = line_pa - chamber_pa
+    conductance = np.divide(flow, difference, out=np.zeros_like(flow), where=difference != 0)
+    implicit: FloatArray = flow / (1 + step_s * conductance * (1 / parts.line_m3 + 1 / state.chamber_m3))
+    return implicit
+
+
+def _turned(parts: _Parts, state: _State, moment_nm: FloatArray, step_s: float) -> tuple[FloatArray, FloatArray]:
+    """Angle and speed a step later, by a moment of the air (7.8, 7.9)."""
+    weight_nm = parts.weight_nm * np.sin(state.angle_rad - math.pi / 2)
+    push = parts.inertia_kg_m2 * state.speed_rad_s + step_s * (moment_nm - weight_nm)
+    left = np.maximum(np.abs(push) - step_s * parts.friction_nm, 0.0)
+    speed = np.sign(push) * left / (parts.inertia_kg_m2 + step_s * parts.damping_nm_s)
+    free = state.angle_rad + step_s * speed
+    angle = np.clip(free, 0.0, math.pi)
+    return angle, np.where(angle == free, speed, 0.0)
+
+
+def _rotations(
+    parts: _Parts, kept: list[tuple[int, _State, FloatArray]], step_ms: float, delay_ms: FloatArray
+) -> Rotations:
+    def over_time(samples: list[FloatArray]) -> FloatArray:
+        return np.moveaxis(np.stack(samples, axis=-1), -2, 0)
+
+    lines_pa = [state.line_j / parts.line_m3 for _, state, _ in kept]
+    return Rotations(
+        t_ms=step_ms * np.array([step for step, *_ in kept], dtype=np.float64),
+        angle_rad=over_time([state.angle_rad for _, state, _ in kept]),
+        chamber_bar=over_time([state.chamber_j / state.chamber_m3 for _, state, _ in kept]) / PA_PER_BAR,
+        line_bar=over_time(lines_pa) / PA_PER_BAR,
+        valve_l_s=over_time([valve for *_, valve in kept]) / (LITRE_PER_S_BAR * PA_PER_BAR),
+        delay_ms=delay_ms,
+    )
