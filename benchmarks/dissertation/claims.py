@@ -18,8 +18,8 @@ from isiw.errors import InvalidValueError
 __all__ = ["REPRODUCED", "Claim", "claims_as_json", "places", "read_claims"]
 
 REPRODUCED: Final = "reproduced"
-UNDER: Final = "under reading "
-NOT: Final = "not, because "
+UNDER: Final = "under reading"
+NOT: Final = "not, because"
 
 _PLACE = re.compile(
     r"\b(?P<kind>Table|Tables|Fig\.|Figs\.|Figure|Figures)\s+"
@@ -55,12 +55,12 @@ class Claim:
         for name, value in asdict(self).items():
             if not isinstance(value, str) or not value.strip():
                 raise InvalidValueError(f"a claim's {name} must be a text that is not empty", got=value)
-        unfinished = self.verdict.strip() in {UNDER.strip(), NOT.strip()}
+        unfinished = self.verdict.strip(" :") in {UNDER, NOT}
         if unfinished or not (self.verdict == REPRODUCED or self.verdict.startswith((UNDER, NOT))):
             raise InvalidValueError(
                 f"the verdict on {self.where} says nothing known",
                 got=self.verdict,
-                expected=f"{REPRODUCED!r}, '{UNDER}…' or '{NOT}…'",
+                expected=f"{REPRODUCED!r}, '{UNDER} …' or '{NOT} …'",
                 remedy="Say under which reading it comes out, or why it does not.",
             )
 
@@ -94,7 +94,7 @@ def claims_as_json(claims: Iterable[Claim]) -> list[dict[str, str]]:
 
 
 def places(where: str) -> list[str]:
-    """The tables and figures that a claim names, as "Table 6.2" and "Fig. 4.31"; none where it names a section only.
+    """The tables and figures that a claim names, as "Table 6.2" and "Fig. 4.31"; none where it names sections only.
 
     Args:
         where: as in a claim; ranges such as "Fig. 4.31–4.33" are written out.
