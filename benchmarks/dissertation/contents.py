@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-__all__ = ["CHAPTERS", "Chapter", "Item", "items"]
+__all__ = ["CHAPTERS", "Chapter", "Item"]
 
 PHOTOGRAPH, DRAWING, MODEL = "a photograph", "a drawing", "a drawing of the hardware"
 DESCRIBED: Final = "a description, which is what the library does"
@@ -177,9 +176,3 @@ CHAPTERS: Final = (
     Chapter("B", "The same person another day", (Item("Fig. B.1", "The window sixteen days apart"),)),
 )
 """The dissertation's own titles are longer; these say what is to be seen."""
-
-
-def items() -> Iterator[Item]:
-    """All tables and figures."""
-    for chapter in CHAPTERS:
-        yield from chapter.items

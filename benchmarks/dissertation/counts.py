@@ -19,6 +19,7 @@ from isiw.devices.robot.mechanism import Geometry
 from isiw.devices.robot.presets import preset
 from isiw.response_counts import EFFECTIVE_SHARE, STIMULATION, CountStudy, study_counts
 from isiw.subjects import WIDTHS_KIM_MS, SimulatedSubject, cohort
+from isiw.types import FloatArray
 
 __all__ = ["tell"]
 
@@ -32,6 +33,7 @@ ARTEFACT_MS: Final = 8.0
 """How long the tap shows in the EMG; it is left out, as everywhere."""
 
 FIXED_MV: Final = 0.03
+EXAMPLE_MV: Final = (0.0, 0.08)
 ISI_MS: Final = np.arange(0.0, 140.0, 5.0)
 SWEPT_MS: Final = np.arange(0.0, 320.0, 5.0)
 WIDTHS_MS: Final = {"electrical": 20.0, "mechanical": 50.0}
@@ -57,7 +59,14 @@ def tell(size: Size, seed: int) -> Told:
     kinds = {kind: _sweeps(kind, size.sweeps, seed) for kind in STIMULATION}
     fixed, own, higher = (_people(seed, rule) for rule in ("text", "own", "higher"))
     claims = [claim for kind, studies in kinds.items() for claim in _kind_claims(kind, studies, seed)]
-    claims += [_wider(kinds), _alone(fixed, own), _taps_alone(own, seed), _sensitive(fixed, higher), _against(fixed)]
+    claims += [
+        _counted(seed),
+        _wider(kinds),
+        _alone(fixed, own),
+        _taps_alone(own, seed),
+        _sensitive(fixed, higher),
+        _against(fixed),
+    ]
     pictures = {
         "Fig. 3.11": _example(seed),
         "Fig. 3.12": _bars({kind: studies[0] for kind, studies in kinds.items()}),
@@ -203,19 +212,38 @@ def _against(fixed: list[CountStudy]) -> Claim:
         verdict(
             holds=bool(np.abs(off).mean() <= 10),
             otherwise="not, because 40 % of responses ask for more than a mean above the baseline, a run of ISIs "
-            "breaks where chance leaves few of twelve, and in this cohort Table 4.1's widths are those of the facilitation",
+            "breaks where chance leaves few of twelve, and Table 4.1's widths are those of the facilitation here",
         ),
     )
+
+
+def _counted(seed: int) -> Claim:
+    """Fig. 3.11: what is counted as a response."""
+    silent, evoked = (isiw.signals.mep_amplitude(*_emg(mep_mv, seed)) for mep_mv in EXAMPLE_MV)
+    return Claim(
+        "Fig. 3.11, 3.3.4",
+        "A response is counted where the MEP is larger than the person's threshold (subject 3: 30 µV).",
+        "drawn, one sweep",
+        f"{1000 * silent:.0f} µV is not counted, {1000 * evoked:.0f} µV is (simulated with none and with "
+        f"{1000 * EXAMPLE_MV[1]:.0f} µV)",
+        "no number to compare with",
+        verdict(holds=silent < THRESHOLDS_MV[2] < evoked, otherwise="not, because the threshold does not part the two"),
+    )
+
+
+def _emg(mep_mv: float, seed: int) -> tuple[FloatArray, float, float]:
+    """EMG of one sweep, its rate, and when the pulse came."""
+    sweep = isiw.Tapper(lambda _: _Evoked(mep_mv), "subject3", seed=seed).answer(isiw.Stimulus(0, 60.0))
+    emg = sweep.channels["emg"]
+    return emg.values, emg.rate_hz, sweep.t_tms_ms
 
 
 def _example(seed: int) -> Figure:
     """One sweep with a response, and one without."""
     picture, axes = panels(1, 2, width=4.0, height=2.4, sharey=True)
-    for one, evoked_mv in zip(axes[0], (0.0, 0.08), strict=True):
-        robot = isiw.Tapper(lambda _, mv=evoked_mv: _Evoked(mv), "subject3", seed=seed)
-        sweep = robot.answer(isiw.Stimulus(0, 60.0))
-        emg = sweep.channels["emg"]
-        one.plot(np.arange(len(emg.values)) / emg.rate_hz * 1000 - sweep.t_tms_ms, emg.values, lw=0.7, color=OURS)
+    for one, mep_mv in zip(axes[0], EXAMPLE_MV, strict=True):
+        emg_mv, rate_hz, pulse_ms = _emg(mep_mv, seed)
+        one.plot(np.arange(len(emg_mv)) / rate_hz * 1000 - pulse_ms, emg_mv, lw=0.7, color=OURS)
         one.axvspan(15, 35, color=THEIRS, alpha=0.4)
         one.set(xlim=(-80, 80), ylim=(-0.2, 0.2), xlabel="ms after the pulse (simulated)", ylabel="EMG [mV]")
     return picture

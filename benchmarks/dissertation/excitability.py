@@ -73,7 +73,7 @@ def _examined(method: str, change: str, subject: SimulatedSubject, number: int, 
 
 
 def _claim(method: str, rows: pd.DataFrame) -> Claim:
-    by = rows.pivot(index="person", columns="change", values=["f1", "start_ms", "end_ms", "trials"])
+    by = rows.pivot_table(index="person", columns="change", values=["f1", "start_ms", "end_ms", "trials"], dropna=False)
     f1, people = by["f1"], rows["person"].nunique()
     worse = {change: f1[change] - f1["none"] for change in ("grows", "shrinks")}
     misses = [change for change, off in worse.items() if off.mean() < -2 * off.sem()]

@@ -13,7 +13,7 @@ from typing import Any, Final
 from jinja2 import Environment, FileSystemLoader, select_autoescape
 
 from benchmarks.dissertation.claims import REPRODUCED, UNDER, Claim, places, read_claims
-from benchmarks.dissertation.contents import CHAPTERS, Chapter, Item, items
+from benchmarks.dissertation.contents import CHAPTERS, Chapter, Item
 
 __all__ = ["OTHERS", "Source", "read_sources", "write_page"]
 
@@ -108,8 +108,9 @@ def write_page(folder: Path, sources: Sequence[Source], missing: Sequence[str]) 
         for chapter in CHAPTERS
     ]
     counts = Counter(_kind(claim) for source in sources for claim in source.claims)
-    counts["without counterpart"] = sum(item.without is not None for item in items())
-    counts["not yet"] = sum(entry.line.startswith("Not yet") for _, entries, _ in chapters for entry in entries)
+    lines = [entry.line for _, entries, _ in chapters for entry in entries]
+    counts["without counterpart"] = sum(line.startswith("No counterpart") for line in lines)
+    counts["not yet"] = sum(line.startswith("Not yet") for line in lines)
     told = {"chapters": chapters, "counts": counts, "sources": sources, "missing": missing}
     for suffix, name in (("md", "README.md"), ("html", "index.html")):
         (folder / name).write_text(_templates().get_template(f"gallery.{suffix}.jinja").render(told))
@@ -144,7 +145,7 @@ def _entry(item: Item, chapter: Chapter, sources: Sequence[Source], missing: Seq
     ]
     notes = list(dict.fromkeys(_origin(source, folder) for source, _ in here))
     line = ""
-    if item.without is not None:
+    if item.without is not None and not here:
         line = f"No counterpart: {item.without}."
     elif not here and elsewhere:
         line = f"See {' and '.join(elsewhere)}."
