@@ -15,7 +15,7 @@ from isiw.subjects import SimulatedSubject
 from isiw.types import FloatArray
 from isiw.window import Window
 
-__all__ = ["INITIAL", "SPACE", "Course", "live", "online"]
+__all__ = ["GENERATION", "INITIAL", "SPACE", "Course", "live", "online"]
 
 SPACE: Final = DesignSpace(0, 500, 5.0, reference="valve")
 INITIAL: Final = 7

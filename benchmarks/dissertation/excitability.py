@@ -21,6 +21,7 @@ from benchmarks.dissertation.parts import Told
 from benchmarks.dissertation.size import Size
 from benchmarks.reduction.look import COLOURS, NAMES, panels
 from isiw.design import IMPACT_SPACE
+from isiw.signals import wrong_isi
 from isiw.subjects import Plasticity, SimulatedSubject, cohort
 
 __all__ = ["tell"]
@@ -58,12 +59,13 @@ def _examined(method: str, change: str, subject: SimulatedSubject, number: int, 
     strategy = isiw.make_strategy(method, IMPACT_SPACE, seed + number)
     trials = 0
     while not strategy.decision().stop:
-        response = responder.respond(strategy.ask(), "impact")
+        asked_ms = strategy.ask()
+        response = responder.respond(asked_ms, "impact")
         trials += 1
-        if response.isi_ms is None or response.isi_ms < 0:
-            strategy.count_mistrial()
-        else:
+        if wrong_isi(response.isi_ms, asked_ms, IMPACT_SPACE) is None:
             strategy.tell(response.isi_ms, response.mep_mv)
+        else:
+            strategy.count_mistrial()
     window, truth = strategy.estimate().window, subject.window(IMPACT_SPACE)
     edges = {"start_ms": np.nan, "end_ms": np.nan}
     if window is not None:

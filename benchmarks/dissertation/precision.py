@@ -155,8 +155,8 @@ def _jitter(jittered: TimingStudy, followed: TimingStudy) -> list[Claim]:
             f"one such set of nine makes the pooled SD at least {alone_ms:.2f} ms",
             verdict(
                 holds=jittered.pooled_sd_ms <= POOLED_MS * np.sqrt(len(STUDY_ISI_MS)),
-                otherwise="not, because jitter of the pulse that is independent of the hammer is an ISI error of the same "
-                "size",
+                otherwise="not, because jitter of the pulse that is independent of the hammer is an ISI error "
+                "of the same size",
             ),
         ),
         Claim(
