@@ -48,7 +48,7 @@ def test_a_person_has_the_threshold_that_few_of_their_own_trials_of_tms_alone_ex
     assert (alone_mv >= threshold_mv).mean() > 0.05
     study = study_counts(STIMULATION["mechanical"], [60.0], threshold_mv=None, alone=200, seed=1)
     assert 0.03 <= study.alone_share <= 0.05
-    assert study.counts.loc[60.0, "share"] > study.alone_share
+    assert study.counts["share"].loc[60.0] > study.alone_share
 
 
 @pytest.mark.parametrize("alone_mv", [[], [np.nan], [-0.1], [[0.1]]])

@@ -91,8 +91,7 @@ class TimingStudy:
     def pulse_table(self) -> pd.DataFrame:
         """How the pulse varies against the valve command, by commanded ISI (Fig. 5.9): columns n and sd_ms."""
         pulses = pd.DataFrame({"isi_ms": self.commanded_ms, "pulse_ms": self.realised_ms + self.events.hit_ms})
-        groups = pulses.dropna().groupby("isi_ms")["pulse_ms"]
-        return groups.agg(n="count", sd_ms="std")
+        return pulses.dropna().groupby("isi_ms").agg(n=("pulse_ms", "count"), sd_ms=("pulse_ms", "std"))
 
     @property
     def error_probabilities(self) -> pd.DataFrame:

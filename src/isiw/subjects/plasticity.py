@@ -1,8 +1,8 @@
 """Excitability that paired pulses change: what is measured changes who is measured [Kim2020, 4.5, 5.4.1].
 
-The text saw its profiles change with every pair that was delivered within the window, and gives no size. Here a person's
-gain moves towards a limit with the dose: every pair counts by its facilitation, TMS alone and pairs outside the window
-by nothing. Within a session nothing of it is lost.
+The text saw its profiles change with every pair that was delivered within the window, and gives no size. Here a
+person's gain moves towards a limit with the dose: every pair counts by its facilitation, TMS alone and pairs outside
+the window by nothing. Within a session nothing of it is lost.
 """
 
 from __future__ import annotations

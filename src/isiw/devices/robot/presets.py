@@ -39,7 +39,7 @@ PRESETS: Mapping[str, Geometry] = MappingProxyType(
         ),
     }
 )
-"""The robot on a load cell, on nine people, and on the cushion of the precision study [Kim2020, Table 3.2, Fig. 4.9]."""
+"""The robot on a load cell, on nine people [Kim2020, Table 3.2, Fig. 4.9], and on the precision study's cushion."""
 
 
 def preset(name: str) -> Geometry:

@@ -211,7 +211,7 @@ class Tapper:
         )
 
     def _jitter_ms(self, rng: np.random.Generator) -> float:
-        """By how much this pulse misses its time [ms]; without jitter nothing is drawn, and the noise stays as it is."""
+        """By how much this pulse misses its time [ms]; without jitter nothing is drawn, so noise stays as it is."""
         sd_ms = self.settings.pulse_jitter_ms
         return float(sd_ms * rng.standard_normal()) if sd_ms else 0.0
 
