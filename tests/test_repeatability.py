@@ -106,6 +106,12 @@ def test_errors_are_counted_by_magnitude_without_the_mean_of_their_set() -> None
     assert table["gaussian"].tolist() == pytest.approx([0.38292, 0.29976, 0.18370, 0.08811, 0.04550], abs=1e-5)
 
 
+def test_without_an_sd_there_is_no_gaussian_but_a_count() -> None:
+    table = error_probabilities(np.array([50.0]), np.array([51.0]), sd_ms=np.nan)
+    assert table["gaussian"].isna().all()
+    assert table["counted"].tolist() == [1.0, 0.0, 0.0, 0.0, 0.0]
+
+
 def test_the_text_has_errors_beyond_4_ms_as_often_as_its_sd_gives() -> None:
     table = error_probabilities(np.zeros(2), np.zeros(2), sd_ms=1.926)
     assert table["gaussian"].iloc[-1] == pytest.approx(0.0378, abs=1e-4)

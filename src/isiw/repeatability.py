@@ -166,7 +166,7 @@ def error_probabilities(commanded_ms: FloatArray, realised_ms: FloatArray, sd_ms
     Args:
         commanded_ms: shape (n,).
         realised_ms: shape (n,); mistrials are left out.
-        sd_ms: pooled SD of the error, each set's mean removed [ms].
+        sd_ms: pooled SD of the error, each set's mean removed [ms]; where it is not known there is no Gaussian.
 
     Returns:
         A row a band; columns from_ms, to_ms, gaussian, counted.
@@ -175,7 +175,7 @@ def error_probabilities(commanded_ms: FloatArray, realised_ms: FloatArray, sd_ms
     trials = pd.DataFrame({"isi_ms": commanded_ms, "error_ms": realised_ms - commanded_ms})[realised_ms >= 0].dropna()
     size_ms = (trials["error_ms"] - trials.groupby("isi_ms")["error_ms"].transform("mean")).abs().to_numpy()
     counted = ((size_ms[:, None] >= low) & (size_ms[:, None] < high)).sum(axis=0) / max(len(size_ms), 1)
-    gaussian = 2 * (norm.sf(low / sd_ms) - norm.sf(high / sd_ms))
+    gaussian = 2 * (norm.sf(low, scale=sd_ms) - norm.sf(high, scale=sd_ms))
     return pd.DataFrame({"from_ms": low, "to_ms": high, "gaussian": gaussian, "counted": counted})
 
 

@@ -1,9 +1,8 @@
 """The effective window from response counts: an earlier definition, which needs a threshold [Kim2020, 3.3.4].
 
 A trial responds when its MEP exceeds a threshold, and an ISI is effective when more than 40 % of its trials respond.
-Each person has a threshold of their own; the text saw it in "individual responses pattern" (4.1.1), here it comes from
-their trials of TMS alone.
-Chapter 4 gives this up for amplitudes, because the window depends on the threshold (4.1.1); it is here to compare.
+Each person has a threshold of their own: the text chose it by looking at their responses (4.1.1), here it can come from
+their trials of TMS alone. Chapter 4 gives this up for amplitudes, because the window depends on the threshold (4.1.1); it is here to compare.
 """
 
 from __future__ import annotations
