@@ -2,7 +2,8 @@
 
 A trial responds when its MEP exceeds a threshold, and an ISI is effective when more than 40 % of its trials respond.
 Each person has a threshold of their own: the text chose it by looking at their responses (4.1.1), here it can come from
-their trials of TMS alone. Chapter 4 gives this up for amplitudes, because the window depends on the threshold (4.1.1); it is here to compare.
+their trials of TMS alone. Chapter 4 gives all this up for amplitudes, because the window depends on the threshold
+(4.1.1); it is here to compare.
 """
 
 from __future__ import annotations
