@@ -25,6 +25,16 @@ OTHERS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """Other benchmarks whose claims are collected, and the chapters that they are about."""
 
+_PICTURES: Final[Mapping[str, str]] = {
+    "Fig. 4.23": "trial_reduction_methods.png",
+    "Fig. 4.28": "trial_reduction_particles.png",
+    "Fig. 4.31": "trial_reduction_initial.png",
+    "Fig. 5.12": "trial_reduction_online.png",
+    "Fig. 6.9": "trial_reduction_intervals.png",
+}
+"""Of a benchmark whose JSON file names no pictures; each shows the neighbouring figures as well."""
+
+_DRAWN = {item.place for chapter in CHAPTERS for item in chapter.items if item.without is not None}
 _SECTION = re.compile(r"\b([3-8]|B)\.\d")
 _CHAPTER = re.compile(r"\b(?:[Cc]hapter|[Aa]ppendix)\s+([3-8]|B)\b")
 
@@ -84,8 +94,13 @@ def read_sources(folder: Path, parts: Sequence[str]) -> tuple[list[Source], list
 
 def _source(name: str, path: Path) -> Source:
     content = json.loads(path.read_text())
-    pictures = content.get("pictures", {})
-    return Source(name, path, read_claims(path), content.get("facts", {}), content.get("note", ""), pictures)
+    claims = [claim for claim in read_claims(path) if not _of_a_drawing(claim)]
+    return Source(name, path, claims, content.get("facts", {}), content.get("note", ""), content.get("pictures", {}))
+
+
+def _of_a_drawing(claim: Claim) -> bool:
+    """Whether a claim says no more than that a drawing or a photograph has no counterpart, as its item does."""
+    return _kind(claim) == "not" and set(places(claim.where)[:1]) <= _DRAWN and bool(places(claim.where))
 
 
 def write_page(folder: Path, sources: Sequence[Source], missing: Sequence[str]) -> Counter[str]:
@@ -126,7 +141,15 @@ def _templates() -> Environment:
         keep_trailing_newline=True,
     )
     environment.filters["cell"] = lambda text: text.replace("|", "\\|").replace("\n", " ")
+    environment.filters["fact"] = _fact
     return environment
+
+
+def _fact(fact: Any) -> str:
+    """A fact in a line; benchmarks leave versions as text or by name, and commands with or without backticks."""
+    if isinstance(fact, Mapping):
+        return ", ".join(f"{name} {value}" for name, value in fact.items())
+    return str(fact).replace("`", "")
 
 
 def _kind(claim: Claim) -> str:
@@ -143,6 +166,9 @@ def _entry(item: Item, chapter: Chapter, sources: Sequence[Source], missing: Seq
     pictures = [
         _link(source, folder, source.pictures[item.place]) for source in sources if item.place in source.pictures
     ]
+    other = _PICTURES.get(item.place)
+    if other is not None and not pictures and (folder.parent / other).exists():
+        pictures = [f"../{other}"]
     notes = list(dict.fromkeys(_origin(source, folder) for source, _ in here))
     line = ""
     if item.without is not None and not here:

@@ -31,7 +31,9 @@ def folder(tmp_path: Path) -> Path:
         note="Simulated.",
         pictures={"Fig. 3.8": "fig_3_8.png"},
     )
-    leave(tmp_path / "vane.json", claim("Fig. 7.1", "under reading closed valves"), claim("Fig. 7.9–7.10"))
+    facts = {"command": "`python x`", "versions": {"isiw": "0.1.0", "numpy": "2"}}
+    leave(tmp_path / "vane.json", claim("Fig. 7.1", "under reading closed valves"), claim("Fig. 7.9–7.10"), facts=facts)
+    (tmp_path / "trial_reduction_initial.png").write_bytes(b"")
     (tmp_path / "interval.json").write_text("{}")
     return tmp_path / "gallery"
 
@@ -80,6 +82,18 @@ def test_benchmarks_that_have_left_no_claims_are_named(folder: Path) -> None:
     page = (folder / "README.md").read_text()
     assert "interval has left no claims" in section(page, "Table 6.2")
     assert "no claim names it" in section(page, "Fig. 7.11")
+
+
+def test_command_and_versions_are_told_however_a_benchmark_left_them(folder: Path) -> None:
+    write_page(folder, *read_sources(folder, ["events"]))
+    assert "| vane | python x | – | isiw 0.1.0, numpy 2 |" in (folder / "README.md").read_text()
+
+
+def test_a_picture_of_another_benchmark_is_shown_where_it_exists(folder: Path) -> None:
+    write_page(folder, *read_sources(folder, ["events"]))
+    page = (folder / "README.md").read_text()
+    assert "](../trial_reduction_initial.png)" in section(page, "Fig. 4.31")
+    assert "](../" not in section(page, "Fig. 4.28")
 
 
 def test_verdicts_are_counted(folder: Path) -> None:
