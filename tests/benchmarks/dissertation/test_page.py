@@ -32,7 +32,13 @@ def folder(tmp_path: Path) -> Path:
         pictures={"Fig. 3.8": "fig_3_8.png"},
     )
     facts = {"command": "`python x`", "versions": {"isiw": "0.1.0", "numpy": "2"}}
-    leave(tmp_path / "vane.json", claim("Fig. 7.1", "under reading closed valves"), claim("Fig. 7.9–7.10"), facts=facts)
+    leave(
+        tmp_path / "vane.json",
+        claim("Fig. 7.1", "under reading closed valves"),
+        claim("Fig. 7.2", "not, because it is a photograph"),
+        claim("Fig. 7.9–7.10"),
+        facts=facts,
+    )
     (tmp_path / "trial_reduction_initial.png").write_bytes(b"")
     (tmp_path / "interval.json").write_text("{}")
     return tmp_path / "gallery"
@@ -72,6 +78,8 @@ def test_a_drawing_has_no_counterpart_unless_a_claim_names_it(folder: Path) -> N
     assert "No counterpart: a photograph." in section(page, "Fig. 3.1")
     assert "under reading closed valves" in section(page, "Fig. 7.1")
     assert "No counterpart" not in section(page, "Fig. 7.1")
+    assert "No counterpart: a photograph." in section(page, "Fig. 7.2")
+    assert "it is a photograph" not in page
 
 
 def test_benchmarks_that_have_left_no_claims_are_named(folder: Path) -> None:
