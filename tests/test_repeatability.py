@@ -16,6 +16,7 @@ from isiw.log.reader import read_session
 from isiw.repeatability import (
     STUDY_ISI_MS,
     TimingStudy,
+    error_probabilities,
     error_table,
     event_table,
     study_preset,
@@ -79,6 +80,46 @@ def test_the_timing_fault_preset_has_negative_isis_at_10_ms_only(seed: int) -> N
     table = study_preset("timing-fault", seed=seed).error_table
     assert table["mistrials"].loc[10.0] == pytest.approx(8, abs=5)
     assert (table.drop(10.0)["mistrials"] == 0).all()
+
+
+@pytest.mark.parametrize(("person", "hit_ms"), [(7, 683), (8, 682), (9, 673), (10, 677), (11, 688)])
+def test_the_later_people_are_hit_when_the_figure_says_and_vary_by_less_than_2_ms(person: int, hit_ms: float) -> None:
+    hit = study_preset(f"subject{person}", taps=60, isi_ms=(), seed=1).event_table.loc["hit"]
+    assert hit["mean_ms"] == pytest.approx(hit_ms, abs=1.0)
+    assert hit["sd_ms"] < 2.0
+
+
+def test_jitter_of_the_pulse_adds_to_the_isi_error() -> None:
+    study = study_preset("cushion", isi_ms=(50.0, 90.0), taps=150, seed=3, pulse_jitter_ms=6.0)
+    assert study.pulse_table["sd_ms"].to_numpy() == pytest.approx([6.0, 6.0], rel=0.2)
+    assert study.pooled_sd_ms == pytest.approx(np.hypot(1.93, 6.0), rel=0.15)
+
+
+def test_without_jitter_the_pulse_does_not_vary_against_the_valve() -> None:
+    assert study_preset("cushion", isi_ms=(50.0,), taps=20, seed=3).pulse_table["sd_ms"].tolist() == [0.0]
+
+
+def test_a_negative_jitter_is_an_error() -> None:
+    with pytest.raises(InvalidValueError):
+        study_preset("cushion", taps=1, pulse_jitter_ms=-1.0)
+
+
+def test_errors_are_counted_by_magnitude_without_the_mean_of_their_set() -> None:
+    commanded = np.array([50.0, 50.0, 50.0, 90.0, 90.0, 90.0, 10.0])
+    table = error_probabilities(commanded, commanded + np.array([7, 9, 8, -4.5, 4.5, 0, -30]), sd_ms=2.0)
+    assert table["counted"].tolist() == pytest.approx([2 / 6, 2 / 6, 0, 0, 2 / 6])
+    assert table["gaussian"].tolist() == pytest.approx([0.38292, 0.29976, 0.18370, 0.08811, 0.04550], abs=1e-5)
+
+
+def test_without_an_sd_there_is_no_gaussian_but_a_count() -> None:
+    table = error_probabilities(np.array([50.0]), np.array([51.0]), sd_ms=np.nan)
+    assert table["gaussian"].isna().all()
+    assert table["counted"].tolist() == [1.0, 0.0, 0.0, 0.0, 0.0]
+
+
+def test_the_text_has_errors_beyond_4_ms_as_often_as_its_sd_gives() -> None:
+    table = error_probabilities(np.zeros(2), np.zeros(2), sd_ms=1.926)
+    assert table["gaussian"].iloc[-1] == pytest.approx(0.0378, abs=1e-4)
 
 
 def test_a_mistrial_counts_and_is_left_out_of_the_statistics() -> None:

@@ -1,10 +1,18 @@
 from __future__ import annotations
 
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.response_counts import STIMULATION, effective_window, response_counts, study_counts
+from isiw.response_counts import (
+    STIMULATION,
+    effective_window,
+    response_counts,
+    response_threshold_mv,
+    study_counts,
+)
 from known import known
 
 
@@ -24,6 +32,39 @@ def test_exactly_40_percent_is_not_effective() -> None:
 
 def test_no_responses_make_no_window() -> None:
     assert effective_window(response_counts([0, 5, 10], [0.0, 0.01, 0.0], threshold_mv=0.03)) is None
+
+
+def test_of_several_runs_the_one_about_the_peak_is_the_window() -> None:
+    counts = response_counts([0, 0, 5, 5, 10, 10, 15, 15, 20, 20], [1, 0, 0, 0, 1, 0, 1, 1, 0, 0], threshold_mv=0.5)
+    assert known(effective_window(counts)).segments == ((0.0, 0.0), (10.0, 15.0))
+    assert known(effective_window(counts, segments="peak")).segments == ((10.0, 15.0),)
+
+
+def test_a_person_has_the_threshold_that_few_of_their_own_trials_of_tms_alone_exceed() -> None:
+    alone_mv = np.arange(1, 101) / 1000
+    threshold_mv = response_threshold_mv(alone_mv)
+    assert threshold_mv in alone_mv
+    assert (alone_mv > threshold_mv).mean() <= 0.05
+    assert (alone_mv >= threshold_mv).mean() > 0.05
+    study = study_counts(STIMULATION["mechanical"], [60.0], threshold_mv=None, alone=200, seed=1)
+    assert 0.03 <= study.alone_share <= 0.05
+    assert study.counts["share"].loc[60.0] > study.alone_share
+
+
+@pytest.mark.parametrize("alone_mv", [[], [np.nan], [-0.1], [[0.1]]])
+def test_without_trials_of_tms_alone_there_is_no_threshold(alone_mv: list[float]) -> None:
+    with pytest.raises(InvalidValueError, match="TMS alone"):
+        response_threshold_mv(alone_mv)
+
+
+def test_a_threshold_from_no_trials_of_tms_alone_is_an_error() -> None:
+    with pytest.raises(InvalidValueError, match="TMS alone"):
+        study_counts(STIMULATION["mechanical"], [60.0], threshold_mv=None)
+
+
+def test_other_segments_are_an_error() -> None:
+    with pytest.raises(InvalidValueError, match="segments"):
+        effective_window(response_counts([0], [1], 0.5), segments=cast("Any", "last"))
 
 
 @pytest.mark.parametrize(("kind", "width_ms"), [("electrical", 20.0), ("mechanical", 50.0)])

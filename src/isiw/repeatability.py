@@ -16,8 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from scipy.stats import norm
 
-from isiw.checks import whole
+from isiw.checks import number, whole
 from isiw.devices.robot.mechanism import Geometry, draw_taps
 from isiw.devices.robot.presets import preset
 from isiw.devices.robot.vane.actuator import Vane
@@ -34,6 +35,7 @@ from isiw.types import FloatArray
 __all__ = [
     "STUDY_ISI_MS",
     "TimingStudy",
+    "error_probabilities",
     "error_table",
     "event_table",
     "hit_delay_ms",
@@ -51,6 +53,9 @@ TRIAL_MS = 1000.0
 CALIBRATION_TAPS = 21
 BATCH = 100
 MOST_ROTATIONS = 2000  # each keeps a second of angle, pressures and flows
+
+ERROR_BANDS_MS = (0.0, 1.0, 2.0, 3.0, 4.0, np.inf)
+"""Between which an ISI error's magnitude is counted [ms], as in Table 5.1."""
 
 HIT_DELAY_SD_MS = 6.0
 """SD over people of the hit delay of one rig, as on the tapping robot (dissertation, 4.2) [ms]."""
@@ -92,6 +97,17 @@ class TimingStudy:
     def mistrials(self) -> int:
         """Trials whose pulse came before the impact, or whose impact was not found."""
         return int(self.error_table["mistrials"].sum())
+
+    @property
+    def pulse_table(self) -> pd.DataFrame:
+        """How the pulse varies against the valve command, by commanded ISI (Fig. 5.9): columns n and sd_ms."""
+        pulses = pd.DataFrame({"isi_ms": self.commanded_ms, "pulse_ms": self.realised_ms + self.events.hit_ms})
+        return pulses.dropna().groupby("isi_ms").agg(n=("pulse_ms", "count"), sd_ms=("pulse_ms", "std"))
+
+    @property
+    def error_probabilities(self) -> pd.DataFrame:
+        """How probable an ISI error of some size is, as `error_probabilities`."""
+        return error_probabilities(self.commanded_ms, self.realised_ms, self.pooled_sd_ms)
 
     @property
     def pooled_sd_ms(self) -> float:
@@ -157,6 +173,25 @@ def error_table(commanded_ms: FloatArray, realised_ms: FloatArray) -> pd.DataFra
     )
 
 
+def error_probabilities(commanded_ms: FloatArray, realised_ms: FloatArray, sd_ms: float) -> pd.DataFrame:
+    """How probable an ISI error of some magnitude is: by a Gaussian, as in Table 5.1, and as counted.
+
+    Args:
+        commanded_ms: shape (n,).
+        realised_ms: shape (n,); mistrials are left out.
+        sd_ms: pooled SD of the error, each set's mean removed [ms]; where it is not known there is no Gaussian.
+
+    Returns:
+        A row a band; columns from_ms, to_ms, gaussian, counted.
+    """
+    low, high = np.array(ERROR_BANDS_MS[:-1]), np.array(ERROR_BANDS_MS[1:])
+    trials = pd.DataFrame({"isi_ms": commanded_ms, "error_ms": realised_ms - commanded_ms})[realised_ms >= 0].dropna()
+    size_ms = (trials["error_ms"] - trials.groupby("isi_ms")["error_ms"].transform("mean")).abs().to_numpy()
+    counted = ((size_ms[:, None] >= low) & (size_ms[:, None] < high)).sum(axis=0) / max(len(size_ms), 1)
+    gaussian = 2 * (norm.sf(low, scale=sd_ms) - norm.sf(high, scale=sd_ms))
+    return pd.DataFrame({"from_ms": low, "to_ms": high, "gaussian": gaussian, "counted": counted})
+
+
 def study_preset(
     name: str,
     *,
@@ -164,6 +199,7 @@ def study_preset(
     isi_ms: Sequence[float] = STUDY_ISI_MS,
     seed: int = 0,
     rate_hz: float = 5000.0,
+    pulse_jitter_ms: float = 0.0,
 ) -> TimingStudy:
     """Run the repeatability study on a preset of the tapping robot, open loop.
 
@@ -173,15 +209,18 @@ def study_preset(
         isi_ms: commanded ISIs [ms]; none for taps without a pulse.
         seed: seed of the taps and of the sensors' noise.
         rate_hz: sampling rate [Hz].
+        pulse_jitter_ms: SD by which the pulse misses its time after the valve command [ms] (Fig. 5.9).
 
     Raises:
-        InvalidValueError: an unknown preset, no taps, or a negative seed.
+        InvalidValueError: an unknown preset, no taps, a negative seed, or a negative jitter.
     """
     taps, seed = whole("taps", taps, least=1), whole("seed", seed, least=0)
     geometry, rng = preset(name), np.random.default_rng(seed)
     predicted_ms = float(np.nanmedian(_tap(geometry, np.full(CALIBRATION_TAPS, np.nan), rate_hz, rng).hit_ms))
     commanded = np.repeat(np.asarray(isi_ms, dtype=np.float64), taps) if len(isi_ms) else np.full(taps, np.nan)
     pulse = predicted_ms + commanded
+    if number("pulse_jitter_ms", pulse_jitter_ms, least=0):
+        pulse = pulse + pulse_jitter_ms * rng.standard_normal(len(pulse))
     parts = [_tap(geometry, pulse[i : i + BATCH], rate_hz, rng) for i in range(0, len(pulse), BATCH)]
     events = _joined(parts)
     return TimingStudy(name, events, commanded, pulse - events.hit_ms)

@@ -1,7 +1,9 @@
 """The effective window from response counts: an earlier definition, which needs a threshold [Kim2020, 3.3.4].
 
 A trial responds when its MEP exceeds a threshold, and an ISI is effective when more than 40 % of its trials respond.
-Chapter 4 gives this up for amplitudes, because the window depends on the threshold (4.1.1); it is here to compare.
+Each person has a threshold of their own: the text chose it by looking at their responses (4.1.1), here it can come from
+their trials of TMS alone. Chapter 4 gives all this up for amplitudes, because the window depends on the threshold
+(4.1.1); it is here to compare.
 """
 
 from __future__ import annotations
@@ -9,11 +11,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import pandas as pd
 
-from isiw.checks import number
+from isiw.checks import choice, number, whole
 from isiw.errors import InvalidValueError
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
@@ -21,7 +24,17 @@ from isiw.subjects.subject import SimulatedSubject
 from isiw.types import ArrayLike
 from isiw.window import Window
 
-__all__ = ["EFFECTIVE_SHARE", "STIMULATION", "CountStudy", "effective_window", "response_counts", "study_counts"]
+__all__ = [
+    "EFFECTIVE_SHARE",
+    "STIMULATION",
+    "CountStudy",
+    "effective_window",
+    "response_counts",
+    "response_threshold_mv",
+    "study_counts",
+]
+
+Segments: TypeAlias = Literal["all", "peak"]
 
 EFFECTIVE_SHARE = 0.40
 """An ISI is effective when more than this share of its trials respond (3.3.4)."""
@@ -55,11 +68,15 @@ class CountStudy:
 
     Args:
         counts: as `response_counts` returns it.
-        window: the effective ISIs; None where there are none.
+        window: the effective ISIs about the largest share; None where there are none.
+        threshold_mv: what an MEP had to exceed [mV].
+        alone_share: share of the trials of TMS alone that exceeded it; NaN without such trials.
     """
 
     counts: pd.DataFrame
     window: Window | None
+    threshold_mv: float
+    alone_share: float
 
 
 def response_counts(isi_ms: ArrayLike, mep_mv: ArrayLike, threshold_mv: float) -> pd.DataFrame:
@@ -88,14 +105,49 @@ def response_counts(isi_ms: ArrayLike, mep_mv: ArrayLike, threshold_mv: float) -
     return table
 
 
-def effective_window(counts: pd.DataFrame, share: float = EFFECTIVE_SHARE) -> Window | None:
+def response_threshold_mv(alone_mv: ArrayLike, false_share: float = 0.05) -> float:
+    """A person's own threshold: the least of their MEPs of TMS alone that at most a small share of these exceed [mV].
+
+    Args:
+        alone_mv: MEPs of TMS alone [mV], shape (n,).
+        false_share: the share, in 0–1.
+
+    Raises:
+        InvalidValueError: no MEPs, MEPs that are not finite or negative, or a share outside 0–1.
+    """
+    mep = np.asarray(alone_mv, dtype=np.float64)
+    false_share = number("the share of false responses", false_share, least=0, below=1)
+    if mep.ndim != 1 or not mep.size or not np.isfinite(mep).all() or mep.min() < 0:
+        raise InvalidValueError(
+            "a threshold needs MEPs of TMS alone",
+            got=mep.tolist() if mep.size < 10 else mep.shape,
+            expected="finite amplitudes that are not negative",
+            remedy="Deliver trials of TMS alone before the sweep, or give a threshold.",
+        )
+    return float(np.quantile(mep, 1 - false_share, method="inverted_cdf"))
+
+
+def effective_window(
+    counts: pd.DataFrame, share: float = EFFECTIVE_SHARE, *, segments: Segments = "all"
+) -> Window | None:
     """The ISIs at which more than a share of the trials respond; None where there are none.
 
     Args:
         counts: as `response_counts` returns it.
         share: the share that must be exceeded, in 0–1.
+        segments: "all" such ISIs, or the run of them about the "peak" of the shares, the first of equal ones.
+
+    Raises:
+        InvalidValueError: other segments.
     """
-    return Window.from_mask(counts.index.to_numpy(), counts["share"].to_numpy() > share)
+    choice("segments", segments, get_args(Segments))
+    isi_ms, shares = counts.index.to_numpy(), counts["share"].to_numpy()
+    window = Window.from_mask(isi_ms, shares > share)
+    if window is None or segments == "all":
+        return window
+    peak_ms = isi_ms[shares.argmax()]
+    low, high = next(segment for segment in window.segments if segment[0] <= peak_ms <= segment[1])
+    return Window(low, high)
 
 
 def study_counts(
@@ -103,7 +155,8 @@ def study_counts(
     isi_ms: ArrayLike,
     *,
     trials: int = 12,
-    threshold_mv: float = 0.03,
+    threshold_mv: float | None = 0.03,
+    alone: int = 0,
     seed: int = 0,
 ) -> CountStudy:
     """Sweep a simulated person over ISIs and count.
@@ -111,12 +164,20 @@ def study_counts(
     Args:
         subject: the person; `STIMULATION` has the two of Fig. 3.12.
         isi_ms: ISIs from the impact or the shock [ms], shape (t,).
-        trials: how many for each ISI.
-        threshold_mv: a larger MEP is a response [mV].
+        trials: how many for each ISI; the text has twelve (4.2.1).
+        threshold_mv: a larger MEP is a response [mV]; None: the person's own, from their trials of TMS alone.
+        alone: trials of TMS alone before the sweep.
         seed: of the trial noise.
+
+    Raises:
+        InvalidValueError: no trials of TMS alone where the threshold comes from them, or an invalid number.
     """
     person = subject.begin(seed)
+    alone = whole("alone", alone, least=0)
+    alone_mv = np.array([person.respond(None, "impact").mep_mv for _ in range(alone)])
+    threshold_mv = response_threshold_mv(alone_mv) if threshold_mv is None else threshold_mv
     isi = np.repeat(np.asarray(isi_ms, dtype=np.float64), trials)
     mep = [person.respond(each, "impact").mep_mv for each in isi.tolist()]
     counts = response_counts(isi, mep, threshold_mv)
-    return CountStudy(counts, effective_window(counts))
+    alone_share = float((alone_mv > threshold_mv).mean()) if alone else float("nan")
+    return CountStudy(counts, effective_window(counts, segments="peak"), threshold_mv, alone_share)

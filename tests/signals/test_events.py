@@ -7,7 +7,7 @@ import pytest
 
 from isiw.devices.robot.mechanism import Faults
 from isiw.errors import InvalidValueError
-from isiw.signals import detect_events, sweep_events
+from isiw.signals import detect_events, load_cell_times, sweep_events
 from isiw.signals.events import TapEvents
 from isiw.trials import Channel, Sweep
 from signals.made import Rendered, render, sweep_of
@@ -47,6 +47,18 @@ def test_the_artefact_of_the_pulse_is_not_taken_for_that_of_the_tap() -> None:
     blind, told = found(tapped), found(tapped, t_tms_ms=pulse)
     assert np.abs(blind.memg_ms - tapped.taps.memg_ms - 500).min() > 1.0
     np.testing.assert_allclose(told.memg_ms, tapped.taps.memg_ms + 500, atol=0.5)
+
+
+def test_the_load_cell_shows_the_hit_where_the_accelerometer_does() -> None:
+    tapped = render("bench", n=50, seed=5)
+    pressed_ms = load_cell_times(tapped.waves["force"], 5000.0)
+    np.testing.assert_allclose(pressed_ms, tapped.true_hit_ms, atol=0.3)
+    np.testing.assert_allclose(pressed_ms, found(tapped).hit_ms, atol=0.5)
+
+
+def test_a_load_cell_that_nothing_hits_shows_no_hit() -> None:
+    waves = render("bench", n=5, faults=Faults(stuck_probability=1.0)).waves
+    assert np.isnan(load_cell_times(waves["force"], 5000.0)).all()
 
 
 def test_channels_of_different_shapes_are_an_error() -> None:

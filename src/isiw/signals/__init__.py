@@ -1,6 +1,6 @@
 """From waveforms to numbers: impact, MEP, background, and the judgement of a trial."""
 
-from isiw.signals.events import TapEvents, detect_events, sweep_events
+from isiw.signals.events import TapEvents, detect_events, load_cell_times, sweep_events
 from isiw.signals.impact import impact_time, impact_times
 from isiw.signals.judgement import SignalLimits, is_saturated, judge, judge_measurement, wrong_isi
 from isiw.signals.mep import (
@@ -27,6 +27,7 @@ __all__ = [
     "is_saturated",
     "judge",
     "judge_measurement",
+    "load_cell_times",
     "mep_amplitude",
     "mep_amplitudes",
     "mep_onset",

@@ -53,7 +53,7 @@ class TrialNoise:
 
     Args:
         input_z: standard normal noise on the input of the recruitment curve.
-        log_gain: drift and start-up of the response's amplitude, natural log.
+        log_gain: drift, start-up and plasticity of the response's amplitude, natural log.
     """
 
     input_z: float = 0.0

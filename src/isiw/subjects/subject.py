@@ -1,7 +1,7 @@
 """One simulated person, the truth about them, and how they answer stimuli.
 
 A `SimulatedSubject` never changes; `begin` gives a `Responder` that holds what has a memory within a session (drift,
-start-up, serial correlation).
+start-up, serial correlation, plasticity).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from isiw.checks import choice, number
 from isiw.design import DesignSpace
+from isiw.subjects.plasticity import Plasticity
 from isiw.subjects.profiles import Profile
 from isiw.subjects.responses import ResponseCurve, TrialNoise
 from isiw.types import FloatArray, Reference
@@ -71,6 +72,8 @@ class SimulatedSubject:
         scale: factor on every amplitude.
         stated_hit_delay_ms: mean and SD of the hit delay that the rig states, where it knows itself [ms]; by default
             the tapping robot's, over people.
+        plasticity: how the pairs that are delivered change the gain; None where they do not. The true window and
+            profile are those before the first pair.
     """
 
     profile: Profile
@@ -84,6 +87,7 @@ class SimulatedSubject:
     jitter_told: bool = True
     scale: float = 1.0
     stated_hit_delay_ms: tuple[float, float] = (180.0, 6.0)
+    plasticity: Plasticity | None = None
 
     def facilitation(self, isi_ms: FloatArray, reference: Reference) -> FloatArray:
         """Facilitation in 0–1 at ISIs on a reference [ms], at the mean hit delay; same shape.
@@ -127,6 +131,7 @@ class Responder:
         self._trials = 0
         self._input_z = self._rng.standard_normal()
         self._walk = 0.0
+        self._dose = 0.0
 
     def respond(self, isi_ms: float | None, reference: Reference) -> Response:
         """Answer one pair of stimuli.
@@ -143,6 +148,7 @@ class Responder:
         choice("the reference", reference, get_args(Reference))
         noise = self._next_noise()
         told_ms, facilitation = (None, 0.0) if isi_ms is None else self._stimulate(isi_ms, reference)
+        self._dose += facilitation
         subject, rng = self.subject, self._rng
         floor_mv = subject.response.floor.median_mv * np.exp(subject.response.floor.log_sd * rng.standard_normal())
         mep_mv = subject.response.sample_evoked_mv(facilitation, noise, rng) + floor_mv
@@ -170,5 +176,7 @@ class Responder:
             self._walk = subject.drift.persistence * self._walk + subject.drift.innovation_sd * rng.standard_normal()
             startup = subject.drift.startup
             log_gain = self._walk + (startup[self._trials] if self._trials < len(startup) else 0.0)
+        if subject.plasticity is not None:
+            log_gain += subject.plasticity.log_gain(self._dose)
         self._trials += 1
         return TrialNoise(float(self._input_z), float(log_gain))

@@ -103,4 +103,4 @@ def test_impossible_faults_are_an_error(wrong: dict[str, Any]) -> None:
 
 def test_an_unknown_preset_names_the_known_ones() -> None:
     with pytest.raises(InvalidValueError, match="subject4"):
-        preset("subject9")
+        preset("subject12")

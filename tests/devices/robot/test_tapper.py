@@ -121,6 +121,19 @@ def test_open_loop_the_isi_varies_with_the_hit_and_triggered_it_does_not() -> No
     assert np.max(np.abs(errors("impact"))) <= 0.2
 
 
+@pytest.mark.parametrize("trigger", ["open-loop", "impact"])
+def test_jitter_moves_the_pulse_and_its_recorded_time_and_no_tap(trigger: Trigger) -> None:
+    def pulses_and_hits(jitter_ms: float) -> tuple[np.ndarray, np.ndarray]:
+        device = tapper("subject4", trigger=trigger, pulse_jitter_ms=jitter_ms)
+        sweeps = deliver(device, 60.0, n=80)
+        pulses = np.array([known(sweep.t_tms_ms) for sweep in sweeps])
+        return pulses, pulses - [realised_ms(sweep) for sweep in sweeps]
+
+    (still, hits), (moved, same_hits) = pulses_and_hits(0.0), pulses_and_hits(5.0)
+    assert np.std(moved - still) == pytest.approx(5.0, rel=0.25)
+    assert np.abs(same_hits - hits).max() < 1.0
+
+
 def test_the_command_is_corrected_by_the_measured_hits() -> None:
     robot = Tapper(Listener(), "subject2", TapperSettings(expected_hit_ms=190.0))
     for trial in range(30):
@@ -242,6 +255,7 @@ def test_it_comes_into_the_state_after_stimuli_of_an_earlier_run() -> None:
         {"trigger": "never"},
         {"rate_hz": 0.0},
         {"trigger": "impact", "accelerometer": False},
+        {"pulse_jitter_ms": -1.0},
     ],
 )
 def test_settings_that_cannot_be_are_errors(wrong: dict[str, Any]) -> None:

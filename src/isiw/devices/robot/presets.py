@@ -18,6 +18,10 @@ def _geometry(
     return Geometry(Event(*descent_ms), Event(*hit_ms), Event(*contact_ms), **others)
 
 
+def _later_person(hit_ms: float) -> Geometry:
+    return _geometry((hit_ms - 53, 3), (hit_ms, 1.5), (14, 0.5))
+
+
 PRESETS: Mapping[str, Geometry] = MappingProxyType(
     {
         # Table 3.2; the load cell is hard, so the contact is short.
@@ -26,6 +30,8 @@ PRESETS: Mapping[str, Geometry] = MappingProxyType(
         "subject2": _geometry((126, 4), (172, 2), (9, 0.5), memg=Event(23, 0.5)),
         "subject3": _geometry((115, 2), (176, 1), (17, 0.3), memg=Event(19, 0.3)),
         "subject4": _geometry((129, 2), (182, 1), (15, 0.3), memg=Event(22, 1.5)),
+        # Fig. 4.9: mean hits of five later people, each with an SD "below 2 ms"; the rest is that of an average person.
+        **{f"subject{number}": _later_person(hit_ms) for number, hit_ms in enumerate((183, 182, 173, 177, 188), 7)},
         # Section 5.3.1: the cushion of the precision study, once as its SD says and once as its mistrials say.
         "cushion": _geometry((125, 3), (180, 1.93), (15, 0.5)),
         "timing-fault": _geometry(
@@ -33,7 +39,7 @@ PRESETS: Mapping[str, Geometry] = MappingProxyType(
         ),
     }
 )
-"""The robot on a load cell, on four people [Kim2020, Table 3.2], and on the cushion of the precision study."""
+"""The robot on a load cell, on nine people [Kim2020, Table 3.2, Fig. 4.9], and on the precision study's cushion."""
 
 
 def preset(name: str) -> Geometry:

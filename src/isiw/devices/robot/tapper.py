@@ -49,10 +49,12 @@ class TapperSettings:
         expected_hit_ms: what is known of a person's hit delay before the first tap [ms].
         expected_hit_sd_ms: its SD from person to person [ms].
         expected_tap_sd_ms: its SD from tap to tap [ms].
+        pulse_jitter_ms: SD by which the software that triggers the pulse misses its time [ms]; the pulse's time is
+            recorded all the same.
 
     Raises:
-        InvalidValueError: an unknown reference or trigger, a value that is not positive, or an impact trigger without
-            accelerometer.
+        InvalidValueError: an unknown reference or trigger, a value that is not positive, a negative jitter, or an
+            impact trigger without accelerometer.
     """
 
     reference: Reference = "impact"
@@ -62,11 +64,13 @@ class TapperSettings:
     expected_hit_ms: float = 180.0
     expected_hit_sd_ms: float = 6.0
     expected_tap_sd_ms: float = 2.5
+    pulse_jitter_ms: float = 0.0
 
     def __post_init__(self) -> None:
         check_choice(self, "reference", get_args(Reference))
         check_choice(self, "trigger", get_args(Trigger))
         check_numbers(self, "rate_hz", "expected_hit_ms", "expected_hit_sd_ms", "expected_tap_sd_ms", above=0)
+        check_numbers(self, "pulse_jitter_ms", least=0)
         if self.trigger == "impact" and not self.accelerometer:
             raise InvalidValueError("the impact cannot trigger a pulse without an accelerometer to find it")
 
@@ -187,7 +191,7 @@ class Tapper:
         return Sweep(channels, t_valve_ms=VALVE_MS, t_hit_ms=VALVE_MS + predicted_ms if blind else None)
 
     def _pair(self, taps: Taps, isi_ms: float, rng: np.random.Generator) -> Sweep:
-        after_impact_ms = self._after_impact_ms(isi_ms)
+        after_impact_ms = self._after_impact_ms(isi_ms) + self._jitter_ms(rng)
         predicted_ms = self.hit_delay.mean_ms
         times = self._times_ms(predicted_ms + after_impact_ms)
         channels = self._channels(times, taps, rng)
@@ -205,6 +209,11 @@ class Tapper:
             t_hit_ms=VALVE_MS + predicted_ms if blind else None,
             isi_sd_ms=self.settings.blind_isi_sd_ms if blind else 0.0,
         )
+
+    def _jitter_ms(self, rng: np.random.Generator) -> float:
+        """By how much this pulse misses its time [ms]; without jitter nothing is drawn, so noise stays as it is."""
+        sd_ms = self.settings.pulse_jitter_ms
+        return float(sd_ms * rng.standard_normal()) if sd_ms else 0.0
 
     def _times_ms(self, pulse_ms: float) -> FloatArray:
         """A sweep of 1 s, or longer where the pulse comes late [ms after the valve command]."""

@@ -1,0 +1,116 @@
+"""A method with a person, step by step: what was told, believed and reported after each trial."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+import isiw
+from benchmarks.waveform_loop import Pair, by_waveform
+from isiw.design import IMPACT_SPACE, DesignSpace
+from isiw.subjects import SimulatedSubject
+from isiw.types import FloatArray
+from isiw.window import Window
+
+__all__ = ["GENERATION", "INITIAL", "SPACE", "Course", "live", "online"]
+
+SPACE: Final = DesignSpace(0, 500, 5.0, reference="valve")
+INITIAL: Final = 7
+GENERATION: Final = 30
+"""Particles of the filter (4.3.2)."""
+
+Answer = Callable[[float], tuple[float, float] | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One session of a method with a person.
+
+    Args:
+        person: index in the cohort.
+        told: ISI [ms] and MEP [mV] of each trial.
+        profiles_mv: expected MEP on the grid after each trial from the seventh on [mV].
+        windows: the reported windows after the same trials.
+        spread: PF only: after each generation, its particles' mean and SD [ms].
+        particles_ms: PF only: the last complete generation [ms].
+        amplitudes_mv: of the fitted Gaussians [mV].
+    """
+
+    person: int
+    told: list[tuple[float, float]]
+    profiles_mv: list[FloatArray]
+    windows: list[Window | None]
+    spread: list[tuple[float, float]]
+    particles_ms: FloatArray
+    amplitudes_mv: tuple[float, ...]
+
+    @property
+    def iterations(self) -> int:
+        """How many fits there were, from the seven initial ISIs on."""
+        return len(self.told) - INITIAL + 1
+
+
+def live(method: str, people: Sequence[SimulatedSubject], person: int, seed: int) -> Course:
+    """One session of a method, ISIs from the valve command.
+
+    Args:
+        method: a named strategy.
+        people: of a cohort.
+        person: which of them.
+        seed: of the session; the person's number is added.
+    """
+    responder = people[person].begin(seed + person)
+    strategy = isiw.make_strategy(method, SPACE, seed + person)
+
+    def answer(isi_ms: float) -> tuple[float, float]:
+        response = responder.respond(isi_ms, "valve")
+        return isi_ms if response.isi_ms is None else response.isi_ms, response.mep_mv
+
+    return _followed(strategy, answer, person)
+
+
+def _followed(strategy: isiw.Strategy, answer: Answer, person: int) -> Course:
+    """A session until the strategy stops, with what it believed on the way."""
+    course = Course(person, [], [], [], [], np.array([]), ())
+    generation: list[float] = []
+    while not strategy.decision().stop:
+        answered = answer(strategy.ask())
+        if answered is None:
+            strategy.count_mistrial()
+            continue
+        course.told.append(answered)
+        strategy.tell(*answered)
+        estimate = strategy.estimate()
+        generation.append(answered[0])
+        if estimate.spread_ms is not None and (window := estimate.window) is not None and len(generation) == GENERATION:
+            course.spread.append((0.5 * (window.start_ms + window.end_ms), estimate.spread_ms))
+            course = replace(course, particles_ms=np.array(generation))
+            generation = []
+        if len(course.told) >= INITIAL:
+            band = estimate.profile(strategy.space.grid_ms)
+            course.profiles_mv.append(np.array([]) if band is None else band.median_mv)
+            course.windows.append(estimate.window)
+    curves = getattr(strategy.posterior, "curves", ())
+    return replace(course, amplitudes_mv=curves[0].amplitudes_mv if curves else ())
+
+
+def online(people: Sequence[SimulatedSubject], person: int, seed: int) -> Course:
+    """One session of NR on the robot's waveforms, ISIs from the impact.
+
+    Args:
+        people: of a cohort.
+        person: which of them.
+        seed: of the session; the person's number is added.
+    """
+    deliver = by_waveform(people[person], IMPACT_SPACE, Pair("impact", "open-loop", seed, person, seed + person, 0))
+    trials = iter(range(10_000))
+
+    def answer(isi_ms: float) -> tuple[float, float] | None:
+        stimulus = isiw.Stimulus(next(trials), isi_ms)
+        judged = isiw.signals.judge(deliver(stimulus), stimulus, IMPACT_SPACE)
+        return None if judged.reason is not None else (judged.isi_ms, judged.mep_mv)
+
+    return _followed(isiw.make_strategy("nr", IMPACT_SPACE, seed + person), answer, person)

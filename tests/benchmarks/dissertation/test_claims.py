@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from benchmarks.dissertation.claims import Claim, claims_as_json, places, read_claims
+
+from isiw.errors import InvalidValueError
+
+CLAIM = {
+    "where": "Table 6.2",
+    "what": "Intervals of 300 ms are produced.",
+    "theirs": "300",
+    "ours": "299",
+    "difference": "−1 ms",
+    "verdict": "reproduced",
+}
+
+
+def test_claims_are_read_as_they_were_left(tmp_path: Path) -> None:
+    path = tmp_path / "interval.json"
+    path.write_text(json.dumps({"facts": {}, "claims": claims_as_json([Claim(**CLAIM)])}))
+    assert read_claims(path) == [Claim(**CLAIM)]
+
+
+@pytest.mark.parametrize("verdict", ["", "yes", "not", "not, because ", "under reading "])
+def test_a_verdict_of_another_form_is_an_error(verdict: str) -> None:
+    with pytest.raises(InvalidValueError):
+        Claim(**CLAIM | {"verdict": verdict})
+
+
+@pytest.mark.parametrize("verdict", ["under reading open loop", "not, because the text gives no number"])
+def test_a_verdict_may_name_a_reading_or_a_reason(verdict: str) -> None:
+    assert Claim(**CLAIM | {"verdict": verdict}).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    "content", [[], {}, {"claims": {}}, {"claims": ["no"]}, {"claims": [{**CLAIM, "more": "x"}]}, {"claims": [{}]}]
+)
+def test_a_file_without_proper_claims_is_an_error(content: Any, tmp_path: Path) -> None:
+    path = tmp_path / "vane.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(InvalidValueError):
+        read_claims(path)
+
+
+@pytest.mark.parametrize(
+    ("where", "named"),
+    [
+        ("Table 6.2", ["Table 6.2"]),
+        ("Fig. 4.31–4.33", ["Fig. 4.31", "Fig. 4.32", "Fig. 4.33"]),
+        ("Tables 6.3, 6.4 and Figure 6.9", ["Table 6.3", "Table 6.4", "Fig. 6.9"]),
+        ("4.4.8, Fig. 4.34, Table 4.1", ["Fig. 4.34", "Table 4.1"]),
+        ("Fig. B.1", ["Fig. B.1"]),
+        ("Figs. 5.12 and 5.13 (5.3.2)", ["Fig. 5.12", "Fig. 5.13"]),
+        ("Fig. 7.10a", ["Fig. 7.10"]),
+        ("5.4.1", []),
+    ],
+)
+def test_a_claim_names_its_tables_and_figures(where: str, named: list[str]) -> None:
+    assert places(where) == named
