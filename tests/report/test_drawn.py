@@ -67,7 +67,7 @@ def test_a_belief_that_hardly_a_trial_bears_names_no_window(tmp_path: Path) -> N
     shown = drawn(tapped(tmp_path / "s.mcap", trials=6))["beliefs"]
     assert (shown[0]["found"], shown[0]["window"]) == (TOO_FEW, [])
     last = shown[max(shown)]
-    assert last["found"].startswith("The tap enhances the MEP at ISIs of")
+    assert last["found"].startswith("The tap probably enhances the MEP at ISIs of")
     assert last["found"].split("ISIs of ")[1].startswith(f"{last['window'][0][0]:g}–")
 
 

@@ -34,7 +34,8 @@ def with_estimate(record: SessionRecord, **changes: Any) -> SessionRecord:
 
 def test_the_statement_has_window_intervals_counts_and_reason(record: SessionRecord) -> None:
     assert final_statement(record) == (
-        "The tap enhances the MEP at ISIs of 33–93 ms after the valve command (probability of a window: 0.90). "
+        "The tap probably enhances the MEP at ISIs of 33–93 ms after the valve command "
+        "(probability of a window: 0.90). "
         "With 90 % probability each, it starts between 28 and 38 ms and ends after 150 ms. "
         "Given a window, it ends beyond the range with probability 0.67. "
         "4 pairs of stimuli were delivered; 3 count; mistrials: 1 background activity. "

@@ -35,7 +35,7 @@ WORTH_SAYING = 0.1
 """Probability from which on an unusual window is mentioned."""
 
 SURE = 0.95
-"""Probability that there is none, from which on no window was found; below it that is undecided."""
+"""Probability from which on it is said outright that there is a window, or none; below it "probably", or undecided."""
 
 UNUSUAL = 0.9
 """Probability from which on a person is told to be unlike most."""
@@ -108,7 +108,8 @@ def finding_sentence(estimate: Estimate, space: DesignSpace) -> str:
     if window is None:
         undecided = probability is not None and 1 - probability < SURE
         return f"It is undecided whether there is a window{chance}." if undecided else f"No window was found{chance}."
-    return f"The tap enhances the MEP at ISIs of {window} {_AFTER[space.reference]}{chance}."
+    likely = "" if probability is None or probability >= SURE else "probably "
+    return f"The tap {likely}enhances the MEP at ISIs of {window} {_AFTER[space.reference]}{chance}."
 
 
 def _edges(estimate: Estimate, space: DesignSpace) -> str:
