@@ -11,6 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
+import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -138,5 +139,6 @@ def save_figure(figure: Figure, path: str | Path, *, overwrite: bool = False) ->
     if suffix not in known:
         raise InvalidValueError("the picture's format is unknown", got=target.name, expected=", ".join(sorted(known)))
     picture = io.BytesIO()
-    figure.savefig(picture, dpi=200, format=suffix)
+    with mpl.rc_context({"svg.hashsalt": "isiw"}):  # so that the same picture is the same file
+        figure.savefig(picture, dpi=200, format=suffix, metadata={"Date": None} if suffix == "svg" else None)
     return write_output(target, picture.getvalue(), overwrite=overwrite)
