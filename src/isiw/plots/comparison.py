@@ -35,11 +35,12 @@ def save_comparison_plot(records: Sequence[SessionRecord], path: str | Path, *, 
     return save_figure(comparison_figure(records), path, overwrite=overwrite)
 
 
-def comparison_figure(records: Sequence[SessionRecord]) -> Figure:
+def comparison_figure(records: Sequence[SessionRecord], names: Sequence[str] | None = None) -> Figure:
     """Sessions below each other as a figure.
 
     Args:
         records: the sessions.
+        names: what to call them; by default person and date.
 
     Raises:
         InvalidValueError: no sessions, or ISIs that count from different events.
@@ -52,7 +53,7 @@ def comparison_figure(records: Sequence[SessionRecord]) -> Figure:
     tidied(axes)
     for line, record in enumerate(records):
         _draw(axes, line, record)
-    axes.set_yticks(range(len(records)), [_name(record) for record in records])
+    axes.set_yticks(range(len(records)), names or [_name(record) for record in records])
     axes.set_ylim(len(records) - 0.4, -0.6)
     spaces = [record.header.space for record in records]
     axes.set_xlim(min(space.low_ms for space in spaces), max(space.high_ms for space in spaces))
