@@ -102,7 +102,9 @@ def test_the_band_of_the_prediction_is_the_logs_and_wider_than_that_of_the_expec
 def test_mistrials_are_where_they_happened_and_trials_are_counted_as_in_the_log(record: SessionRecord) -> None:
     profile, edges, chance = session_figure(record).axes
     (lost,) = [trial for trial in record.table if trial.reason is not None]
-    assert line(profile, "mistrial") == ([lost.isi_ms], [pytest.approx(1e3 * known(lost.mep_mv))])
+    isis_ms, meps_uv = line(profile, "mistrial")
+    assert isis_ms == [lost.isi_ms]
+    assert meps_uv == pytest.approx([1e3 * known(lost.mep_mv)])
     assert [lost.index] in [np.asarray(line.get_xdata()).tolist() for line in chance.lines]
     assert line(edges, "start of the window, with 90 % interval")[0] == [
         estimate.trial for estimate in record.estimates

@@ -232,7 +232,7 @@ class Estimate(_Record):
         return StopDecision(self.stop, self.reason)
 
 
-def _profile(estimate: WindowEstimate) -> Mapping[str, tuple[float, ...]]:
+def _profile(estimate: WindowEstimate) -> Mapping[str, Any]:
     band = None if estimate.grid_ms is None else estimate.profile(estimate.grid_ms)
     if band is None or estimate.grid_ms is None:
         return {}

@@ -58,7 +58,7 @@ def comparison_figure(records: Sequence[SessionRecord], names: Sequence[str] | N
     spaces = [record.header.space for record in records]
     axes.set_xlim(min(space.low_ms for space in spaces), max(space.high_ms for space in spaces))
     axes.set_xlabel(_AXIS_NAME[spaces[0].reference], fontsize=9)
-    explain(figure, ncols=3, loc="outside upper left")
+    explain(figure, ncols=3, above=True)
     return figure
 
 

@@ -107,13 +107,12 @@ def _draw_window(axes: Axes, estimate: Estimate | None, truth: Window | None) ->
 def _draw_profile(axes: Axes, estimate: Estimate | None) -> None:
     if estimate is None or not estimate.grid_ms:
         return
-    prediction = (estimate.predicted_low_mv, estimate.predicted_high_mv)
-    if len(prediction[0]) == len(prediction[1]) == len(estimate.grid_ms):
+    low_mv, high_mv = estimate.predicted_low_mv, estimate.predicted_high_mv
+    if len(low_mv) == len(high_mv) == len(estimate.grid_ms):
         label = "prediction: 90 % of trials lie here"
-        axes.fill_between(estimate.grid_ms, *map(_uv, prediction), color=FAINT, alpha=0.18, lw=0, label=label)
-    expected = (estimate.band_low_mv, estimate.band_high_mv)
-    label = "90 % band of the expected MEP"
-    axes.fill_between(estimate.grid_ms, *map(_uv, expected), color=BLUE, alpha=0.3, lw=0, label=label)
+        axes.fill_between(estimate.grid_ms, _uv(low_mv), _uv(high_mv), color=FAINT, alpha=0.18, lw=0, label=label)
+    low_uv, high_uv, label = _uv(estimate.band_low_mv), _uv(estimate.band_high_mv), "90 % band of the expected MEP"
+    axes.fill_between(estimate.grid_ms, low_uv, high_uv, color=BLUE, alpha=0.3, lw=0, label=label)
     axes.plot(estimate.grid_ms, _uv(estimate.profile_mv), color=BLUE, lw=1.8, label="expected MEP")
 
 

@@ -9,7 +9,7 @@ import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Final, Literal
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -98,18 +98,21 @@ def tidied(*panels: Axes) -> None:
         axes.tick_params(labelsize=8, color=FAINT)
 
 
-def explain(figure: Figure, ncols: int, loc: str = "outside lower center") -> None:
+def explain(figure: Figure, ncols: int, *, above: bool = False) -> None:
     """Give a figure one legend, outside its panels, that has each label once; none where nothing has a label.
 
     Args:
         figure: the figure.
         ncols: how many labels stand beside each other.
-        loc: where, as `Figure.legend` has it.
+        above: whether it stands above the panels, not below.
     """
     labelled = [axes.get_legend_handles_labels() for axes in figure.axes]
     once = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
     if once:
-        figure.legend(once.values(), once.keys(), loc=loc, ncols=ncols, fontsize=7.5, frameon=False)
+        loc: Literal["outside upper left", "outside lower center"] = (
+            "outside upper left" if above else "outside lower center"
+        )
+        figure.legend(list(once.values()), list(once), loc=loc, ncols=ncols, fontsize=7.5, frameon=False)
 
 
 def saying(axes: Axes, text: str) -> None:
