@@ -44,13 +44,13 @@ _PINK, _SKY, _OLIVE, _BROWN = "#cc79a7", "#56b4e9", "#8f8a00", "#7a4a1f"
 STRATEGY_COLOURS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "default": BLUE,
-        "oracle": FAINT,
+        "oracle": INK,
         "gpr": ORANGE,
         "nr": GREEN,
         "svmr": RED,
         "pf": _PINK,
         "particles-mi": _SKY,
-        "incremental": INK,
+        "incremental": FAINT,
         "even": _OLIVE,
         "random": _BROWN,
     }
