@@ -59,6 +59,8 @@ def test_a_method_without_a_belief_is_not_drawn_before_it_has_reported_a_window(
     late = table("wide", strategies=("pf",), start_coverage=math.nan, end_coverage=math.nan)
     late.loc[late["trial"] < 20, ["called_none", "f1"]] = [1.0, 0.0]
     assert curve(study_figure(late).axes[0], "pf") == ([20], [0.7])
+    assert curve(study_figure(late, "frontier").axes[0], "pf") == ([21], [0.7])
+    assert study_figure(late, "coverage").axes[0].texts[0].get_text() == "no true edges, or no intervals"
     late[["called_none"]] = 1.0
     assert curve(study_figure(late).axes[0], "pf")[0] == [0, 10, 20]
 

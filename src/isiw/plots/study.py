@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.checks import choice
-from isiw.plots.style import FAINT, INK, explain, save_figure, strategy_colours, tidied
+from isiw.plots.style import FAINT, INK, explain, save_figure, saying, strategy_colours, tidied
 
 __all__ = ["STUDY_PICTURES", "StudyPicture", "draw_curve", "save_study_plot", "study_figure"]
 
@@ -116,11 +116,12 @@ def _from_first_estimate(curve: pd.DataFrame) -> pd.DataFrame:
 
 def _draw_frontier(axes: Axes, curves: _Curves, colours: _Colours) -> None:
     """How many stimuli an F1 takes that is kept from then on, and what each strategy has when its rule stops it."""
-    for name, curve in curves.items():
+    for name, whole in curves.items():
+        curve = _from_first_estimate(whole)
         kept = np.minimum.accumulate(curve["f1"].to_numpy()[::-1])[::-1]
         axes.step(curve["delivered"], kept, where="post", color=colours[name], lw=1.5, label=name)
         last = curve.tail(1)
-        axes.plot(last["stop_trial"], last["stop_f1"], "o", ms=6, color=colours[name], mec=INK)
+        axes.plot(last["stop_trial"], last["stop_f1"], "o", ms=6, color=colours[name], mec=INK, clip_on=False)
     axes.plot([], [], "o", ms=6, color="none", mec=INK, label="where its rule stops it, on average")
     axes.set_ylim(0, 1)
     axes.set_xlabel("stimuli delivered", fontsize=9)
@@ -129,6 +130,8 @@ def _draw_frontier(axes: Axes, curves: _Curves, colours: _Colours) -> None:
 
 def _draw_coverage(axes: Axes, curves: _Curves, colours: _Colours) -> None:
     axes.axhline(0.9, color=FAINT, lw=1.2, label="what 90 % intervals should have")
+    if not any(curve["start_coverage"].notna().any() for curve in curves.values()):
+        saying(axes, "no true edges, or no intervals")
     _draw_pair(axes, curves, colours, {"start_coverage": "start", "end_coverage": "end"})
     axes.set_ylim(0, 1.02)
     axes.set_xlabel("trials", fontsize=9)
