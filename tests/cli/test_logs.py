@@ -80,6 +80,7 @@ def test_compare_prints_the_windows_and_draws_them(isiw: Command, tmp_path: Path
     assert "--overwrite" in isiw("compare", "first.mcap", "second.mcap", "-o", "c.png").output
 
 
+@pytest.mark.slow
 def test_compare_writes_a_page_where_the_suffix_asks_for_one(isiw: Command, tmp_path: Path) -> None:
     for number, name in enumerate(("first", "second")):
         write_log(tmp_path / f"{name}.mcap", gaussian_person(), trials=4, seed=number)
