@@ -131,7 +131,13 @@ def write(rows: pd.DataFrame, facts: dict[str, object], fixed: pd.DataFrame, out
     out.with_suffix(".md").write_text("\n".join([header, "", *parts]))
     records = {title: json.loads(part.to_json(orient="records", double_precision=6)) for title, part in tables.items()}
     out.with_suffix(".json").write_text(json.dumps({"facts": facts, **records}, indent=1))
-    save_study_plot(table, out.with_suffix(".png"))
+    save_study_plot(table, out.with_suffix(".png"), overwrite=True)
+
+
+def redraw(out: Path) -> None:
+    """The picture of results that are there, drawn again."""
+    records = json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["F1 by trial"]
+    save_study_plot(pd.DataFrame(records), out.with_suffix(".png"), overwrite=True)
 
 
 def strategy_of(text: str) -> StudyStrategy:
@@ -192,8 +198,12 @@ def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
     *,
     stopping: Annotated[bool, typer.Option(help="Note when the stopping rule fires: an estimate a trial.")] = True,
     quick: Annotated[bool, typer.Option(help="Three cohorts, few people: under two minutes.")] = False,
+    only_draw: Annotated[bool, typer.Option(help="Draw the results again that are there; run nothing.")] = False,
 ) -> None:
     """Compare strategies on paired simulated people."""
+    if only_draw:
+        redraw(out)
+        return
     names = cohorts.split(",")
     if quick:
         names, people, other_people, trials = ["gaussian", "recruitment", "nonresponder"], 10, 10, 20

@@ -2,7 +2,7 @@
 
     python benchmarks/readme_results.py
 
-prints the table, to be put between the two `results` marks of the README, and draws `docs/images/results.png`.
+prints the table, to be put between the two `results` marks of the README, and draws `docs/images/results.svg`.
 """
 
 from __future__ import annotations
@@ -11,15 +11,27 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+
+from isiw.plots.study import draw_curve
+from isiw.plots.style import INK, explain, save_figure, strategy_colours, tidied
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 MARKS = (10, 20, 40)
 COHORTS = {"recruitment": "noise as near threshold (`recruitment`)", "gaussian": "constant-CV noise (`gaussian`)"}
 METHODS = {"gpr": "the dissertation's Gaussian process", "default": "**isiw's default**", "oracle": "oracle"}
-COLOURS = {"gpr": "#E69F00", "default": "#0072B2", "oracle": "#999999"}
+PICTURED = {
+    "default": "isiw's default",
+    "oracle": "oracle",
+    "gpr": "dissertation: Gaussian process (gpr)",
+    "nr": "dissertation: nonlinear regression (nr)",
+    "svmr": "dissertation: support vectors (svmr)",
+    "pf": "dissertation: particle filter (pf)",
+}
+LAST = 60
 GUESS = "guess without any trial"
 
 
@@ -34,9 +46,7 @@ def f1_by_trial(cohort: str) -> pd.DataFrame:
 
 def guess(cohort: str) -> float:
     """Mean F1 of the best fixed window on 1,000 people."""
-    text = (RESULTS / "zero_trials.md").read_text(encoding="utf-8")
-    (value,) = re.findall(rf"^\| {cohort} +\| +[\d.]+ \| +([\d.]+) \|", text, re.MULTILINE)
-    return float(value)
+    return _zero_trials(cohort)[1]
 
 
 def table() -> str:
@@ -53,23 +63,56 @@ def table() -> str:
     return "\n".join(lines)
 
 
+def curves_of(cohort: str) -> pd.DataFrame:
+    """What the picture shows of a cohort: trial, F1 and its standard error of each method, a row a marked trial.
+
+    The oracle has no standard error of its own: it is the default's F1 and how much that is behind it.
+    """
+    default = (
+        _table("people.json", "By trial").assign(strategy="default").rename(columns={"start_covered": "start_coverage"})
+    )
+    oracle = default.assign(strategy="oracle", f1=default["f1"] + default["behind_oracle"], f1_se=0.0)
+    others = _table("acquisition.json").query("strategy in ['gpr', 'nr', 'svmr', 'pf']")
+    rows = pd.concat([default, oracle, others])
+    return rows[(rows["cohort"] == cohort) & (rows["trial"] <= LAST)]
+
+
+def before_any_trial(cohort: str) -> float:
+    """Mean F1 of what the default believes beforehand, on 1,000 people."""
+    return _zero_trials(cohort)[0]
+
+
 def picture() -> Figure:
-    """Mean F1 by trial, a panel a cohort."""
-    figure = Figure(figsize=(9, 3.6), layout="constrained")
-    for axes, (cohort, people) in zip(figure.subplots(1, 2, sharey=True), COHORTS.items(), strict=True):
-        curves = f1_by_trial(cohort)
-        for method, name in METHODS.items():
-            axes.plot(curves[method].dropna(), "o-", color=COLOURS[method], label=name.replace("*", ""))
-        axes.axhline(guess(cohort), color="black", linestyle="--", label=GUESS)
-        axes.set(xlabel="stimuli delivered", xlim=(0, 42), ylim=(0.3, 1), title=people.replace("`", ""))
-        axes.grid(alpha=0.3)
-    figure.axes[0].set_ylabel("mean F1 of the reported window")
-    figure.axes[1].legend(loc="lower right")
+    """Mean F1 by trial, a panel a kind of noise."""
+    figure = Figure(figsize=(9.6, 4.4), layout="constrained")
+    colours = strategy_colours(list(PICTURED))
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, (cohort, people) in zip(panels, COHORTS.items(), strict=True):
+        tidied(axes)
+        rows = curves_of(cohort)
+        for (method, name), marker in zip(PICTURED.items(), "oPsD^v", strict=True):
+            curve = rows[rows["strategy"] == method].sort_values("trial")
+            draw_curve(axes, curve, name, colours[method], marker)
+        axes.plot(0, before_any_trial(cohort), "o", color=colours["default"], mfc="none", ms=6, clip_on=False,
+                  label="the default before any trial")  # fmt: skip
+        axes.axhline(guess(cohort), color=INK, lw=1, ls=(0, (4, 3)), label=GUESS)
+        axes.set(xlim=(0, LAST + 2), ylim=(0, 1), yticks=np.linspace(0, 1, 6))
+        axes.set_xlabel("stimuli delivered", fontsize=9)
+        axes.set_title(people.replace("`", ""), fontsize=10, loc="left", color=INK)
+    panels[0].set_ylabel("mean F1 of the reported window, 95 % band", fontsize=9)
+    explain(figure, ncols=4)
     return figure
 
 
 def _table(name: str, title: str = "F1 by trial") -> pd.DataFrame:
     return pd.DataFrame(json.loads((RESULTS / name).read_text(encoding="utf-8"))[title])
+
+
+def _zero_trials(cohort: str) -> tuple[float, float]:
+    """Mean F1 of the default before any trial, and of the best fixed window."""
+    text = (RESULTS / "zero_trials.md").read_text(encoding="utf-8")
+    ((default, fixed),) = re.findall(rf"^\| {cohort} +\| +([\d.]+) \| +([\d.]+) \|", text, re.MULTILINE)
+    return float(default), float(fixed)
 
 
 def _short(value: float) -> str:
@@ -78,4 +121,4 @@ def _short(value: float) -> str:
 
 if __name__ == "__main__":
     print(table())
-    picture().savefig(ROOT / "docs" / "images" / "results.png", dpi=110)
+    save_figure(picture(), ROOT / "docs" / "images" / "results.svg", overwrite=True)

@@ -17,7 +17,7 @@ import isiw
 
 IMAGES = Path(__file__).parent / "images"
 SEED = 1
-SHOWN = "12"
+SHOWN = "10"
 
 
 def report(folder: Path) -> Path:
@@ -45,6 +45,7 @@ def main() -> None:
         page.goto(path.as_uri())
         page.screenshot(path=IMAGES / "report.png")
         page.locator(f".choose[data-trial='{SHOWN}']").click()
+        page.wait_for_timeout(500)
         page.locator("#explore").screenshot(path=IMAGES / "report-trial.png")
         browser.close()
 

@@ -14,6 +14,7 @@ from benchmarks.reduction.look import NAMES, beside, panels
 from benchmarks.reduction.sessions import Session
 from benchmarks.reduction.significance import paired_tests
 from benchmarks.reduction.size import Size
+from isiw.plots.style import explain
 
 METHODS = (*text.METHODS, "default")
 PEOPLE_OF_KIM = 11
@@ -123,7 +124,7 @@ def figure(table: pd.DataFrame) -> Figure:
             beside(one, rows["method"], rows[theirs], rows[ours], error)
             one.set_title(f"{title}, {word} acc.")
         line[0].set_yscale("log")
-    axes[0, 0].legend(fontsize=7, frameon=False, loc="upper left")
+    explain(picture, ncols=2)
     return picture
 
 

@@ -6,12 +6,14 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import pandas as pd
 from matplotlib.figure import Figure
 
-__all__ = ["Section", "Table", "write"]
+__all__ = ["DPI", "Section", "Table", "write"]
+
+DPI: Final = 110
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,7 @@ def _markdown(section: Section, out: Path) -> list[str]:
         path = out.with_name(f"{out.name}_{name}.png")
         for axes in picture.axes:
             axes.title.set_fontsize(9)
-        picture.savefig(path, dpi=80)
+        picture.savefig(path, dpi=DPI)
         lines += [f"![{section.title}]({path.name})", ""]
     for table in section.tables:
         lines += [f"{table.caption}", "", table.rows.map(_cell).to_markdown(index=False, disable_numparse=True), ""]

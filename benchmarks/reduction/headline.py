@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,7 @@ from benchmarks.reduction.readings import LIVE
 from benchmarks.reduction.sessions import Session
 from benchmarks.reduction.size import Size
 from isiw.metrics import trials_to_criterion
+from isiw.plots.style import explain
 from isiw.types import FloatArray
 
 NOISE = {"recruitment": "realistic", "gaussian": "constant-CV"}
@@ -109,35 +111,43 @@ def _word(holds: bool) -> str:  # noqa: FBT001 - a verdict
     return "holds" if holds else "FAILS"
 
 
-def figure(rows: pd.DataFrame) -> Figure:
-    """Mean F1 by trial, and where each method stops."""
+def figure(equal: pd.DataFrame, duels: Mapping[str, pd.DataFrame]) -> Figure:
+    """Mean F1 after so many trials, and where the dissertation's methods stop.
+
+    Args:
+        equal: as `equal_trials` gives it.
+        duels: of each cohort, as `duel` gives a row of it.
+    """
     picture, axes = panels(1, 2, width=4.6, height=3.3, sharey=True)
     for one, (cohort, noise) in zip(axes[0], NOISE.items(), strict=True):
-        group = rows[rows["cohort"] == cohort]
+        means = equal[equal["cohort"] == cohort].set_index("method")
+        marks = [mark for mark in MARKS if str(mark) in means]
+        stops = duels[cohort].set_index("against")
         for method in ("nr", "svmr", "gpr", "default"):
-            mean = curve(group, method).mean(axis=0)
-            one.plot(np.arange(1, len(mean) + 1), mean, color=COLOURS[method], label=NAMES[method])
-            own = group[group["method"] == method]
-            one.plot(own["trials"].mean(), own["f1, true"].mean(), "o", color=COLOURS[method], ms=6)
-        one.set(
-            title=f"{cohort}: {noise} noise (dots: at the stopping rule)", xlabel="trials", ylim=(0, 1), xlim=(0, None)
-        )
+            name = NAMES[method]
+            f1s = means.loc[name, [str(mark) for mark in marks]].to_numpy(dtype=float)
+            one.plot(marks, f1s, "o-", ms=3, color=COLOURS[method], label=name)
+            if name in stops.index:
+                one.plot(*stops.loc[name, ["its trials", "its F1"]], "D", color=COLOURS[method], mec="black", ms=6)
+        one.plot([], [], "D", color="none", mec="black", ms=6, label="at its stopping rule, on average")
+        one.set(title=f"{cohort}: {noise} noise", xlabel="trials", ylim=(0, 1), xlim=(0, None))
     axes[0, 0].set_ylabel("mean F1 (true window)")
-    axes[0, 0].legend(fontsize=8, frameon=False)
+    explain(picture, ncols=5)
     return picture
 
 
 def section(rows: pd.DataFrame) -> Section:
     """This part of the report."""
     tables = {
-        cohort: pd.DataFrame([duel(group, method) for method in text.METHODS])
+        str(cohort): pd.DataFrame([duel(group, method) for method in text.METHODS])
         for cohort, group in rows.groupby("cohort")
     }
     shown = [
         Table(f"`{cohort}`, {noise} noise: at each method's stop.", tables[cohort]) for cohort, noise in NOISE.items()
     ]
+    equal = equal_trials(rows)
     shown += [
-        Table("Equal trials: mean F1 after so many, whatever the stopping rule says.", equal_trials(rows)),
+        Table("Equal trials: mean F1 after so many, whatever the stopping rule says.", equal),
         Table("Equal F1: trials from which on a mean F1 is kept, of so many that were played.", equal_f1(rows)),
     ]
     prose = f"""\
@@ -146,4 +156,4 @@ window. At equal trials: the default's F1 after as many trials as each session o
 {curve(rows, "default").shape[1]}), paired by person. At equal F1: from which trial on the default's mean F1 stays
 at or above the other method's mean at its stop. A trial is one pair of stimuli."""
     said = [sentence for cohort, noise in NOISE.items() for sentence in verdicts(tables[cohort], noise)]
-    return Section("The headline: equal trials, equal F1", prose, shown, ("headline", figure(rows)), said)
+    return Section("The headline: equal trials, equal F1", prose, shown, ("headline", figure(equal, tables)), said)

@@ -14,6 +14,7 @@ from benchmarks.reduction.look import COLOURS, NAMES, panels
 from benchmarks.reduction.sessions import Session
 from benchmarks.reduction.significance import paired_tests
 from benchmarks.reduction.size import Size
+from isiw.plots.style import FAINT, explain
 
 COUNTS: Final = tuple(range(2, 10))
 FEWEST: Final = {"nr": 4, "svmr": 2, "gpr": 2}
@@ -63,18 +64,18 @@ def figure(table: pd.DataFrame) -> Figure:
     picture, axes = panels(2, 3, sharex=True)
     for column, (method, number) in enumerate(zip(FEWEST, ("4.31", "4.32", "4.33"), strict=True)):
         for (word, style), (cohort, colour) in itertools.product(
-            (("without", "-"), ("with", "--")), (("kim11", COLOURS[method]), ("gaussian", COLOURS["pf"]))
+            (("without", "-"), ("with", "--")), (("kim11", COLOURS[method]), ("gaussian", FAINT))
         ):
             chosen = (table["cohort"] == cohort) & (table["method"] == method) & (table["accelerometer"] == word)
             for line, value in enumerate(("F1", "trials")):
                 rows = table[chosen]
-                label = f"{cohort}, {word} acc."
+                label = f"{'gaussian' if cohort == 'gaussian' else f'kim11, {NAMES[method]}'}, {word} acc."
                 axes[line, column].plot(
                     rows["initial"], rows[value], style, marker="o", ms=3, color=colour, label=label
                 )
         axes[0, column].set(title=f"Fig. {number}: {NAMES[method]}", ylim=(0, 1), ylabel="F1 (true window)")
         axes[1, column].set(xlabel="initial observations", ylabel="trials", ylim=(0, None))
-        axes[0, column].legend(fontsize=6, frameon=False, ncols=2, loc="lower left")
+    explain(picture, ncols=4)
     return picture
 
 

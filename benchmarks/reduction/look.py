@@ -9,18 +9,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from isiw.plots.style import BLUE, STRATEGY_COLOURS, tidied
+
 __all__ = ["COLOURS", "NAMES", "OURS", "THEIRS", "beside", "panels"]
 
-OURS: Final = "#2b6ca3"
+OURS: Final = BLUE
 THEIRS: Final = "#c9c3b8"
 
-COLOURS: Final = {
-    "nr": "#4c956c",
-    "svmr": "#e09f3e",
-    "gpr": "#9e2a2b",
-    "pf": "#6c757d",
-    "default": OURS,
-}
+COLOURS: Final = STRATEGY_COLOURS
+"""The colour of each method, as in every picture of isiw."""
 
 NAMES: Final = {
     "nr": "NR",
@@ -44,9 +41,7 @@ def panels(lines: int, columns: int, width: float = 3.6, height: float = 2.7, **
     """
     figure = Figure(figsize=(width * columns, height * lines), layout="constrained")
     axes = figure.subplots(lines, columns, squeeze=False, **options)
-    for one in axes.flat:
-        one.spines[["top", "right"]].set_visible(False)
-        one.tick_params(labelsize=8)
+    tidied(*axes.flat)
     return figure, axes
 
 
@@ -66,4 +61,3 @@ def beside(
     axes.bar(x - 0.2, theirs, 0.38, color=THEIRS, label="dissertation")
     axes.bar(x + 0.2, ours, 0.38, yerr=error, color=OURS, label="here", error_kw={"lw": 0.8})
     axes.set_xticks(x, labels, fontsize=8)
-    axes.legend(fontsize=7, frameon=False)

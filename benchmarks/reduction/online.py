@@ -17,6 +17,7 @@ from benchmarks.reduction.look import COLOURS, NAMES, panels
 from benchmarks.reduction.sessions import correlation
 from benchmarks.waveform_loop import Pair, by_waveform
 from isiw.design import IMPACT_SPACE
+from isiw.plots.style import explain
 from isiw.subjects.cohorts import cohort
 from isiw.types import FloatArray
 
@@ -132,11 +133,11 @@ def figure(results: list[dict[str, Any]]) -> Figure:
                 result["grid_ms"],
                 result["profile_mv"],
                 color=colour,
-                label=f"{NAMES[result['method']]}, {result['trials']} trials",
+                label=f"Fig. {number}: {NAMES[result['method']]}, {result['trials']} trials",
             )
             one.plot(*zip(*result["told"], strict=True), "o", ms=2.5, color=colour, alpha=0.6)
         one.set(title=f"Fig. {number}: online", xlabel="ISI from the impact [ms]", ylabel="MEP [mV]")
-        one.legend(fontsize=7, frameon=False)
+    explain(picture, ncols=3)
     return picture
 
 

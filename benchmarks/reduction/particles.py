@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 
 from benchmarks.reduction.comparison import PEOPLE_OF_KIM
 from benchmarks.reduction.document import Section, Table
-from benchmarks.reduction.look import COLOURS, OURS, panels
+from benchmarks.reduction.look import COLOURS, panels
 from benchmarks.reduction.readings import BASE, READINGS, Reading
 from benchmarks.reduction.sessions import Session
 from benchmarks.reduction.significance import paired_tests
 from benchmarks.reduction.size import Size
+from isiw.plots.style import FAINT, INK, explain
 
 COUNTS: Final = (10, 20, 30, 40, 50)
 GENERATIONS: Final = 8
@@ -28,7 +29,7 @@ RANGES: Final[dict[str, tuple[Reading, bool]]] = {
 """Without accelerometer; with it, the text's particles cover 500 ms from the impact (4.4.5), which is no narrower a
 range, and its regressions what is left of the 500 ms from the valve command (4.4.7)."""
 
-STYLES: Final = dict(zip(RANGES, (("-", OURS), ("--", COLOURS["gpr"]), (":", COLOURS["nr"])), strict=True))
+STYLES: Final = dict(zip(RANGES, (("-", INK), ("--", FAINT), (":", COLOURS["pf"])), strict=True))
 
 PROSE = """\
 The text: 30–40 particles need 3–4 iterations, 100–150 trials (yet 199 in Fig. 4.24); fewer particles fewer trials,
@@ -92,7 +93,7 @@ def figure(table: pd.DataFrame, spread: pd.DataFrame) -> Figure:
             one.set(title=f"Fig. 4.30: {count} particles", xlabel="iteration", ylabel="variance [ms²]", ylim=(0, None))
     axes[0, 0].set(title="Fig. 4.28a: trials", xlabel="particles", ylim=(0, None))
     axes[0, 1].set(title="Fig. 4.28b: F1 (true window)", xlabel="particles", ylim=(0, 1))
-    axes[0, 1].legend(fontsize=7, frameon=False, loc="lower right")
+    explain(picture, ncols=3)
     return picture
 
 

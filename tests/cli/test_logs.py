@@ -80,6 +80,15 @@ def test_compare_prints_the_windows_and_draws_them(isiw: Command, tmp_path: Path
     assert "--overwrite" in isiw("compare", "first.mcap", "second.mcap", "-o", "c.png").output
 
 
+@pytest.mark.slow
+def test_compare_writes_a_page_where_the_suffix_asks_for_one(isiw: Command, tmp_path: Path) -> None:
+    for number, name in enumerate(("first", "second")):
+        write_log(tmp_path / f"{name}.mcap", gaussian_person(), trials=4, seed=number)
+    result = isiw("compare", "first.mcap", "second.mcap", "-o", "c.html")
+    assert "page: c.html" in result.output
+    assert "the same person: the window moved with" in Path("c.html").read_text()
+
+
 def test_compare_needs_two_sessions(isiw: Command, log: Path) -> None:
     result = isiw("compare", log)
     assert result.exit_code == 1

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord, read_session
@@ -12,10 +13,11 @@ from isiw.log.schema import Estimate
 from isiw.plots.session import save_session_plot, session_figure
 from isiw.session.loop import Session
 from isiw.session.resume import exclude
+from isiw.strategy.catalogue import make_strategy
 from isiw.trials import Measurement
 from isiw.window import Window
 from known import known
-from scripted import ScriptedDevice, scripted_strategy
+from scripted import SPACE, ScriptedDevice, scripted_strategy
 
 
 @pytest.fixture
@@ -28,8 +30,13 @@ def record(tmp_path: Path) -> SessionRecord:
     return read_session(tmp_path / "s.mcap")
 
 
-def labels(axes: Axes) -> set[str]:
-    return {text.get_text() for text in known(axes.get_legend()).get_texts()}
+def labels(figure: Figure) -> set[str]:
+    return {text.get_text() for legend in figure.legends for text in legend.get_texts()}
+
+
+def line(axes: Axes, label: str) -> tuple[list[float], list[float]]:
+    (found,) = [line for line in axes.lines if line.get_label() == label]
+    return np.asarray(found.get_xdata()).tolist(), np.asarray(found.get_ydata()).tolist()
 
 
 @pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
@@ -44,12 +51,12 @@ def test_an_unknown_format_is_refused(record: SessionRecord, tmp_path: Path) -> 
 
 
 def test_the_picture_shows_profile_trials_window_and_truth(record: SessionRecord) -> None:
-    profile, edges, _ = session_figure(record, truth=Window(30, 80)).axes
-    assert labels(profile) == {
-        "window", "90 % interval of its edges", "true window (simulated)", "90 % band", "expected MEP", "trial",
-        "excluded", "mistrial",
+    figure = session_figure(record, truth=Window(30, 80))
+    profile, *_ = figure.axes
+    assert labels(figure) == {
+        "window", "true window (simulated)", "90 % band of the expected MEP", "expected MEP", "trial", "excluded",
+        "mistrial", "start of the window, with 90 % interval", "end of the window, with 90 % interval",
     }  # fmt: skip
-    assert labels(edges) == {"start", "end"}
     assert profile.get_xlim() == (0, 200)
     assert profile.get_xlabel() == "ISI after the valve command [ms]"
     assert "after 6 trials" in profile.get_title(loc="left")
@@ -76,7 +83,38 @@ def test_a_session_without_a_window_is_drawn(record: SessionRecord) -> None:
     none = type(record)(record.path, record.header, tuple(entries), {}, (), True)
     profile = session_figure(none).axes[0]
     assert profile.get_title(loc="left").startswith("No window")
-    assert "window" not in labels(profile)
+    assert "window" not in labels(session_figure(none))
+
+
+def test_the_band_of_the_prediction_is_the_logs_and_wider_than_that_of_the_expectation(tmp_path: Path) -> None:
+    strategy = make_strategy(space=SPACE, seed=1, max_trials=3, particles=200)
+    Session(ScriptedDevice(), strategy, log=tmp_path / "d.mcap").run()
+    record = read_session(tmp_path / "d.mcap")
+    last, profile = record.estimates[-1], session_figure(record).axes[0]
+    drawn = {collection.get_label(): collection for collection in profile.collections}
+    band = drawn["prediction: 90 % of trials lie here"].get_paths()[0].vertices
+    ends_uv = {round(float(uv), 2) for _, uv in np.asarray(band)}
+    assert {round(1e3 * mv, 2) for mv in last.predicted_high_mv} <= ends_uv
+    assert (np.asarray(last.predicted_high_mv) > np.asarray(last.profile_mv)).all()
+    assert (np.asarray(last.predicted_low_mv) < np.asarray(last.profile_mv)).all()
+
+
+def test_mistrials_are_where_they_happened_and_trials_are_counted_as_in_the_log(record: SessionRecord) -> None:
+    profile, edges, chance = session_figure(record).axes
+    (lost,) = [trial for trial in record.table if trial.reason is not None]
+    isis_ms, meps_uv = line(profile, "mistrial")
+    assert isis_ms == [lost.isi_ms]
+    assert meps_uv == pytest.approx([1e3 * known(lost.mep_mv)])
+    assert [lost.index] in [np.asarray(line.get_xdata()).tolist() for line in chance.lines]
+    assert line(edges, "start of the window, with 90 % interval")[0] == [
+        estimate.trial for estimate in record.estimates
+    ]
+
+
+def test_where_nothing_counts_the_panels_say_so(record: SessionRecord) -> None:
+    empty = type(record)(record.path, record.header, (), {}, (), False)
+    said = [[text.get_text() for text in axes.texts] for axes in session_figure(empty).axes]
+    assert said == [["no trial counts"], *[["no estimate that rests on trials"]] * 2]
 
 
 def test_a_session_without_trials_is_drawn(record: SessionRecord, tmp_path: Path) -> None:

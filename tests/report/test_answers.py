@@ -84,7 +84,21 @@ def test_without_a_background_it_is_not_known(record: SessionRecord) -> None:
 
 
 def test_why_it_stopped_is_the_last_decisions_reason(record: SessionRecord) -> None:
-    assert answer(record, "stop")[1:] == ("it ended", "The budget of 4 stimuli is used up.")
+    assert answer(record, "stop")[1:] == ("The budget of 4 stimuli is used up.", "")
+
+
+def test_lost_trials_are_named_as_far_as_they_are_few(record: SessionRecord) -> None:
+    def lost(count: int) -> str:
+        bad = [trial(k, reason=MistrialReason.SATURATION) for k in range(1, count + 1)]
+        return answer(replace(record, history=(trial(0), *bad), delivered=0), "lost").answer
+
+    assert [lost(0), lost(1), lost(2)] == ["none", "1 of 2: trial 1", "2 of 3: trials 1, 2"]
+    assert lost(11) == "11 of 12: trials 1, 2, 3, 4, 5, 6, 7, 8 and 3 more"
+
+
+def test_a_control_trial_from_which_nothing_is_learnt_is_not_lost(record: SessionRecord) -> None:
+    tap = Trial(1, Status.ACCEPTED, None, tap_alone=True, mep_mv=0.01)
+    assert answer(replace(record, history=(trial(0), tap), delivered=0), "lost").answer == "none"
 
 
 def test_a_session_that_broke_off_says_by_what(record: SessionRecord) -> None:
@@ -100,7 +114,7 @@ def test_a_session_that_broke_off_says_by_what(record: SessionRecord) -> None:
 
 def test_nothing_at_all_has_answers_too(record: SessionRecord) -> None:
     assert [said for _, said, _ in answers(replace(record, history=(), delivered=0))] == [
-        "0 of 0 count", "not known", "not known", "before the first estimate",
+        "none", "not known", "not known", "before the first estimate",
     ]  # fmt: skip
 
 

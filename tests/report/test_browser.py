@@ -1,7 +1,12 @@
-"""The page as a browser shows it; skipped where there is no Chromium."""
+"""The pages as a browser shows them; skipped where there is no Chromium.
+
+Pictures of them are kept in the folder that the environment variable ISIW_SCREENSHOTS names; by default it is one of
+pytest's.
+"""
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 from collections.abc import Iterator
@@ -10,9 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 from isiw.log.reader import SessionRecord
+from isiw.priors import Difference
+from isiw.report.compared import save_comparison
 from isiw.report.page import save_report
 from report.sessions import HOSTILE, tapped
 
@@ -55,6 +63,13 @@ def browser() -> Iterator[Any]:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"], timeout=60_000)
         yield browser
         browser.close()
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = Path(os.environ.get("ISIW_SCREENSHOTS") or tmp_path_factory.mktemp("screenshots"))
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 @pytest.fixture(scope="module")
@@ -117,9 +132,23 @@ def test_the_slider_moves_belief_words_and_sweep_by_keyboard(opened: Opened, rec
 def test_what_is_asked_next_is_said_and_marked(opened: Opened, record: SessionRecord) -> None:
     estimate = next(e for e in record.estimates if e.next_isi_ms is not None)
     opened.page.locator(f".choose[data-trial='{estimate.trial}']").click()
-    assert opened.text("#told-next") == f"Asked next: {estimate.next_isi_ms:g} ms."
+    assert opened.text("#told-next") == f"Asked next: {estimate.next_isi_ms:g} ms, where the score is highest."
     marks = opened.drawn("document.getElementById('belief').layout.shapes.filter(s => s.line.dash === 'dash')")
     assert [shape["x0"] for shape in marks] == [estimate.next_isi_ms]
+
+
+def test_the_scores_of_the_acquisition_function_are_drawn_with_what_they_chose(
+    opened: Opened, record: SessionRecord
+) -> None:
+    estimate = next(e for e in record.estimates if e.chosen_by == "acquisition")
+    opened.page.locator(f".choose[data-trial='{estimate.trial}']").click()
+    drawn = "document.getElementById('belief').data.find(trace => trace.name.startsWith('score'))"
+    curve = opened.drawn(drawn)
+    assert curve["x"] == list(estimate.scored_ms)
+    assert curve["y"] == pytest.approx(estimate.scores, abs=0.05)
+    assert curve["x"][curve["y"].index(max(curve["y"]))] == pytest.approx(estimate.next_isi_ms, abs=1)
+    opened.page.locator(f".choose[data-trial='{record.estimates[-1].trial}']").click()
+    assert opened.drawn(f"{drawn} === undefined")
 
 
 def test_a_click_on_a_trial_shows_its_sweep(opened: Opened, record: SessionRecord) -> None:
@@ -193,6 +222,42 @@ def test_paper_has_the_pictures_and_the_tables_but_nothing_to_move(opened: Opene
     opened.page.emulate_media(media="screen")
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_passes_axe_and_its_picture_is_kept(opened: Opened, scheme: Any, pictures: Path) -> None:
+    opened.page.emulate_media(media="screen", color_scheme=scheme)
+    opened.page.wait_for_timeout(200)  # plotly redraws when the scheme changes
+    assert broken_rules(opened.page) == []
+    opened.page.screenshot(path=pictures / f"report-{scheme}.png", full_page=True)
+    opened.page.emulate_media(media="screen", color_scheme="light")
+    assert (pictures / f"report-{scheme}.png").stat().st_size > 50_000
+
+
+def test_a_nameless_button_and_faint_words_would_be_found(browser: Any) -> None:
+    page = browser.new_page()
+    page.set_content("<html lang=en><title>x</title><main><h1>x</h1><button></button><p style='color:#ddd'>faint</p>")
+    assert {rule.split(":")[0] for rule in broken_rules(page)} == {"button-name", "color-contrast"}
+    page.close()
+
+
+def test_sessions_beside_each_other_are_a_page_for_everybody(
+    browser: Any, record: SessionRecord, pictures: Path
+) -> None:
+    difference = Difference(record, record, same_person=True, starts_later=0.97, ends_later=0.6, moved=0.91)
+    page = browser.new_page(viewport=SIZE)
+    opened = Opened(page)
+    page.on("console", lambda message: opened.said.append(message.text))
+    page.on("request", lambda request: opened.asked.append(request.url))
+    page.goto(save_comparison([record, record], [difference], pictures / "compared.html", overwrite=True).as_uri())
+    assert HOSTILE in opened.text("h3 >> nth=0")
+    assert page.locator("main b, main img, script").count() == 0
+    assert page.locator("#windows svg").is_visible()
+    assert "the window moved with probability 0.91" in opened.text(".finding >> nth=0")
+    assert broken_rules(page) == []
+    page.screenshot(path=pictures / "compared.png", full_page=True)
+    assert (opened.said, len(opened.asked)) == ([], 1)
+    page.close()
+
+
 def test_without_javascript_everything_but_the_moving_part_is_read(browser: Any, path: Path) -> None:
     page = browser.new_context(java_script_enabled=False, viewport=SIZE).new_page()
     page.goto(path.as_uri())
@@ -200,6 +265,12 @@ def test_without_javascript_everything_but_the_moving_part_is_read(browser: Any,
     assert not page.locator("#explore").is_visible()
     assert "With JavaScript this page also shows" in page.locator("body").inner_text()
     page.context.close()
+
+
+def broken_rules(page: Page) -> list[str]:
+    """The rules of axe-core that a page breaks, and where."""
+    found = Axe().run(page).response["violations"]
+    return [f"{rule['id']}: {[node['target'] for node in rule['nodes']][:3]}" for rule in found]
 
 
 def contrast(one: str, other: str) -> float:

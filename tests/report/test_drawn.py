@@ -67,8 +67,26 @@ def test_a_belief_that_hardly_a_trial_bears_names_no_window(tmp_path: Path) -> N
     shown = drawn(tapped(tmp_path / "s.mcap", trials=6))["beliefs"]
     assert (shown[0]["found"], shown[0]["window"]) == (TOO_FEW, [])
     last = shown[max(shown)]
-    assert last["found"].startswith("The tap enhances the MEP at ISIs of")
+    assert last["found"].startswith("The tap probably enhances the MEP at ISIs of")
     assert last["found"].split("ISIs of ")[1].startswith(f"{last['window'][0][0]:g}–")
+
+
+def test_scores_and_prediction_are_the_logs_and_old_logs_have_none(record: SessionRecord) -> None:
+    before = drawn(record)["beliefs"][record.estimates[0].trial]
+    assert (before["predictedLow"], before["predictedHigh"]) == ([], [])
+    last = record.estimates[0].model_copy(
+        update={
+            "predicted_low_mv": (0.01,) * len(record.estimates[0].grid_ms),
+            "predicted_high_mv": (0.2,) * len(record.estimates[0].grid_ms),
+            "chosen_by": "acquisition", "scored_ms": (0.0, 100.0), "scores": (math.nan, 0.123456),
+        }
+    )  # fmt: skip
+    shown = drawn(replace(record, history=(last,)))
+    belief = shown["beliefs"][last.trial]
+    assert (set(belief["predictedLow"]), set(belief["predictedHigh"])) == ({10.0}, {200.0})
+    assert (belief["scoredMs"], belief["scores"], belief["chosenBy"]) == ([0, 100], [None, 0.1235], "acquisition")
+    assert shown["scored"]
+    assert not drawn(replace(record, history=(last.model_copy(update={"scores": ()}),)))["scored"]
 
 
 def test_a_trial_without_waveforms_has_none(record: SessionRecord) -> None:

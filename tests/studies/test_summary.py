@@ -19,6 +19,7 @@ def rows(strategy: str, cohort: str, f1s: Sequence[float], **columns: object) ->
         "reported_window": [True, True, False][: len(f1s)],
         "delivered": [10, 8, 9][: len(f1s)],
         "stop_trial": [math.nan, 8.0, 9.0][: len(f1s)],
+        "stop_f1": [math.nan, 0.7, 0.8][: len(f1s)],
         "converged": [0.0, 1.0, 1.0][: len(f1s)],
         "ask_ms": [1.0, 2.0, 30.0][: len(f1s)],
         "tell_ms": 4.0,
@@ -38,7 +39,7 @@ def test_each_column_is_the_mean_over_people_that_it_says() -> None:
     assert row["f1_se"] == pytest.approx(math.sqrt(0.21 / 3))
     assert (row["start_coverage"], row["end_coverage"]) == (0.5, 1.0)
     assert row["called_none"] == pytest.approx(1 / 3)
-    assert (row["delivered"], row["stop_trial"]) == (9.0, 8.5)
+    assert (row["delivered"], row["stop_trial"], row["stop_f1"]) == (9.0, 8.5, 0.75)
     assert row["converged"] == pytest.approx(2 / 3)
     assert (row["ask_ms"], row["tell_ms"]) == (2.0, 4.0)
     assert row["failed"] == 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import Any
 
@@ -23,6 +23,7 @@ from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
 from isiw.testing import check_acquisition, check_model, check_strategy
 from isiw.testing.requirements import Trials, trials_that_break_things, usual_trials
+from isiw.types import FloatArray
 from isiw.window import Window, WindowEstimate
 
 FEW: dict[str, Any] = {"particles": 100}
@@ -99,6 +100,13 @@ def test_an_acquisition_function_that_cannot_work_with_the_model_is_refused_with
         make_strategy(acquisition="own")
 
 
+class Backwards(ParticlePosterior):
+    """Its band of nine of ten MEPs is the narrower one."""
+
+    def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
+        return super().prediction_mv(1.4 - level, person)
+
+
 @dataclass(frozen=True)
 class Broken:
     """The particle model with one promise broken."""
@@ -107,7 +115,9 @@ class Broken:
     model: ParticleModel = field(default_factory=lambda: ParticleModel(particles=50))
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> Posterior:
-        return self.model.begin(space, seed, people)
+        before = self.model.begin(space, seed, people)
+        backwards = self.fault == "predicts backwards"
+        return Backwards(**{f.name: getattr(before, f.name) for f in fields(before)}) if backwards else before
 
     def update(self, posterior: Any, observation: Observation) -> Posterior:
         after = self.model.update(posterior, observation)
@@ -118,6 +128,8 @@ class Broken:
                 return replace(after, log_weights=after.log_weights + 20 * torch.rand(()) * after.log_likelihood)
             case "forgets the first":
                 return after if after.trials > 1 else posterior
+            case "predicts backwards":
+                return after
         return self.model.update(posterior, replace(observation, mep_mv=observation.mep_mv * after.trials**2))
 
 
@@ -128,6 +140,7 @@ class Broken:
         ("depends on chance", "same seed and trials"),
         ("forgets the first", "one trial more"),
         pytest.param("weighs by the order", "order", marks=pytest.mark.slow),
+        pytest.param("predicts backwards", "holds those of smaller probability", marks=pytest.mark.slow),
     ],
 )
 def test_the_suite_finds_a_broken_model(fault: str, promise: str) -> None:

@@ -43,8 +43,10 @@ def export(
 @app.command()
 def compare(
     logs: Annotated[list[Path], typer.Argument(help="Logs; each is compared to the first.", **NO_DEFAULT)],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
-    overwrite: Annotated[bool, typer.Option(help="Replace a picture that is there; a log never is.")] = False,  # noqa: FBT002 - a flag
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Page (.html) or picture to write.", **NO_DEFAULT)
+    ] = None,
+    overwrite: Annotated[bool, typer.Option(help="Replace a file that is there; a log never is.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Compare the windows of sessions: of one person on several days, or of several people."""
     with errors_reported():
@@ -53,7 +55,9 @@ def compare(
         show(isiw.report.comparison_table(records))
         for difference in differences:
             show(isiw.report.comparison_sentence(difference), style="bold")
-        if output is not None:
+        if output is not None and output.suffix.lower() == ".html":
+            show(f"page: {isiw.report.save_comparison(records, differences, output, overwrite=overwrite)}")
+        elif output is not None:
             show(f"picture: {isiw.plots.save_comparison_plot(records, output, overwrite=overwrite)}")
         losses = [f"{record.path.name}: {loss}" for record in records for loss in record.losses]
         for loss in losses:

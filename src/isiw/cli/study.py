@@ -74,15 +74,17 @@ def replay(
 
 @app.command()
 def summary(folder: Folder) -> None:
-    """Print the table of a study, and write it and its figure into the folder."""
+    """Print the table of a study, and write it and its pictures into the folder."""
     with errors_reported():
         store = isiw.studies.open_store(folder)
         table = isiw.studies.summarise(store.rows(), store.errors())
         show(table.to_string(index=False, float_format=lambda value: f"{value:.3f}"))
         table.to_csv(folder / "summary.csv", index=False)
-        picture = isiw.plots.save_study_plot(table, folder / "summary.png", overwrite=True)
         _say_what_is_there(store)
-        show(f"table:   {folder / 'summary.csv'}\npicture: {picture}")
+        show(f"table:   {folder / 'summary.csv'}")
+        for name in isiw.plots.STUDY_PICTURES:
+            target = folder / f"summary_{name}.svg"
+            show(f"picture: {isiw.plots.save_study_plot(table, target, picture=name, overwrite=True)}")
 
 
 @contextmanager

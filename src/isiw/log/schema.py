@@ -175,7 +175,9 @@ class Estimate(_Record):
     `start_beyond`, `end_beyond` and `split` are probabilities given a window: that an edge lies beyond the range, and
     that there is more than one segment. `hypotheses` and `unusual` are probabilities by name, `best_isi_ms` is the
     median and the ends of the 90 % interval; `excluded_mv` and `excluded_pct_rmt` are the largest enhancement that is
-    excluded with 90 % probability.
+    excluded with 90 % probability. Nine of ten next MEPs lie between `predicted_low_mv` and `predicted_high_mv`, at the
+    ISIs of the profile. `chosen_by` says what chose the next ISI (`isiw.strategy.choosing.ChosenBy`), and `scores` are
+    those of the acquisition function at `scored_ms`; both are empty where nothing is asked next.
     """
 
     trial: TrialNumber
@@ -200,6 +202,11 @@ class Estimate(_Record):
     profile_mv: Numbers = ()
     band_low_mv: Numbers = ()
     band_high_mv: Numbers = ()
+    predicted_low_mv: Numbers = ()
+    predicted_high_mv: Numbers = ()
+    chosen_by: str = ""
+    scored_ms: tuple[float, ...] = ()
+    scores: Numbers = ()
     next_isi_ms: float | None = None
     stop: bool = False
     reason: str = ""
@@ -259,7 +266,7 @@ class Estimate(_Record):
         return StopDecision(self.stop, self.reason)
 
 
-def _profile(estimate: WindowEstimate) -> Mapping[str, tuple[float, ...]]:
+def _profile(estimate: WindowEstimate) -> Mapping[str, Any]:
     band = None if estimate.grid_ms is None else estimate.profile(estimate.grid_ms)
     if band is None or estimate.grid_ms is None:
         return {}

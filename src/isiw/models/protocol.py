@@ -27,6 +27,7 @@ __all__ = [
     "HasEvidence",
     "Observation",
     "Posterior",
+    "PredictsMeps",
     "PredictsOutcomes",
     "ProposesIsi",
     "ReportsTrouble",
@@ -112,6 +113,22 @@ class PredictsOutcomes(Protocol):
 
         Returns:
             Given each posterior sample, shape (b, s, t, y), summing to 1 over y.
+        """
+
+
+@runtime_checkable
+class PredictsMeps(Protocol):
+    """Capability: between which amplitudes the next MEP lies."""
+
+    def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
+        """The band that holds the next MEP with this probability [mV], at the ISIs of the estimate's profile.
+
+        Args:
+            level: the probability.
+            person: which person.
+
+        Returns:
+            Its low and its high end, each of shape (t,).
         """
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
-from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, save_figure, tidied
+from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, save_figure, tidied
 from isiw.text import one_line
 
 __all__ = ["comparison_figure", "save_comparison_plot"]
@@ -36,11 +35,12 @@ def save_comparison_plot(records: Sequence[SessionRecord], path: str | Path, *, 
     return save_figure(comparison_figure(records), path, overwrite=overwrite)
 
 
-def comparison_figure(records: Sequence[SessionRecord]) -> Figure:
+def comparison_figure(records: Sequence[SessionRecord], names: Sequence[str] | None = None) -> Figure:
     """Sessions below each other as a figure.
 
     Args:
         records: the sessions.
+        names: what to call them; by default person and date.
 
     Raises:
         InvalidValueError: no sessions, or ISIs that count from different events.
@@ -53,12 +53,12 @@ def comparison_figure(records: Sequence[SessionRecord]) -> Figure:
     tidied(axes)
     for line, record in enumerate(records):
         _draw(axes, line, record)
-    axes.set_yticks(range(len(records)), [_name(record) for record in records])
+    axes.set_yticks(range(len(records)), names or [_name(record) for record in records])
     axes.set_ylim(len(records) - 0.4, -0.6)
     spaces = [record.header.space for record in records]
     axes.set_xlim(min(space.low_ms for space in spaces), max(space.high_ms for space in spaces))
     axes.set_xlabel(_AXIS_NAME[spaces[0].reference], fontsize=9)
-    _explain(figure, axes)
+    explain(figure, ncols=3, above=True)
     return figure
 
 
@@ -71,12 +71,9 @@ def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
     for start_ms, end_ms in last.window.segments:
         axes.barh(line, end_ms - start_ms, left=start_ms, height=0.5, color=BLUE, alpha=0.3, label="window")
     space = record.header.space
-    for edge, colour in (("start", GREEN), ("end", ORANGE)):
-        ends = (getattr(last, f"{edge}_low_ms"), getattr(last, f"{edge}_high_ms"))
-        if None not in ends:
-            low_ms, high_ms = np.clip(ends, space.low_ms, space.high_ms)
-            label = f"90 % interval of its {edge}"
-            axes.plot((low_ms, high_ms), (line, line), color=colour, lw=4, solid_capstyle="butt", label=label)
+    for edge, colour, pair in edge_intervals(last, space.low_ms, space.high_ms):
+        label = f"90 % interval of its {edge}"
+        axes.plot(pair, (line, line), color=colour, lw=4, solid_capstyle="butt", label=label)
     axes.annotate(
         _chance(last), (1.01, line), xycoords=("axes fraction", "data"), va="center", fontsize=8, color=INK,
         annotation_clip=False,
@@ -91,11 +88,3 @@ def _name(record: SessionRecord) -> str:
     code = one_line(record.header.subject) or "unnamed"
     code = code if len(code) <= _LONGEST_CODE else f"{code[: _LONGEST_CODE - 1]}…"
     return f"{code}, {record.header.created[:10]}".replace("$", r"\$")
-
-
-def _explain(figure: Figure, axes: Axes) -> None:
-    """A legend that has each thing once."""
-    handles, labels = axes.get_legend_handles_labels()
-    once = dict(zip(labels, handles, strict=True))
-    if once:
-        figure.legend(once.values(), once.keys(), loc="outside upper left", ncols=3, fontsize=7.5, frameon=False)

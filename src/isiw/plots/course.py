@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from isiw.log.reader import SessionRecord
-from isiw.plots.style import BLUE, FAINT, ORANGE, RED, tidied
+from isiw.plots.style import BLUE, FAINT, ORANGE, RED, TRIAL_AXIS, saying, tidied
 from isiw.trials import Trial
 
 __all__ = ["course_figure"]
@@ -36,7 +36,7 @@ def course_figure(record: SessionRecord) -> Figure:
     _draw(background, record.table.trials, lambda trial: trial.background_rms_uv)
     background.set_ylim(bottom=0)
     background.set_ylabel("background EMG [µV RMS]", fontsize=9)
-    background.set_xlabel("trial", fontsize=9)
+    background.set_xlabel(TRIAL_AXIS, fontsize=9)
     background.xaxis.set_major_locator(MaxNLocator(integer=True))
     for axes in (timing, background):
         axes.legend(fontsize=7.5, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -50,4 +50,4 @@ def _draw(axes: Axes, trials: Sequence[Trial], measured: Callable[[Trial], float
         if points:
             axes.plot(*zip(*points, strict=True), mark, ms=4 if mark == "o" else 5.5, color=colour, label=name)
     if not any(measured(trial) is not None for trial in trials):
-        axes.text(0.5, 0.5, "not recorded", transform=axes.transAxes, ha="center", color=FAINT)
+        saying(axes, "not recorded")

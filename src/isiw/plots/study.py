@@ -1,63 +1,163 @@
-"""The picture of a study: F1 by trial, a panel a cohort."""
+"""The pictures of a study: F1 by trial, stimuli against F1, coverage and latency, each with a panel a cohort."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import Final, Literal, TypeAlias
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from isiw.plots.style import BLUE, GREEN, INK, ORANGE, RED, save_figure, tidied
+from isiw.checks import choice
+from isiw.plots.style import FAINT, INK, explain, save_figure, saying, strategy_colours, tidied
 
-__all__ = ["save_study_plot", "study_figure"]
+__all__ = ["STUDY_PICTURES", "StudyPicture", "draw_curve", "save_study_plot", "study_figure"]
 
-_COLOURS = (BLUE, ORANGE, GREEN, RED, INK, "#cc79a7", "#56b4e9", "#b8a000")
+StudyPicture: TypeAlias = Literal["f1", "frontier", "coverage", "latency"]
+
 _MARKERS = "osD^vPX"
 _COLUMNS = 4
+_SE_OF_BAND = 1.96
+_DASHED = (0, (4, 2))
 
 
-def save_study_plot(table: pd.DataFrame, path: str | Path, *, overwrite: bool = False) -> Path:
+def save_study_plot(
+    table: pd.DataFrame, path: str | Path, *, picture: StudyPicture = "f1", overwrite: bool = False
+) -> Path:
     """Draw a study into a file; its suffix chooses the format.
 
     Args:
         table: as `isiw.studies.summarise` returns it.
         path: where to.
+        picture: one of `STUDY_PICTURES`.
         overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
+        InvalidValueError: no such picture, a format that matplotlib does not know, or a file that is not to be
+            replaced.
     """
-    return save_figure(study_figure(table), path, overwrite=overwrite)
+    return save_figure(study_figure(table, picture), path, overwrite=overwrite)
 
 
-def study_figure(table: pd.DataFrame) -> Figure:
-    """A study as a figure: mean F1 and its standard error by trial, a panel a cohort."""
+def study_figure(table: pd.DataFrame, picture: StudyPicture = "f1") -> Figure:
+    """A study as a figure, a panel a cohort.
+
+    Args:
+        table: as `isiw.studies.summarise` returns it.
+        picture: one of `STUDY_PICTURES`.
+
+    Raises:
+        InvalidValueError: no such picture.
+    """
+    draw_panel = STUDY_PICTURES[choice("the picture of a study", picture, STUDY_PICTURES)]
     played = table[table["people"] > 0]
-    cohorts, strategies = list(played["cohort"].unique()), sorted(played["strategy"].unique())
+    cohorts, colours = list(played["cohort"].unique()), strategy_colours(sorted(played["strategy"].unique()))
     columns = min(_COLUMNS, max(1, len(cohorts)))
     lines = max(1, -(-len(cohorts) // columns))
-    figure = Figure(figsize=(0.8 + 3.2 * columns, 0.6 + 2.7 * lines), layout="constrained")
+    figure = Figure(figsize=(0.8 + 3.2 * columns, 1.2 + 2.7 * lines), layout="constrained")
     panels = list(figure.subplots(lines, columns, squeeze=False, sharey=True).flat)
     for axes, cohort in zip(panels, cohorts, strict=False):
-        _draw_cohort(axes, played[played["cohort"] == cohort], strategies)
+        tidied(axes)
+        of_cohort = played[played["cohort"] == cohort].sort_values("trial")
+        draw_panel(axes, {name: of_cohort[of_cohort["strategy"] == name] for name in colours}, colours)
         axes.set_title(cohort, fontsize=10, loc="left", color=INK)
+        axes.set_xlim(left=0)
     for axes in panels[len(cohorts) :]:
         axes.set_visible(False)
-    if strategies:
-        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside right upper", fontsize=8, frameon=False)
+    explain(figure, ncols=2 * columns)
     return figure
 
 
-def _draw_cohort(axes: Axes, table: pd.DataFrame, strategies: list[str]) -> None:
-    for number, strategy in enumerate(strategies):
-        curve = table[table["strategy"] == strategy]
-        colour, marker = _COLOURS[number % len(_COLOURS)], _MARKERS[number % len(_MARKERS)]
-        axes.errorbar(
-            curve["trial"], curve["f1"], curve["f1_se"], label=strategy, color=colour, marker=marker, ms=4, lw=1.5
-        )
-    tidied(axes)
-    axes.set_xlim(left=0)
+_Curves: TypeAlias = Mapping[str, pd.DataFrame]
+_Colours: TypeAlias = Mapping[str, str]
+
+
+def _draw_f1(axes: Axes, curves: _Curves, colours: _Colours) -> None:
+    markers = itertools.cycle(_MARKERS)
+    for name, curve in curves.items():
+        draw_curve(axes, curve, name, colours[name], next(markers))
     axes.set_ylim(0, 1)
     axes.set_xlabel("trials", fontsize=9)
-    axes.set_ylabel("mean F1 ± SE", fontsize=9)
+    axes.set_ylabel("mean F1, 95 % band", fontsize=9)
+
+
+def draw_curve(axes: Axes, curve: pd.DataFrame, name: str, colour: str, marker: str = "o") -> None:
+    """The mean F1 of a strategy by trial with its 95 % band, and a dotted line at what it has before any trial.
+
+    A method without a belief is drawn from where it reports a window for anybody.
+
+    Args:
+        axes: where to.
+        curve: the rows of one strategy and cohort, trials ascending: trial, f1, f1_se, and where known called_none and
+            start_coverage.
+        name: for the legend.
+        colour: of the strategy.
+        marker: of the marked trials.
+    """
+    curve = _from_first_estimate(curve)
+    reach = _SE_OF_BAND * curve["f1_se"].fillna(0.0)
+    axes.fill_between(curve["trial"], curve["f1"] - reach, curve["f1"] + reach, color=colour, alpha=0.15, lw=0)
+    axes.plot(curve["trial"], curve["f1"], color=colour, marker=marker, ms=4, lw=1.5, label=name)
+    for at_start in curve.loc[curve["trial"] == 0, "f1"]:
+        axes.axhline(at_start, color=colour, lw=0.8, ls=":")
+
+
+def _from_first_estimate(curve: pd.DataFrame) -> pd.DataFrame:
+    if "called_none" not in curve or curve["start_coverage"].notna().any():
+        return curve
+    found = curve["called_none"] < 1.0
+    return curve[found.cummax()] if found.any() else curve
+
+
+def _draw_frontier(axes: Axes, curves: _Curves, colours: _Colours) -> None:
+    """How many stimuli an F1 takes that is kept from then on, and what each strategy has when its rule stops it."""
+    for name, whole in curves.items():
+        curve = _from_first_estimate(whole)
+        kept = np.minimum.accumulate(curve["f1"].to_numpy()[::-1])[::-1]
+        axes.step(curve["delivered"], kept, where="post", color=colours[name], lw=1.5, label=name)
+        last = curve.tail(1)
+        axes.plot(last["stop_trial"], last["stop_f1"], "o", ms=6, color=colours[name], mec=INK, clip_on=False)
+    axes.plot([], [], "o", ms=6, color="none", mec=INK, label="where its rule stops it, on average")
+    axes.set_ylim(0, 1)
+    axes.set_xlabel("stimuli delivered", fontsize=9)
+    axes.set_ylabel("mean F1 from there on", fontsize=9)
+
+
+def _draw_coverage(axes: Axes, curves: _Curves, colours: _Colours) -> None:
+    axes.axhline(0.9, color=FAINT, lw=1.2, label="what 90 % intervals should have")
+    if not any(curve["start_coverage"].notna().any() for curve in curves.values()):
+        saying(axes, "no true edges, or no intervals")
+    _draw_pair(axes, curves, colours, {"start_coverage": "start", "end_coverage": "end"})
+    axes.set_ylim(0, 1.02)
+    axes.set_xlabel("trials", fontsize=9)
+    axes.set_ylabel("share of true edges inside", fontsize=9)
+
+
+def _draw_latency(axes: Axes, curves: _Curves, colours: _Colours) -> None:
+    _draw_pair(axes, curves, colours, {"ask_ms": "ask", "tell_ms": "tell"})
+    axes.set_yscale("log")
+    axes.set_xlabel("trials", fontsize=9)
+    axes.set_ylabel("median time [ms]", fontsize=9)
+
+
+def _draw_pair(axes: Axes, curves: _Curves, colours: _Colours, columns: Mapping[str, str]) -> None:
+    """Two columns of each strategy, the second dashed; where a method has neither, nothing."""
+    for (column, meaning), style in zip(columns.items(), ("-", _DASHED), strict=True):
+        axes.plot([], [], color=INK, ls=style, lw=1.5, label=meaning)
+        for name, curve in curves.items():
+            known = curve[curve[column].notna()]
+            axes.plot(known["trial"], known[column], color=colours[name], ls=style, lw=1.5)
+    for name, curve in curves.items():
+        if curve[list(columns)].notna().any(axis=None):
+            axes.plot([], [], color=colours[name], lw=4, label=name)
+
+
+STUDY_PICTURES: Final[Mapping[StudyPicture, Callable[[Axes, _Curves, _Colours], None]]] = MappingProxyType(
+    {"f1": _draw_f1, "frontier": _draw_frontier, "coverage": _draw_coverage, "latency": _draw_latency}
+)
+"""The pictures of a study by name, and what draws a panel of each."""

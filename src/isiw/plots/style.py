@@ -6,18 +6,89 @@ Everything is drawn with matplotlib's object interface, so no display is needed 
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
+from typing import Final, Literal
 
+import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
 from isiw.log.outputs import write_output
+from isiw.log.schema import Estimate
 
-__all__ = ["BLUE", "FAINT", "GREEN", "INK", "ORANGE", "RED", "save_figure", "tidied"]
+__all__ = [
+    "BLUE",
+    "EDGES",
+    "FAINT",
+    "GREEN",
+    "INK",
+    "ORANGE",
+    "RED",
+    "STRATEGY_COLOURS",
+    "TRIAL_AXIS",
+    "edge_intervals",
+    "explain",
+    "save_figure",
+    "saying",
+    "strategy_colours",
+    "tidied",
+]
 
 INK, FAINT, BLUE, ORANGE, GREEN, RED = "#222222", "#8a8a8a", "#0072b2", "#e69f00", "#009e73", "#d55e00"
-"""Colours that remain distinct for colour-blind readers (Okabe and Ito)."""
+_PINK, _SKY, _OLIVE, _BROWN = "#cc79a7", "#56b4e9", "#8f8a00", "#7a4a1f"
+"""Colours that remain distinct for colour-blind readers; all but the last two are those of Okabe and Ito."""
+
+STRATEGY_COLOURS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "default": BLUE,
+        "oracle": INK,
+        "gpr": ORANGE,
+        "nr": GREEN,
+        "svmr": RED,
+        "pf": _PINK,
+        "particles-mi": _SKY,
+        "incremental": FAINT,
+        "even": _OLIVE,
+        "random": _BROWN,
+    }
+)
+"""The colour that a strategy has in every picture."""
+
+EDGES: Final[Mapping[str, str]] = MappingProxyType({"start": GREEN, "end": ORANGE})
+"""The colours of a window's edges."""
+
+TRIAL_AXIS: Final = "trial (from 0, as in the log)"
+
+
+def strategy_colours(names: Sequence[str]) -> dict[str, str]:
+    """A colour for each strategy: its own where it has one, otherwise one that no other of them has.
+
+    Args:
+        names: the strategies in one picture; beyond ten, colours come again.
+    """
+    free = [colour for name, colour in STRATEGY_COLOURS.items() if name not in names] or list(STRATEGY_COLOURS.values())
+    others = [name for name in names if name not in STRATEGY_COLOURS]
+    given = {name: free[number % len(free)] for number, name in enumerate(others)}
+    return {name: STRATEGY_COLOURS.get(name) or given[name] for name in names}
+
+
+def edge_intervals(estimate: Estimate, low_ms: float, high_ms: float) -> list[tuple[str, str, tuple[float, float]]]:
+    """The 90 % intervals of a window's edges, clipped to a range: name, colour and ends [ms] of each that is known.
+
+    Args:
+        estimate: what is believed.
+        low_ms: where the range begins [ms].
+        high_ms: where it ends [ms].
+    """
+    ends = {name: (getattr(estimate, f"{name}_low_ms"), getattr(estimate, f"{name}_high_ms")) for name in EDGES}
+    return [
+        (name, EDGES[name], (min(max(low, low_ms), high_ms), min(max(high, low_ms), high_ms)))
+        for name, (low, high) in ends.items()
+        if low is not None and high is not None
+    ]
 
 
 def tidied(*panels: Axes) -> None:
@@ -25,6 +96,33 @@ def tidied(*panels: Axes) -> None:
     for axes in panels:
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(labelsize=8, color=FAINT)
+
+
+def explain(figure: Figure, ncols: int, *, above: bool = False) -> None:
+    """Give a figure one legend, outside its panels, that has each label once; none where nothing has a label.
+
+    Args:
+        figure: the figure.
+        ncols: how many labels stand beside each other.
+        above: whether it stands above the panels, not below.
+    """
+    labelled = [axes.get_legend_handles_labels() for axes in figure.axes]
+    once = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
+    if once:
+        loc: Literal["outside upper left", "outside lower center"] = (
+            "outside upper left" if above else "outside lower center"
+        )
+        figure.legend(list(once.values()), list(once), loc=loc, ncols=ncols, fontsize=7.5, frameon=False)
+
+
+def saying(axes: Axes, text: str) -> None:
+    """Say in the middle of a panel why nothing is drawn there.
+
+    Args:
+        axes: the panel.
+        text: what to say.
+    """
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=9, color=FAINT)
 
 
 def save_figure(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -44,5 +142,6 @@ def save_figure(figure: Figure, path: str | Path, *, overwrite: bool = False) ->
     if suffix not in known:
         raise InvalidValueError("the picture's format is unknown", got=target.name, expected=", ".join(sorted(known)))
     picture = io.BytesIO()
-    figure.savefig(picture, dpi=200, format=suffix)
+    with mpl.rc_context({"svg.hashsalt": "isiw"}):  # so that the same picture is the same file
+        figure.savefig(picture, dpi=200, format=suffix, metadata={"Date": None} if suffix == "svg" else None)
     return write_output(target, picture.getvalue(), overwrite=overwrite)

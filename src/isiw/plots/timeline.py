@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import statistics
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
-from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, tidied
+from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, tidied
 
 __all__ = ["timeline_figure"]
 
@@ -25,14 +24,14 @@ def timeline_figure(record: SessionRecord) -> Figure:
         record: the session.
     """
     space = record.header.space
-    figure = Figure(figsize=(7.2, 1.9), layout="constrained")
+    figure = Figure(figsize=(7.2, 2.2), layout="constrained")
     axes = figure.subplots()
     tidied(axes)
     axes.spines["left"].set_visible(False)
     axes.set_yticks([])
     events = {_ORIGIN[space.reference]: 0.0} | _other_event(record)
     for name, place_ms in events.items():
-        axes.axvline(place_ms, ymax=0.72, color=ORANGE, lw=1.6)
+        axes.axvline(place_ms, ymax=0.72, color=INK, lw=1.6)
         axes.text(place_ms, 0.76, name, ha="center", va="bottom", fontsize=8, color=INK)
     if record.estimates and record.rests_on_data:
         _draw_window(axes, record.estimates[-1], (space.low_ms, space.high_ms))
@@ -44,7 +43,7 @@ def timeline_figure(record: SessionRecord) -> Figure:
     axes.set_xlim(low - margin, high + margin)
     axes.set_ylim(0, 1)
     axes.set_xlabel(_AXIS[space.reference], fontsize=9)
-    figure.legend(loc="outside lower left", ncols=4, fontsize=7.5, frameon=False)
+    explain(figure, ncols=3)
     return figure
 
 
@@ -63,13 +62,11 @@ def _draw_window(axes: Axes, estimate: Estimate, span_ms: tuple[float, float]) -
     segments = estimate.window.segments if estimate.window else ()
     for number, (start, end) in enumerate(segments):
         axes.axvspan(start, end, ymin=0.1, ymax=0.62, color=BLUE, alpha=0.3, lw=0, label=None if number else "window")
-    pairs = ((estimate.start_low_ms, estimate.start_high_ms), (estimate.end_low_ms, estimate.end_high_ms))
-    for number, pair in enumerate(pairs if segments else ()):
-        if None not in pair:
-            low, high = np.clip(np.asarray(pair, dtype=np.float64), *span_ms)
-            label = None if number else "90 % interval of its edges"
-            axes.plot((low, high), (0.36, 0.36), color=BLUE, lw=5, solid_capstyle="butt", label=label)
+    for height, (name, colour, pair) in zip((0.47, 0.34), edge_intervals(estimate, *span_ms), strict=False):
+        if segments:
+            label = f"90 % interval of its {name}"
+            axes.plot(pair, (height, height), color=colour, lw=5, solid_capstyle="butt", label=label)
     if segments and estimate.best_isi_ms:
         best, low, high = estimate.best_isi_ms
-        axes.plot((low, high), (0.2, 0.2), color=GREEN, lw=1.5)
-        axes.plot(best, 0.2, "D", ms=5, color=GREEN, label="best ISI, 90 % interval")
+        axes.plot((low, high), (0.2, 0.2), color=INK, lw=1.5)
+        axes.plot(best, 0.2, "D", ms=5, color=INK, label="best ISI, 90 % interval")

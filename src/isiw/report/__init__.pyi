@@ -1,3 +1,5 @@
+from .compared import comparison_page as comparison_page
+from .compared import save_comparison as save_comparison
 from .comparison import comparison_sentence as comparison_sentence
 from .comparison import comparison_table as comparison_table
 from .facts import first_facts as first_facts

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate, Event, EventKind
+from isiw.report.tables import lost_rows
 from isiw.report.words import counts_sentence
 from isiw.trials import MistrialReason
 
@@ -17,6 +18,9 @@ __all__ = ["Answer", "answers"]
 _OF_TIMING: Final = frozenset(
     {MistrialReason.NO_IMPACT, MistrialReason.NO_PULSE, MistrialReason.TMS_BEFORE_IMPACT, MistrialReason.ISI_OFF}
 )
+MOST_NAMED: Final = 8
+"""Lost trials that are named one by one."""
+
 _ENDING: Final[frozenset[EventKind]] = frozenset({"limit", "fault", "pause", "doubt"})
 
 
@@ -38,9 +42,10 @@ def answers(record: SessionRecord) -> list[Answer]:
 
 
 def _lost(record: SessionRecord) -> Answer:
-    given = len(record.table) + len(record.unknown)
-    counting = len(record.table.told)
-    return Answer("Which trials were lost, and why?", f"{counting} of {given} count", counts_sentence(record))
+    given, lost = len(record.table) + len(record.unknown), [str(number) for number, *_ in lost_rows(record)]
+    named = ", ".join(lost[:MOST_NAMED]) + (f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else "")
+    answer = f"{len(lost)} of {given}: {'trial' if len(lost) == 1 else 'trials'} {named}" if lost else "none"
+    return Answer("Which trials were lost, and why?", answer, counts_sentence(record))
 
 
 def _timing(record: SessionRecord) -> Answer:
@@ -101,7 +106,7 @@ def _stopped(record: SessionRecord) -> Answer:
     if decision is None:
         return Answer(question, "before the first estimate", ending)
     if decision.stop:
-        return Answer(question, "it ended", f"{decision.reason} {ending}".strip())
+        return Answer(question, decision.reason or "it ended", ending)
     answer = "it has not stopped" if not ending else "it was interrupted"
     return Answer(question, answer, f"{ending} {decision.reason}".strip())
 

@@ -10,9 +10,10 @@ from isiw.log.schema import Estimate
 from isiw.priors.differing import Difference
 from isiw.text import one_line
 
-__all__ = ["comparison_sentence", "comparison_table"]
+__all__ = ["HEADINGS", "comparison_rows", "comparison_sentence", "comparison_table"]
 
-_HEADINGS = ("session", "subject", "begun", "told", "P(window)", "window", "start", "end")
+HEADINGS = ("session", "subject", "begun", "told", "P(window)", "window", "start", "end")
+"""What the rows of the table hold."""
 
 
 def comparison_table(records: Sequence[SessionRecord]) -> str:
@@ -21,9 +22,18 @@ def comparison_table(records: Sequence[SessionRecord]) -> str:
     Args:
         records: the sessions.
     """
-    rows = [_HEADINGS, *(_row(number, record) for number, record in enumerate(records, start=1))]
+    rows = [HEADINGS, *comparison_rows(records)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
+
+
+def comparison_rows(records: Sequence[SessionRecord]) -> list[tuple[str, ...]]:
+    """The cells of that table, a row a session; empty where nothing is known.
+
+    Args:
+        records: the sessions.
+    """
+    return [_row(number, record) for number, record in enumerate(records, start=1)]
 
 
 def _row(number: int, record: SessionRecord) -> tuple[str, ...]:

@@ -45,6 +45,7 @@ def drawn(record: SessionRecord) -> dict[str, Any]:
         "range": [header.space.low_ms, header.space.high_ms],
         "mepWindow": list(header.signals.mep_window_ms),
         "acquisition": plain(str(header.strategy.settings.get("acquisition", ""))),
+        "scored": any(estimate.scores for estimate in record.estimates),
         "trials": [_trial(record, trial) for trial in record.table],
         "beliefs": beliefs,
         "fallbacks": {e.trial: plain(e.text) for e in record.events if e.kind == "fallback" and e.trial is not None},
@@ -74,13 +75,22 @@ def _belief(record: SessionRecord, estimate: Estimate) -> dict[str, Any]:
     window = estimate.window if pairs >= ENOUGH_PAIRS else None
     found = finding_sentence(estimate, record.header.space) if pairs >= ENOUGH_PAIRS else TOO_FEW
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
-    bands = {"profile": estimate.profile_mv, "low": estimate.band_low_mv, "high": estimate.band_high_mv}
+    bands = {
+        "profile": estimate.profile_mv,
+        "low": estimate.band_low_mv,
+        "high": estimate.band_high_mv,
+        "predictedLow": estimate.predicted_low_mv,
+        "predictedHigh": estimate.predicted_high_mv,
+    }
     return {
         "found": found,
         "window": [list(segment) for segment in window.segments] if window else [],
         "start": [_edge(edge) for edge in (estimate.start_low_ms, estimate.start_high_ms)],
         "end": [_edge(edge) for edge in (estimate.end_low_ms, estimate.end_high_ms)],
         "nextMs": _number(estimate.next_isi_ms),
+        "chosenBy": plain(estimate.chosen_by),
+        "scoredMs": [_number(isi_ms) for isi_ms in estimate.scored_ms],
+        "scores": _rounded(np.asarray(estimate.scores), FINE),
         "stop": estimate.stop,
         "reason": plain(estimate.reason),
         "isiMs": [_number(isi_ms) for isi_ms in estimate.grid_ms[kept]],

@@ -6,15 +6,10 @@ browser, from the numbers of `isiw.report.drawn`.
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import importlib
 from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-from isiw.errors import ConfigError
 from isiw.log.outputs import write_output
 from isiw.log.reader import SessionRecord
 from isiw.plots.course import course_figure
@@ -25,14 +20,12 @@ from isiw.plots.timeline import timeline_figure
 from isiw.report.answers import answers
 from isiw.report.drawn import drawn
 from isiw.report.facts import first_facts, further_facts, settings_facts
+from isiw.report.html import asset, library, rendered
 from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
 from isiw.report.words import finding_sentences, fit_sentence, is_judged_since
-from isiw.text import plain
 from isiw.window import Window
 
 __all__ = ["report_page", "save_report"]
-
-_ASSETS: Final = resources.files("isiw.report") / "assets"
 
 
 def save_report(
@@ -63,24 +56,8 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
     Raises:
         ConfigError: plotly or jinja2 is not installed.
     """
-    jinja2, plotly = _library("jinja2"), _library("plotly.offline").get_plotlyjs()
-    scripts = [plotly, _asset("page.js")]
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(_asset),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        finalize=lambda value: plain(value) if type(value) is str else value,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    page: str = environment.get_template("page.html").render(
-        _contents(record),
-        pictures=_pictures(record, truth),
-        style=_asset("page.css"),
-        scripts=scripts,
-        hashes=" ".join(_hash(script) for script in scripts),
-    )
-    return page
+    scripts = [library("plotly.offline").get_plotlyjs(), asset("page.js")]
+    return rendered("page.html", scripts, pictures=_pictures(record, truth), **_contents(record))
 
 
 def _contents(record: SessionRecord) -> dict[str, Any]:
@@ -126,22 +103,3 @@ def _pictures(record: SessionRecord, truth: Window | None) -> Mapping[str, str]:
         "course": course_figure(record),
     }
     return {name: inline_svg(figure, name) for name, figure in figures.items() if figure is not None}
-
-
-def _asset(name: str) -> str:
-    return (_ASSETS / name).read_text(encoding="utf-8")
-
-
-def _hash(script: str) -> str:
-    """What the page's policy knows a script by, so that no other is run."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
-
-
-def _library(name: str) -> Any:
-    try:
-        return importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        missing = name.partition(".")[0]
-        raise ConfigError(
-            f"{missing} is not installed", remedy='Install it with: pip install "isiw[report]"'
-        ) from error

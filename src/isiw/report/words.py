@@ -35,7 +35,7 @@ WORTH_SAYING = 0.1
 """Probability from which on an unusual window is mentioned."""
 
 SURE = 0.95
-"""Probability that there is none, from which on no window was found; below it that is undecided."""
+"""Probability from which on it is said outright that there is a window, or none; below it "probably", or undecided."""
 
 UNUSUAL = 0.9
 """Probability from which on a person is told to be unlike most."""
@@ -108,14 +108,17 @@ def finding_sentence(estimate: Estimate, space: DesignSpace) -> str:
     if window is None:
         undecided = probability is not None and 1 - probability < SURE
         return f"It is undecided whether there is a window{chance}." if undecided else f"No window was found{chance}."
-    return f"The tap enhances the MEP at ISIs of {window} {_AFTER[space.reference]}{chance}."
+    likely = "" if probability is None or probability >= SURE else "probably "
+    return f"The tap {likely}enhances the MEP at ISIs of {window} {_AFTER[space.reference]}{chance}."
 
 
 def _edges(estimate: Estimate, space: DesignSpace) -> str:
     low, high = (estimate.start_low_ms, estimate.start_high_ms), (estimate.end_low_ms, estimate.end_high_ms)
     if estimate.window is None or None in low or None in high:
         return ""
-    edges = f"With 90 % probability each, it starts {_between(low, space)} and ends {_between(high, space)}."
+    is_sure = estimate.probability is None or estimate.probability >= SURE
+    given = "With 90 % probability each, it" if is_sure else "If there is a window, with 90 % probability each it"
+    edges = f"{given} starts {_between(low, space)} and ends {_between(high, space)}."
     unusual = {
         "starts before the range": estimate.start_beyond,
         "ends beyond the range": estimate.end_beyond,
@@ -145,7 +148,9 @@ def _figure(value: float) -> str:
 
 
 def _expected_f1(estimate: Estimate) -> str:
-    return "" if estimate.expected_f1 is None else f"The expected F1 of this result is {estimate.expected_f1:.2f}."
+    if estimate.expected_f1 is None:
+        return ""
+    return f"The expected F1 of this result is {estimate.expected_f1:.2f} (1 is the true window, 0 no overlap)."
 
 
 def _unusual(estimate: Estimate) -> str:

@@ -18,8 +18,9 @@ from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.log.durable import part_of
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
-from isiw.log.schema import Estimate, Event, EventKind, Header
+from isiw.log.schema import Event, EventKind, Header
 from isiw.log.writer import LogWriter
+from isiw.session.believed import believed
 from isiw.session.header import header_of, require_parts
 from isiw.session.journal import Journal, learn, relearned
 from isiw.session.judging import Judging
@@ -345,7 +346,7 @@ class Recorder(Judging):
         self._log_estimate(trial.index)
 
     def _log_estimate(self, trial: int) -> None:
-        self._log.append(Estimate.of(trial, self.estimate(), self.decision(), None))
+        self._log.append(believed(self.strategy, trial, self.decision(), None))
         self._log.sync()
 
     def _warn(self, text: str) -> None:

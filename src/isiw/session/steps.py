@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from isiw.errors import NotDelivered
-from isiw.log.schema import Estimate, Event, Header
+from isiw.log.schema import Event, Header
+from isiw.session.believed import believed
 from isiw.session.delivery import Delivery
 from isiw.session.desk import Desk
 from isiw.session.journal import Journal, learn, relearned
@@ -83,8 +84,8 @@ class Steps:
     def _stop_at_limit(self) -> StopDecision:
         decision = StopDecision(stop=True, reason=f"The limit of {self._header.limits.max_pulses} pulses is reached.")
         self._journal.event("limit", decision.reason)
-        estimate = self._freely(self.strategy.estimate)
-        self._journal.log.append(Estimate.of(len(self._journal.trials) - 1, estimate, decision, None))
+        last = len(self._journal.trials) - 1
+        self._journal.log.append(self._freely(believed, self.strategy, last, decision, None))
         return decision
 
     def _one_trial(self) -> None:
@@ -153,9 +154,9 @@ class Steps:
 
     def log_estimate(self, trial: int) -> tuple[StopDecision, float | None]:
         """Put what is believed after a trial on disk; the decision and the next ISI [ms]."""
-        estimate, decision = self._freely(self.strategy.estimate), self._freely(self._decision)
+        decision = self._freely(self._decision)
         next_isi_ms = None if decision.stop else self._next_isi_ms()
-        self._journal.log.append(Estimate.of(trial, estimate, decision, next_isi_ms))
+        self._journal.log.append(self._freely(believed, self.strategy, trial, decision, next_isi_ms))
         self._journal.log.sync()
         return decision, next_isi_ms
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal, TypeAlias
 
 import torch
 
@@ -20,12 +21,26 @@ from isiw.models.protocol import Observation, Posterior, ProposesIsi, ResponseMo
 from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
 from isiw.window import WindowEstimate
 
-__all__ = ["Belief", "Choice", "Cost", "Course", "Method", "best_choices", "candidate_isis", "evenly_spaced"]
+__all__ = [
+    "Belief",
+    "Choice",
+    "ChosenBy",
+    "Cost",
+    "Course",
+    "Method",
+    "best_choices",
+    "candidate_isis",
+    "evenly_spaced",
+]
 
 MAX_CANDIDATES = 101
 
 Cost = Callable[[Tensor], Tensor]
 """What each of some ISIs [ms] (shape (t,)) costs, in the unit of the scores, shape (t,)."""
+
+ChosenBy: TypeAlias = Literal["initial", "plan", "acquisition", "fallback", "again"]
+"""What chose an ISI: it is an initial one, in the model's own plan, of the highest score, stands in for that one, or is
+asked again because its trial was lost."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +50,14 @@ class Choice:
     Args:
         isi_ms: the ISI [ms], on the grid.
         fallback: why it is not the acquisition function's choice; None where it is.
+        by: what it was chosen by.
+        scores: of `candidate_isis`, less their cost, shape (t,); None where none were worked out.
     """
 
     isi_ms: float
     fallback: str | None = None
+    by: ChosenBy = field(default="acquisition", compare=False)
+    scores: Tensor | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -162,10 +181,10 @@ class Course:
     def planned(self) -> tuple[Choice, ...] | None:
         """What is asked of each person where that stands already; None where the acquisition function chooses."""
         if self.initial_left:
-            return (Choice(self.initial_left[0]),) * self.people
+            return (Choice(self.initial_left[0], by="initial"),) * self.people
         if self.plans_ahead and isinstance(self.posterior, ProposesIsi):
             wanted_ms = self.posterior.proposed_isis_ms()[:, 0].tolist()
-            return tuple(Choice(self.method.space.snap(isi_ms)) for isi_ms in wanted_ms)
+            return tuple(Choice(self.method.space.snap(isi_ms), by="plan") for isi_ms in wanted_ms)
         return None
 
     @cached_property
@@ -238,12 +257,13 @@ def best_choices(
     """
     candidates = candidate_isis(space)
     scores = acquisition(posterior, candidates).cpu().expand(people, -1)
-    best = best_candidate(scores, None if cost is None else cost(candidates), first=golden_index(told, len(candidates)))
+    costs = None if cost is None else cost(candidates)
+    best = best_candidate(scores, costs, first=golden_index(told, len(candidates)))
     nothing = f"{type(acquisition).__name__} gives no ISI a finite score: an evenly spaced one instead."
-    scored = scores.isfinite().any(-1)
+    scored, net = scores.isfinite().any(-1), scores if costs is None else scores - costs
     return tuple(
-        Choice(space.snap(isi_ms), None if found else nothing)
-        for isi_ms, found in zip(candidates[best].tolist(), scored.tolist(), strict=True)
+        Choice(space.snap(isi_ms), scores=own) if found else Choice(space.snap(isi_ms), nothing, by="fallback")
+        for isi_ms, found, own in zip(candidates[best].tolist(), scored.tolist(), net, strict=True)
     )
 
 

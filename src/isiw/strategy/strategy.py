@@ -6,7 +6,7 @@ import threading
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeVar
 
@@ -17,10 +17,11 @@ from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
-from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel
+from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
 from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
 from isiw.strategy.choosing import Choice, Cost, Method, evenly_spaced
 from isiw.strategy.stopping import StopDecision, StoppingRule
+from isiw.types import FloatArray
 from isiw.window import WindowEstimate
 
 __all__ = ["Recipe", "Strategy"]
@@ -172,7 +173,7 @@ class Strategy:
             return answer.result(min(deadline_s, threading.TIMEOUT_MAX))[0]
         except TimeoutError:
             reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
-            return Choice(evenly_spaced(self.space, course.told), reason)
+            return Choice(evenly_spaced(self.space, course.told), reason, by="fallback")
 
     def ask_batch(self, n: int) -> list[float]:
         """The next n ISIs [ms], to be delivered before anything is told; the first is what `ask` answers.
@@ -193,6 +194,11 @@ class Strategy:
         choice = self._course.chosen(posterior)[0]
         self._fallback_reason = self._fallback_reason or choice.fallback
         return choice.isi_ms
+
+    @property
+    def choice(self) -> Choice | None:
+        """The current ISI and what it was chosen by; None where nothing was asked since the last tell."""
+        return self._choice
 
     @property
     def fallback_reason(self) -> str | None:
@@ -278,10 +284,11 @@ class Strategy:
         """Count a delivered stimulus whose outcome is not told: it uses up budget, and is asked again at most twice."""
         self._mistrials += 1
         self._lost += 1
+        self._choice = None if self._choice is None else replace(self._choice, by="again")
         if self._lost > ASKED_AGAIN and not self._course.plans_ahead:
             reason = f"The trial was lost {self._lost} times in a row: an evenly spaced ISI instead."
             isi_ms = evenly_spaced(self.space, self._course.told + self._mistrials)
-            self._choice, self._fallback_reason, self._lost = Choice(isi_ms, reason), reason, 0
+            self._choice, self._fallback_reason, self._lost = Choice(isi_ms, reason, by="fallback"), reason, 0
 
     def count_control(self) -> None:
         """Count a control trial from which nothing is learnt: a tap alone, or TMS alone that was lost."""
@@ -290,6 +297,10 @@ class Strategy:
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""
         return self._course.estimate()
+
+    def prediction_mv(self) -> tuple[FloatArray, FloatArray] | None:
+        """The band of nine of ten next MEPs [mV], at the ISIs of the estimate; None where the model predicts none."""
+        return self.posterior.prediction_mv(0.9) if isinstance(self.posterior, PredictsMeps) else None
 
     def decision(self) -> StopDecision:
         """Whether to stop now, and why."""

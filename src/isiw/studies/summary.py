@@ -19,9 +19,9 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
     Returns:
         Sorted by cohort, strategy and trial: people; mean F1 and its standard error; shares of the people with a window
         whose start and end lie in the 90 % intervals; share reported to have no window; mean of the pairs delivered;
-        mean of the pairs after which the stopping rule fired, over those for whom it did; share for whom it did so
-        before the budget was used up; people without rows because they failed; median time of an ask and a tell [ms].
-        A strategy that failed for everybody has one row, at trial 0.
+        mean of the pairs after which the stopping rule fired and of the F1 then, over those for whom it did; share for
+        whom it did so before the budget was used up; people without rows because they failed; median time of an ask and
+        a tell [ms]. A strategy that failed for everybody has one row, at trial 0.
     """
     failed = errors.groupby(_GROUP[:2]).size() if len(errors) else pd.Series(dtype="int64")
     table = _means(rows) if len(rows) else pd.DataFrame(columns=[*_GROUP, "people"])
@@ -45,6 +45,7 @@ def _means(rows: pd.DataFrame) -> pd.DataFrame:
             "called_none": 1.0 - groups["reported_window"].mean(),
             "delivered": groups["delivered"].mean(),
             "stop_trial": groups["stop_trial"].mean(),
+            "stop_f1": groups["stop_f1"].mean(),
             "converged": groups["converged"].mean(),
             "ask_ms": groups["ask_ms"].median(),
             "tell_ms": groups["tell_ms"].median(),

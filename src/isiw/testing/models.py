@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import torch
 
 from isiw.design import DesignSpace
@@ -13,6 +14,7 @@ from isiw.models.protocol import (
     HasEvidence,
     Observation,
     Posterior,
+    PredictsMeps,
     PredictsOutcomes,
     ProposesIsi,
     ReportsTrouble,
@@ -116,6 +118,19 @@ def _check_capabilities(posterior: Posterior, space: DesignSpace, people: int, w
     wrong = [shape for shape in shapes if len(shape) > 2 and shape[2] != len(isi_ms)]
     require(not wrong, f"there is a value for each of {len(isi_ms)} ISIs {when}, here {wrong}")
     _check_further(posterior, people, when)
+    if isinstance(posterior, PredictsMeps):
+        for person in range(people):
+            _check_prediction(posterior, person, when)
+
+
+def _check_prediction(posterior: Any, person: int, when: str) -> None:
+    grid_ms = posterior.estimate(person).grid_ms
+    wide, narrow = (np.stack(posterior.prediction_mv(level, person)) for level in (0.9, 0.5))
+    shape = None if grid_ms is None else (2, len(grid_ms))
+    require(wide.shape == shape, f"prediction_mv is at the ISIs of the estimate {when}, here {wide.shape}, not {shape}")
+    require(bool(np.isfinite(wide).all()), f"prediction_mv is finite {when}")
+    nested = bool((np.diff([wide[0], narrow[0], narrow[1], wide[1]], axis=0) >= -1e-9).all())
+    require(nested, f"a band of prediction_mv holds those of smaller probability {when}")
 
 
 def _sample_shapes(posterior: Any, isi_ms: Tensor, when: str) -> list[tuple[int, ...]]:

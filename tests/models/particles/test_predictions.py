@@ -7,9 +7,12 @@ import torch
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1
 from isiw.models.particles.laws import ProfilePrior
+from isiw.models.particles.model import ParticleModel
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Prior
+from isiw.models.protocol import Observation
 from isiw.models.shared.start import StartPrior
+from isiw.models.windows import profile_grid
 from isiw.window import Window, window_from_excess
 
 
@@ -34,3 +37,20 @@ def test_windows_are_those_of_the_rule_also_where_a_peak_lies_beyond_the_range(s
     scores = np.array([f1(ours, rules, space) for ours, rules in zip(told, ruled, strict=True)])
     assert (scores > 0).mean() > 0.995  # none against one: excesses within a hair of the least that counts
     assert np.quantile(scores[scores > 0], 0.01) > 0.98
+
+
+def test_nine_of_ten_meps_of_people_in_general_lie_in_the_predicted_band() -> None:
+    model = ParticleModel(particles=2000, thinned=1000)
+    isis_ms = profile_grid(VALVE_SPACE).double().numpy()
+    low_mv, high_mv = model.begin(VALVE_SPACE, seed=5).prediction_mv(0.9)
+    assert low_mv.shape == high_mv.shape == isis_ms.shape
+    meps_mv = np.stack([model.simulate(VALVE_SPACE, seed, [isis_ms[50]]).mep_mv for seed in range(200)])[:, 0]
+    assert 0.85 < ((meps_mv >= low_mv[50]) & (meps_mv <= high_mv[50])).mean() < 0.95
+    assert 0.02 < (meps_mv < low_mv[50]).mean() < 0.08
+
+
+def test_each_person_of_a_batch_has_a_band_of_its_own() -> None:
+    model = ParticleModel(particles=200)
+    posterior = model.update(model.begin(VALVE_SPACE, seed=5, people=2), Observation.of([100.0] * 2, [0.01, 1.0]))
+    (_, small_mv), (_, large_mv) = (posterior.prediction_mv(0.9, person) for person in range(2))
+    assert (small_mv < large_mv).all()

@@ -27,7 +27,7 @@ from isiw.models.protocol import Observation, SimulatedPerson, Tensor
 from isiw.models.randomness import SIMULATED, step_generator, systematic
 from isiw.models.shared.history import History, observed
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
-from isiw.types import ArrayLike
+from isiw.types import ArrayLike, FloatArray
 from isiw.window import Enhancement, Window, WindowEstimate
 
 __all__ = ["Moving", "ParticleModel", "ParticlePosterior"]
@@ -256,6 +256,13 @@ class ParticlePosterior:
     def log_evidence(self) -> Tensor:
         """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
         return self.evidence
+
+    def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
+        """Between which amplitudes the next MEP lies; see `PredictsMeps`."""
+        isi_ms = profile_grid(self.space).to(self.log_weights.device)
+        shares = 0.5 + 0.5 * torch.tensor([-level, level], device=isi_ms.device)
+        low_mv, high_mv = self._thinned.mep_quantiles_mv(isi_ms, shares)[person].T.double().cpu().numpy()
+        return low_mv, high_mv
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""

@@ -75,16 +75,21 @@ class PersonSample:
         return response.log_floor.exp().unsqueeze(-1) * (evoked + rest)
 
     @cached_property
+    def _log_ends(self) -> tuple[Tensor, Tensor]:
+        """Between which log MEPs outcomes lie, each of shape (b,)."""
+        response = self.person.response
+        top = response.log_floor + torch.log1p(self._evoked.amax(-1))
+        low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
+        return low, torch.quantile(top, 0.95, dim=-1) + 1.5
+
+    @cached_property
     def _outcome_table(self) -> Tensor:
         """Probability of each outcome of the next trial at the tables' levels, shape (b, s, l, y)."""
         response = self.person.response
         gain = log_gain(response, torch.full_like(response.drift, self.order).unsqueeze(-1)).squeeze(-1)
         response = response._replace(log_ratio=response.log_ratio + gain)
-        top = response.log_floor + torch.log1p(self._evoked.amax(-1))
-        low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
-        high = torch.quantile(top, 0.95, dim=-1) + 1.5
-        # Cells are narrow where MEPs are as small as the floor, which varies little.
-        ends = torch.linspace(0.0, 1.0, OUTCOMES + 1, device=low.device).pow(1.5)
+        low, high = self._log_ends
+        ends = _cell_ends(low.device)
         middle, width = 0.5 * (ends[1:] + ends[:-1]), ends.diff()
         log_mep = (low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)).unsqueeze(-2)
         density = in_pieces(
@@ -96,3 +101,27 @@ class PersonSample:
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
         return interpolated(self._outcome_table, levels(self.person, isi_ms.unsqueeze(0)))
+
+    def mep_quantiles_mv(self, isi_ms: Tensor, shares: Tensor) -> Tensor:
+        """Quantiles of the next MEP [mV], shape (b, t, q).
+
+        Args:
+            isi_ms: ISIs [ms], shape (t,).
+            shares: which quantiles, shape (q,).
+        """
+        below = torch.nn.functional.pad(self.outcome_mass(isi_ms).mean(1).cumsum(-1), (1, 0))
+        wanted = shares.expand(*below.shape[:-1], -1).contiguous()
+        right = torch.searchsorted(below, wanted).clamp(1, OUTCOMES)
+        less, more = below.gather(-1, right - 1), below.gather(-1, right)
+        ends = _cell_ends(below.device)
+        place = torch.lerp(ends[right - 1], ends[right], (wanted - less) / (more - less).clamp_min(1e-12))
+        low, high = (end[:, None, None] for end in self._log_ends)
+        return torch.exp(low + place * (high - low))
+
+
+def _cell_ends(device: torch.device) -> Tensor:
+    """Ends of the cells of the log MEP, from 0 to 1; narrow where MEPs are as small as the floor, which varies little.
+
+    Shape (y + 1,).
+    """
+    return torch.linspace(0.0, 1.0, OUTCOMES + 1, device=device).pow(1.5)

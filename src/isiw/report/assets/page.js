@@ -23,8 +23,8 @@
 
   // ---- the belief after a trial
 
-  const sizesUv = [...trials.map((trial) => trial.mepUv),
-    ...Object.values(session.beliefs).flatMap((belief) => [...belief.low, ...belief.high])];
+  const sizesUv = [...trials.map((trial) => trial.mepUv), ...Object.values(session.beliefs)
+    .flatMap((belief) => [...belief.low, ...belief.high, ...belief.predictedLow, ...belief.predictedHigh])];
   const positiveUv = sizesUv.filter((size) => size !== null && size >= 1);
   const lowestUv = positiveUv.reduce((least, size) => Math.min(least, size), 10) * 0.8;
   const largestUv = positiveUv.reduce((most, size) => Math.max(most, size), 100) * 1.3;
@@ -35,18 +35,21 @@
   function profileTraces(belief) {
     if (!belief || !belief.isiMs.length) return [];
     const none = { width: 0, color: colour("blue") };
+    const band = (low, high, name, fillcolor) => (low.length ? [
+      line(belief.isiMs, low, "", none, { showlegend: false }),
+      line(belief.isiMs, high, name, none, { fill: "tonexty", fillcolor }),
+    ] : []);
     return [
-      line(belief.isiMs, belief.low, "", none, { showlegend: false }),
-      line(belief.isiMs, belief.high, "90 % band of the expectation", none,
-        { fill: "tonexty", fillcolor: "rgba(60,150,220,0.22)" }),
+      ...band(belief.predictedLow, belief.predictedHigh, "prediction: 90 % of trials lie here", "rgba(130,135,140,0.2)"),
+      ...band(belief.low, belief.high, "90 % band of the expected MEP", "rgba(60,150,220,0.3)"),
       line(belief.isiMs, belief.profile, "expected MEP", { width: 2, color: colour("blue") }),
     ];
   }
 
-  // A mistrial is drawn where it was asked or came, at the lower edge.
+  // A mistrial is drawn where it happened: at the lower edge where no MEP was measured, at what was asked where nothing came.
   const placeMs = (trial) => (trial.kind === "mistrial" ? trial.isiMs ?? trial.askedMs : trial.isiMs);
   const measuredUv = (trial) => (trial.mepUv === null ? null : Math.max(trial.mepUv, lowestUv));
-  const heightUv = (trial) => (trial.kind === "mistrial" ? lowestUv : measuredUv(trial));
+  const heightUv = (trial) => measuredUv(trial) ?? (trial.kind === "mistrial" ? lowestUv : null);
 
   function trialTrace(kind, number) {
     const symbol = { counts: "circle", excluded: "circle-open", mistrial: "x-thin-open" }[kind];
@@ -64,20 +67,32 @@
     };
   }
 
+  // What the acquisition function said of every ISI, as a strip below the belief.
+  const isScored = (belief) => Boolean(belief && belief.scores.length);
+  function scoreTraces(belief) {
+    if (!isScored(belief)) return [];
+    return [line(belief.scoredMs, belief.scores, "score of the acquisition function", { width: 1.5, color: colour("ink") },
+      { yaxis: "y2", hoverinfo: "x+y" })];
+  }
+
+  // The 90 % intervals of the edges that are known, each with its colour.
+  const edgeHeights = { start: 1.02, end: 1 };
+  const intervals = (belief) => [["start", "green", belief.start], ["end", "orange", belief.end]]
+    .filter(([, , pair]) => belief.window.length && !pair.includes(null));
+
   function beliefShapes(belief) {
     if (!belief) return [];
     const edge = (value) => (value === "low" ? session.range[0] : value === "high" ? session.range[1] : value);
     const window = belief.window.map(([x0, x1]) => ({
       type: "rect", x0, x1, yref: "paper", y0: 0, y1: 1, fillcolor: colour("blue"), opacity: 0.12, line: { width: 0 },
     }));
-    const intervals = [belief.start, belief.end].filter((pair) => belief.window.length && !pair.includes(null));
-    const bars = intervals.map((pair) => ({
-      type: "line", x0: edge(pair[0]), x1: edge(pair[1]), yref: "paper", y0: 1, y1: 1,
-      line: { width: 7, color: colour("blue") },
+    const bars = intervals(belief).map(([name, hue, [low, high]]) => ({
+      type: "line", x0: edge(low), x1: edge(high), yref: "paper", y0: edgeHeights[name], y1: edgeHeights[name],
+      line: { width: 6, color: colour(hue) },
     }));
     const next = belief.nextMs === null ? [] : [{
       type: "line", x0: belief.nextMs, x1: belief.nextMs, yref: "paper", y0: 0, y1: 1,
-      line: { width: 1.5, dash: "dash", color: colour("orange") },
+      line: { width: 1.5, dash: "dash", color: colour("ink") },
     }];
     return [...window, ...bars, ...next];
   }
@@ -87,18 +102,19 @@
     const key = (name, style) => line([null], [null], name, style);
     const found = belief && belief.window.length ? [
       key("window", { width: 10, color: "rgba(60,150,220,0.3)" }),
-      key("90 % interval of its edges", { width: 6, color: colour("blue") }),
+      ...intervals(belief).map(([name, hue]) => key(`90 % interval of its ${name}`, { width: 6, color: colour(hue) })),
     ] : [];
     const next = belief && belief.nextMs !== null
-      ? [key("asked next", { width: 1.5, dash: "dash", color: colour("orange") })] : [];
+      ? [key("asked next", { width: 1.5, dash: "dash", color: colour("ink") })] : [];
     const points = Object.keys(names).map((kind) => trialTrace(kind, number));
-    const traces = [...profileTraces(belief), ...points, ...found, ...next];
+    const traces = [...profileTraces(belief), ...points, ...found, ...scoreTraces(belief), ...next];
     Plotly.react("belief", traces, layout({
-      xaxis: axis(`ISI ${after} [ms]`, { range: session.range }),
+      xaxis: axis(`ISI ${after} [ms]`, { range: session.range, anchor: isScored(belief) ? "y2" : "y" }),
+      yaxis2: axis("score", { domain: [0, 0.2], visible: isScored(belief), showticklabels: false }),
       yaxis: axis("MEP [µV]", {
-        type: "log", tickvals: ticksUv, range: [Math.log10(lowestUv * 0.9), Math.log10(largestUv)],
+        domain: isScored(belief) ? [0.26, 1] : [0, 1], type: "log", tickvals: ticksUv, range: [Math.log10(lowestUv * 0.9), Math.log10(largestUv)],
       }),
-      shapes: beliefShapes(belief), uirevision: "belief", margin: { l: 60, r: 12, t: 40, b: 44 },
+      shapes: beliefShapes(belief), uirevision: "belief", margin: { l: 60, r: 12, t: 60, b: 44 },
       legend: { orientation: "h", y: 1.04, yanchor: "bottom", traceorder: "normal" },
     }), options);
   }
@@ -169,13 +185,19 @@
     element("told-belief").textContent = `Believed after it: ${belief.found} ${belief.reason}`;
   }
 
+  const reasons = {
+    initial: ", one of the ISIs that are asked first.", plan: ", by the strategy's own plan.",
+    acquisition: ", where the score is highest.", again: " again, as its trial was lost.", fallback: ", by a fallback.",
+  };
+  const why = (belief) => reasons[belief.chosenBy] ?? ".";
+
   function tellNext(belief) {
     const next = trials[position + 1];
     const fallback = next && session.fallbacks[next.number];
     const told = element("told-next");
     if (!belief) told.textContent = "";
     else if (belief.stop) told.textContent = "Nothing was asked after it: the session stopped.";
-    else if (belief.nextMs !== null) told.textContent = `Asked next: ${ms(belief.nextMs)}${fallback ? `, by a fallback: ${fallback}` : "."}`;
+    else if (belief.nextMs !== null) told.textContent = `Asked next: ${ms(belief.nextMs)}${fallback ? `, by a fallback: ${fallback}` : why(belief)}`;
     else told.textContent = next ? `Next came trial ${next.number}: ${next.asked}.` : "No ISI was asked after it.";
   }
 

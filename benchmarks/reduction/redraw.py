@@ -1,0 +1,47 @@
+"""Draws the figures of the reproduction again from its committed tables, without running a session.
+
+    python -m benchmarks.reduction.redraw
+
+Those of the online experiment and of interval production need what the tables leave out, single trials; they are drawn
+when the whole reproduction is run.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from benchmarks.reduction import comparison, headline, initial, particles
+from benchmarks.reduction.document import DPI
+
+RESULTS = Path(__file__).parents[1] / "results" / "trial_reduction.json"
+
+
+def redrawn(results: Path = RESULTS) -> dict[str, Figure]:
+    """The figures by name.
+
+    Args:
+        results: the tables, as `document.write` writes them.
+    """
+    sections = json.loads(results.read_text(encoding="utf-8"))["sections"]
+    tables = {
+        section["title"].partition(" (")[0]: [pd.DataFrame(table["rows"]) for table in section["tables"]]
+        for section in sections
+    }
+    recruitment, gaussian, equal, _ = tables["The headline: equal trials, equal F1"]
+    return {
+        "headline": headline.figure(equal, {"recruitment": recruitment, "gaussian": gaussian}),
+        "methods": comparison.figure(tables["The methods side by side"][0]),
+        "initial": initial.figure(tables["How many initial observations"][0]),
+        "particles": particles.figure(*tables["How many particles"]),
+    }
+
+
+if __name__ == "__main__":
+    for name, figure in redrawn().items():
+        for axes in figure.axes:
+            axes.title.set_fontsize(9)
+        figure.savefig(RESULTS.with_name(f"{RESULTS.stem}_{name}.png"), dpi=DPI)
