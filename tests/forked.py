@@ -33,14 +33,14 @@ class Forked:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *error: object) -> None:
         _ = self.returncode
         self.stdout.close()
         self.stderr.close()
 
-    def send_signal(self, signal: int) -> None:
+    def send_signal(self, number: int) -> None:
         """Send it a signal."""
-        os.kill(self.process, signal)
+        os.kill(self.process, number)
 
     @property
     def returncode(self) -> int:

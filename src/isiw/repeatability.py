@@ -101,7 +101,8 @@ class TimingStudy:
     @property
     def pulse_table(self) -> pd.DataFrame:
         """How the pulse varies against the valve command, by commanded ISI (Fig. 5.9): columns n and sd_ms."""
-        pulses = pd.DataFrame({"isi_ms": self.commanded_ms, "pulse_ms": self.realised_ms + self.events.hit_ms})
+        hit_ms = self.events.hit_ms if isinstance(self.events, TapEvents) else np.nan
+        pulses = pd.DataFrame({"isi_ms": self.commanded_ms, "pulse_ms": self.realised_ms + hit_ms})
         return pulses.dropna().groupby("isi_ms").agg(n=("pulse_ms", "count"), sd_ms=("pulse_ms", "std"))
 
     @property

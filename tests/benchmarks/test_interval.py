@@ -13,7 +13,8 @@ RESULTS = Path(__file__).parents[2] / "benchmarks" / "results" / "interval.json"
 def people_of(mean_ms: float, sd_ms: float) -> np.ndarray:
     """Eight people who produce two intervals in turn, and differ a little."""
     differing = (np.arange(8)[:, None] - 3.5) / 1000
-    return mean_ms * (1 + differing) + sd_ms * (1 + differing) * np.tile([-1.0, 1.0], (8, 10))
+    people: np.ndarray = mean_ms * (1 + differing) + sd_ms * (1 + differing) * np.tile([-1.0, 1.0], (8, 10))
+    return people
 
 
 @pytest.fixture
