@@ -9,6 +9,7 @@ from isiw.log.schema import Estimate, Event, Header
 from isiw.session.delivery import Delivery
 from isiw.session.desk import Desk
 from isiw.session.journal import Journal, learn, relearned
+from isiw.session.pace import Pace
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig
 from isiw.session.updates import SessionUpdate
@@ -54,6 +55,7 @@ class Steps:
         self.on_trial: Callable[[SessionUpdate], None] | None = None
         self.desk: Desk | None = None
         self._rig, self._journal, self._pausing, self._header = rig, journal, pausing, header
+        self._pace = Pace()
         self._backoffs_s, self._freely = backoffs_s, rig.interrupts.freely
 
     def next(self) -> StopDecision | None:
@@ -112,6 +114,7 @@ class Steps:
         if not self._disturbed:
             fallback = None if stimulus.isi_ms is None else self.strategy.fallback_reason
             self.delivery.deliver(stimulus, fallback)
+            self._pace.passed(self._rig.clock.now_s())
 
     def _wait(self) -> None:
         """Sleep until limits and protocol allow the next stimulus, or an operator has another wish."""
@@ -147,7 +150,8 @@ class Steps:
             self._pausing.reason = self.delivery.watch.reason
         if self.on_trial is not None:
             estimate = self._freely(self.strategy.estimate)
-            update = SessionUpdate(trial, estimate, decision, next_isi_ms, self._stimuli_left())
+            left = self._stimuli_left()
+            update = SessionUpdate(trial, estimate, decision, next_isi_ms, left, self._pace.left_s(left))
             self._freely(self.on_trial, update)
         return decision
 
