@@ -39,7 +39,9 @@ _INTERRUPTED = "Interrupted: the device is stopped and the log is closed."
 Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
 Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **NO_DEFAULT)]
 Overwrite = Annotated[bool, typer.Option(help="Replace a file that is there; a log never is.")]
-Live = Annotated[bool, typer.Option("--live", help="Show the session in the browser while it runs, and operate it there.")]
+Live = Annotated[
+    bool, typer.Option("--live", help="Show the session in the browser while it runs, and operate it there.")
+]
 Seed = Annotated[int | None, typer.Option(help="Seed of the person, the trials and the strategy.", **NO_DEFAULT)]
 
 

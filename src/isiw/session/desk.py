@@ -8,7 +8,7 @@ from typing import Final, Protocol
 
 from isiw.errors import InvalidValueError, LogError
 from isiw.session.asking import Asking
-from isiw.session.terminal import Keys, Screen
+from isiw.session.terminal import ERASED, Keys, Screen
 from isiw.trials import TrialTable
 
 __all__ = ["KEYS", "Desk", "Operated"]
@@ -89,6 +89,16 @@ class Desk:
             self.screen.say("First finish the note with Enter, or drop it with Esc.")
         return self._asking.wait(lambda: self._left_alone)
 
+    def show(self, row: str, standing: str) -> None:
+        """Show a row of the table, and below it how the session stands.
+
+        Args:
+            row: the row.
+            standing: how it stands, in a line.
+        """
+        self.screen.say(row)
+        self.screen.stand(standing)
+
     def count_down(self, left_s: float, text: str) -> None:
         """Show how long a wait still lasts, where it is worth it.
 
@@ -166,7 +176,6 @@ class Desk:
 
     def _begin_note(self) -> None:
         self._note = ""
-        self.screen.counted_down()
         self.screen.type("Note (Enter keeps it, Esc drops it): ")
 
     def _type(self, note: str, key: str) -> None:
@@ -181,7 +190,7 @@ class Desk:
             self.screen.type("\n")
         elif key in "\x7f\b":
             self._note = note[:-1]
-            self.screen.type("\b \b" if note else "")
+            self.screen.type(ERASED if note else "")
         elif key.isprintable():
             self._note = note + key
             self.screen.type(key)

@@ -27,7 +27,7 @@ from isiw.session.header import header_of, require_parts
 from isiw.session.journal import Journal
 from isiw.session.judging import Judging
 from isiw.session.pausing import Pausing
-from isiw.session.progress import PROGRESS_HEADINGS, progress_row, show_progress
+from isiw.session.progress import fitted, progress_row, show_legend, show_progress, standing
 from isiw.session.rig import Rig, require_matching
 from isiw.session.safeguards import Safeguards
 from isiw.session.steps import Steps, paused
@@ -223,16 +223,24 @@ class Session(Judging):
         """What is called after every trial."""
         shown = self._on_trial is None and is_terminal(sys.stdout) if progress is None else progress
         if shown:
-            show_progress(PROGRESS_HEADINGS)
+            show_legend()
 
         def report(update: SessionUpdate) -> None:
             self._followers.updated(update)
             if shown:
-                show_progress(progress_row(update))
+                self._show(update)
             if self._on_trial is not None:
                 self._on_trial(update)
 
         return report if shown or self._followers else self._on_trial
+
+    def _show(self, update: SessionUpdate) -> None:
+        """Show a trial: in a terminal with a last line that says how the session stands."""
+        row, desk = progress_row(update), self._steps.desk
+        if desk is not None and is_terminal(sys.stdout):
+            desk.show(fitted(row), standing(update, self._space))
+        else:
+            show_progress(row)
 
     @contextmanager
     def _operated(self, *, keys: bool) -> Iterator[None]:

@@ -13,7 +13,7 @@ _LAST: Final = 20
 
 
 class Pace:
-    """The usual time from one stimulus to the next, of the last ones; a rest or a pause among them does not change it."""
+    """The usual time between the last stimuli; a rest or a pause among them does not change it."""
 
     def __init__(self) -> None:
         self._ends_s: deque[float] = deque(maxlen=_LAST + 1)

@@ -37,10 +37,11 @@
 
   function tellNext(belief, last) {
     const isOld = last && belief && Number(shown.beliefOf) < last.number;
-    if (isOld) said("next", "being chosen");
+    if (isOld) said("next", shown.phase === "running" ? "being chosen" : "–");
     else if (belief && belief.stop) said("next", "nothing");
     else said("next", belief && belief.nextMs !== null ? ms(belief.nextMs) : "–");
-    said("next-more", belief && belief.stop ? "the session stops" : belief && belief.nextMs === null ? "a control trial, or the first" : "");
+    const more = belief && belief.stop ? "the session stops" : belief && belief.nextMs === null ? "a control trial" : "";
+    said("next-more", isOld ? "" : more);
   }
 
   function tellLeft() {
@@ -197,9 +198,11 @@
 
   function showButtons(last) {
     const { phase } = shown;
+    const focused = document.activeElement;
     element("operate").hidden = !["running", "paused"].includes(phase);
     element("pause").hidden = phase === "paused";
     element("resume").hidden = phase !== "paused";
+    if (focused.hidden) element(phase === "paused" ? "resume" : "pause").focus(); // the button that was pressed is gone
     element("exclude").disabled = !last || last.kind === "mistrial";
     said("exclude", last && last.kind === "excluded" ? `Count trial ${last.number} again` : "Exclude the last trial");
   }

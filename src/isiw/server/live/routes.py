@@ -19,8 +19,8 @@ from isiw.session.loop import Session
 
 __all__ = ["FILES", "router"]
 
-UPDATE_S: Final = 0.1
-"""The shortest time between two updates [s]: a session faster than that is not slowed down by being looked at."""
+GLANCE_S: Final = 0.05
+"""How often is looked for news [s]."""
 
 QUIET_S: Final = 2.0
 """After so long without news, the page is told that the session is still there [s]."""
@@ -77,6 +77,7 @@ def _session(request: Request) -> Session:
         Refusal: it does not.
     """
     session: Session = request.app.state.session
+    _view(request).seen()
     if not session.running:
         raise Refusal(409, "NotRunning", "the session is not running", remedy="Nothing was done.")
     return session
@@ -92,22 +93,22 @@ async def updates(view: Annotated[View, Depends(_view)]) -> StreamingResponse:
 
 
 async def _followed(view: View) -> AsyncIterator[str]:
-    """Each viewer gets what there is to see when it has taken what there was before; what it missed it need not know."""
+    """Each viewer gets the latest when it has taken what came before; what it missed it need not know."""
     seen: object = None
     quiet_s = 0.0
     with view.attended():
         while True:
-            over = view.over
-            if (state := view.state) != seen:
-                seen, quiet_s = state, 0.0
-                yield f"data: {view.shown()}\n\n"
+            over, shown = view.over, view.shown()
+            if shown.state != seen:
+                seen, quiet_s = shown.state, 0.0
+                yield f"data: {shown.json}\n\n"
             elif quiet_s >= QUIET_S:
                 quiet_s = 0.0
                 yield ": still here\n\n"
             if over:
                 return
-            await asyncio.sleep(UPDATE_S)
-            quiet_s += UPDATE_S
+            await asyncio.sleep(GLANCE_S)
+            quiet_s += GLANCE_S
 
 
 @router.post("/pause")

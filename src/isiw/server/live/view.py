@@ -7,10 +7,11 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Final
+from functools import cached_property
+from typing import Any, Final, NamedTuple
 
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Estimate, Event, Record, Waveform
+from isiw.log.schema import Estimate, Event, Intent, Record, Waveform
 from isiw.report.drawn import drawn
 from isiw.report.facts import first_facts
 from isiw.session.loop import Session
@@ -23,8 +24,18 @@ __all__ = ["View"]
 MOST_EVENTS: Final = 100
 """Events that the page lists; the log has all."""
 
+UPDATE_S: Final = 0.2
+"""The shortest time between two updates [s]: a session faster than that is not slowed down by being looked at."""
+
 AWAY_S: Final = 60.0
-"""A page that was closed for less is taken to be loaded again [s]."""
+"""Who was there a shorter time ago is taken to come back, as after loading the page again [s]."""
+
+
+class Shown(NamedTuple):
+    """What a page shows, and of which state of the session."""
+
+    state: object
+    json: str
 
 
 class View:
@@ -43,27 +54,28 @@ class View:
         self._coming: dict[tuple[int, str], Waveform] = {}
         self._sweep: dict[tuple[int, str], Waveform] = {}
         self._update: SessionUpdate | None = None
-        self._records = self._viewers = 0
-        self._left_s: float | None = None
-        self._shown: tuple[object, str] = (None, "")
+        self._news = self._viewers = 0
+        self._seen_s: float | None = None
+        self._shown, self._made_s = Shown(None, ""), -UPDATE_S
         self.over = False
 
     def logged(self, record: Record, channel_name: str | None) -> None:
         """Keep what was logged."""
         if isinstance(record, Waveform):
             self._coming[record.trial, channel_name or ""] = record
-        elif isinstance(record, Trial):
+            return
+        if isinstance(record, Trial):
             self._sweep, self._coming = self._coming, {}
         elif isinstance(record, Estimate):
             self._estimate = record
         elif isinstance(record, Event):
             self._events.append(record)
-        self._records += 1
+        self._news += not isinstance(record, Intent)
 
     def updated(self, update: SessionUpdate) -> None:
         """Keep what is left of the session."""
         self._update = update
-        self._records += 1
+        self._news += 1
 
     def ended(self) -> None:
         """Nothing more comes."""
@@ -71,8 +83,8 @@ class View:
 
     def is_attended(self) -> bool:
         """Whether somebody has the page open, or had it a moment ago."""
-        left_s = self._left_s
-        return self._viewers > 0 or (left_s is not None and time.monotonic() - left_s < AWAY_S)
+        seen_s = self._seen_s
+        return self._viewers > 0 or (seen_s is not None and time.monotonic() - seen_s < AWAY_S)
 
     @contextmanager
     def attended(self) -> Iterator[None]:
@@ -81,20 +93,20 @@ class View:
         try:
             yield
         finally:
-            self._left_s = time.monotonic()
+            self.seen()
             self._viewers -= 1
 
-    @property
-    def state(self) -> object:
-        """Differs where the page has something new to show."""
-        return self._records, self._session.paused, self._session.running, self.over
+    def seen(self) -> None:
+        """Somebody was there just now."""
+        self._seen_s = time.monotonic()
 
-    def shown(self) -> str:
-        """What the page shows now, as JSON; put together once for all who look."""
-        state = self.state
-        if self._shown[0] != state:
-            self._shown = state, json.dumps(self._contents(), allow_nan=False, separators=(",", ":"))
-        return self._shown[1]
+    def shown(self) -> Shown:
+        """What the page shows now; put together once for all who look, and not too often."""
+        state = (self._news, self._session.paused, self._session.running, self.over)
+        if state != self._shown.state and (self.over or time.monotonic() - self._made_s >= UPDATE_S):
+            self._shown = Shown(state, json.dumps(self._contents(), allow_nan=False, separators=(",", ":")))
+            self._made_s = time.monotonic()
+        return self._shown
 
     def _contents(self) -> dict[str, Any]:
         record, update = self._record(), self._update
@@ -102,7 +114,7 @@ class View:
             "phase": self._phase(),
             "pause": plain(self._session.paused or ""),
             "subject": plain(record.header.subject) or "an unnamed subject",
-            "facts": [[fact.name, plain(fact.value)] for fact in first_facts(record)],
+            "facts": self._facts,
             "drawn": drawn(record),
             "delivered": len(record.table),
             "most": record.header.limits.max_pulses,
@@ -110,6 +122,10 @@ class View:
             "leftS": None if update is None else update.left_s,
             "events": [[event.trial, event.kind, plain(event.text)] for event in tuple(self._events)],
         }
+
+    @cached_property
+    def _facts(self) -> list[tuple[str, str]]:
+        return [(fact.name, plain(fact.value)) for fact in first_facts(self._record())]
 
     def _phase(self) -> str:
         if self.over:
@@ -129,5 +145,3 @@ class View:
             losses=(),
             finished=False,
         )
-
-
