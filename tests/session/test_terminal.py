@@ -23,41 +23,38 @@ def seen(written: str) -> list[str]:
 
 def test_how_things_stand_stays_below_what_is_said(capsys: pytest.CaptureFixture[str]) -> None:
     with Screen() as screen:
-        screen.say("trial 0")
-        screen.stand("17 left")
-        screen.say("trial 1")
-        screen.stand("16 left")
-    assert seen(capsys.readouterr().err) == ["trial 0", "trial 1", "16 left", ""]
+        screen.say("trial 0", "17 left")
+        screen.say("paused")
+        screen.say("trial 1", "16 left")
+    assert seen(capsys.readouterr().err) == ["trial 0", "paused", "trial 1", "16 left", ""]
 
 
 def test_a_countdown_takes_the_last_line_and_gives_it_back(capsys: pytest.CaptureFixture[str]) -> None:
     with Screen() as screen:
-        screen.stand("17 left")
+        screen.say("trial 0", "17 left")
         screen.count_down("Rest: 1:00 left")
-        screen.say("trial 1")
+        screen.say("paused")
         screen.counted_down()
-    assert seen(capsys.readouterr().err) == ["trial 1", "17 left", ""]
+    assert seen(capsys.readouterr().err) == ["trial 0", "paused", "17 left", ""]
 
 
 def test_what_is_being_typed_is_not_torn_apart(capsys: pytest.CaptureFixture[str]) -> None:
     with Screen() as screen:
-        screen.stand("17 left")
+        screen.say("trial 0", "17 left")
         for sign in ("Note: ", "a", "b", ERASED, "c"):
             screen.type(sign)
-        screen.stand("16 left")
-        screen.say("trial 1")
+        screen.say("trial 1", "16 left")
         screen.type("d")
         screen.type("\n")
         screen.say("The note is in the log.")
     written = capsys.readouterr().err
-    assert seen(written) == ["trial 1", "Note: acd", "The note is in the log.", "16 left", ""]
+    assert seen(written) == ["trial 0", "trial 1", "Note: acd", "The note is in the log.", "16 left", ""]
 
 
 def test_terminals_obey_nothing_that_is_said(capsys: pytest.CaptureFixture[str]) -> None:
     with Screen() as screen:
-        screen.say("\x1b]0;taken\x07P07\x1b[2J")
-        screen.stand("\x1b[2Jleft")
-    assert capsys.readouterr().err == "P07\n\rleft\x1b[K\n"
+        screen.say("\x1b]0;taken\x07P07\x1b[2J", "\x1b[2Jleft")
+    assert capsys.readouterr().err == "P07\nleft\n"
 
 
 def test_signs_that_a_terminal_lacks_do_not_silence_the_screen(

@@ -96,8 +96,7 @@ class Desk:
             row: the row.
             standing: how it stands, in a line.
         """
-        self.screen.say(row)
-        self.screen.stand(standing)
+        self.screen.say(row, standing)
 
     def count_down(self, left_s: float, text: str) -> None:
         """Show how long a wait still lasts, where it is worth it.

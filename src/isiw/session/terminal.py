@@ -72,9 +72,17 @@ class Screen:
         self._texts.put(None)
         self._thread.join(_LAST_WORDS_S)  # a terminal that takes no output must not keep a session open
 
-    def say(self, text: str) -> None:
-        """Show a line, above the last one that is being written."""
-        self._texts.put(f"{self._cleared}{plain(text)}\n{self._line}")
+    def say(self, text: str, standing: str | None = None) -> None:
+        """Show a line, above the last one, which stays.
+
+        Args:
+            text: the line.
+            standing: how things stand now, for the last line.
+        """
+        cleared = self._cleared
+        if standing is not None:
+            self._standing = plain(standing)
+        self._texts.put(f"{cleared}{plain(text)}\n{self._line}")
 
     def type(self, text: str) -> None:
         """Show what is being typed, in the last line."""
@@ -89,22 +97,14 @@ class Screen:
     def count_down(self, text: str) -> None:
         """Show a line in the place of the last one that counted down."""
         self._counting = plain(text)
-        self._show_line()
+        if not self._typed:
+            self._texts.put(f"\r{self._counting}\x1b[K")
 
     def counted_down(self) -> None:
         """Clear the line that counted down, where there is one."""
         if self._counting:
             self._counting = ""
             self._texts.put(f"\r\x1b[K{self._line}")
-
-    def stand(self, text: str) -> None:
-        """Show how things stand, in a last line that stays below all others.
-
-        Args:
-            text: how things stand.
-        """
-        self._standing = plain(text)
-        self._show_line()
 
     @property
     def _line(self) -> str:
@@ -114,10 +114,6 @@ class Screen:
     @property
     def _cleared(self) -> str:
         return "\r\x1b[K" if self._line else ""
-
-    def _show_line(self) -> None:
-        if not self._typed:
-            self._texts.put(f"\r{self._line}\x1b[K")
 
     def _write(self) -> None:
         with suppress(OSError, ValueError):  # the terminal is gone

@@ -7,6 +7,7 @@
   const SILENT_MS = 8000; // the server says something every two seconds
   const AGAIN_MS = 1000;
   let shown = null;
+  let swept = null; // the trial whose sweep is drawn
 
   // ---- words
 
@@ -224,7 +225,18 @@
     showButtons(last);
     element("now").hidden = false;
     drawBelief(belief);
+    if (swept !== (last ? last.number : -1)) setTimeout(drawLastSweep); // the slowest, once words and points are there
+  }
+
+  function drawLastSweep() {
+    const last = shown.drawn.trials.at(-1);
+    swept = last ? last.number : -1;
     drawSweep(last);
+  }
+
+  function repaint() {
+    swept = null;
+    if (shown) show();
   }
 
   // ---- the server
@@ -323,6 +335,6 @@
     const text = element("note").value.trim();
     if (text && await send("note", { text }, "The note is in the log.")) element("note").value = "";
   });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => shown && show());
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
   followOn();
 })();
