@@ -198,9 +198,10 @@ def _ratio(ratios: list[float]) -> str:
 
 def _say_how() -> None:
     print("# The live page\n")
-    print(f"- command: `python -m benchmarks.live {shlex.join(sys.argv[1:])}`".replace(" `", "`"))
-    print(f"- isiw {isiw.__version__}, python {platform.python_version()}, fastapi {fastapi.__version__}, "
-          f"uvicorn {uvicorn.__version__}, one thread, {os.cpu_count()} cores that other programs shared\n")  # fmt: skip
+    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.live', *sys.argv[1:]])}`")
+    libraries = f"fastapi {fastapi.__version__}, uvicorn {uvicorn.__version__}"
+    print(f"- isiw {isiw.__version__}, python {platform.python_version()}, {libraries}, one thread")
+    print(f"- {os.cpu_count()} cores that other programs shared; load average {os.getloadavg()[1]:.0f} before\n")
 
 
 if __name__ == "__main__":

@@ -29,10 +29,12 @@ def session_of(folder: Path) -> isiw.Session:
     strategy = isiw.make_strategy(
         space=space, seed=SEED, max_trials=40, particles=200, stop_width_ms=0.01, stop_expected_f1=1.0
     )
-    session = isiw.Session(
-        device, strategy, log=folder / "P07.mcap", subject="P07",
-        on_trial=lambda update: session.pause("Time to look at the coil.") if update.trial.index == PAUSE_AFTER else None,
-    )  # fmt: skip
+
+    def on_trial(update: isiw.session.SessionUpdate) -> None:
+        if update.trial.index == PAUSE_AFTER:
+            session.pause("Time to look at the coil.")
+
+    session = isiw.Session(device, strategy, log=folder / "P07.mcap", subject="P07", on_trial=on_trial)
     return session
 
 

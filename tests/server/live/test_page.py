@@ -46,7 +46,7 @@ def test_what_is_of_the_session_needs_the_token_and_the_pages_own_origin(watched
 def test_what_is_shown_is_what_the_log_holds(watched: Watched) -> None:
     watched.start(trials=3)
     with watched.viewer() as news:
-        shown = next(state for state in news if "2" in state["drawn"]["beliefs"])
+        shown = next(state for state in news if "2" in state["drawn"]["beliefs"] and state["left"] == 3)
     record = watched.record
     (belief,) = shown["drawn"]["beliefs"].values()
     assert shown["phase"] == "running"
@@ -101,6 +101,16 @@ def test_a_paused_session_can_be_ended(watched: Watched) -> None:
     assert watched.events[-1] == ("pause", "Ended on the live page.")
 
 
+def test_a_pause_whose_reason_holds_what_terminals_obey_can_be_answered(watched: Watched) -> None:
+    with watched.viewer() as news:
+        watched.start()
+        watched.session.pause("The device said \x1b[2J.")
+        reason = next(state["pause"] for state in news if state["phase"] == "paused")
+        assert reason == "The device said ."
+        done(watched.press("resume", reason=reason))
+        watched.until(lambda: watched.session.paused is None)
+
+
 def test_what_cannot_be_done_is_said(watched: Watched) -> None:
     refused(watched.press("pause"), 409, "NotRunning")
     watched.start()
@@ -108,7 +118,8 @@ def test_what_cannot_be_done_is_said(watched: Watched) -> None:
     refused(watched.press("resume", reason="Paused on the live page."), 409, "OtherPause")
     refused(watched.press("note"), 422, "InvalidValueError")
     watched.finish()
-    for button, body in {"pause": {}, "stop": {}, "note": {"text": "late"}, "exclude": {"trial": 0}}.items():
+    late: dict[str, dict[str, Any]] = {"pause": {}, "stop": {}, "note": {"text": "late"}, "exclude": {"trial": 0}}
+    for button, body in late.items():
         refused(watched.press(button, **body), 409, "NotRunning")
 
 

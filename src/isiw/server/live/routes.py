@@ -16,6 +16,7 @@ from isiw.server.live.view import View
 from isiw.server.refusals import Refusal
 from isiw.server.requests import ExcludeRequest, GoOnRequest, IncludeRequest, NoteRequest, body_of
 from isiw.session.loop import Session
+from isiw.text import plain
 
 __all__ = ["FILES", "router"]
 
@@ -121,7 +122,7 @@ def pause(session: Running) -> OkAnswer:
 @router.post("/resume")
 def resume(session: Running, body: Annotated[GoOnRequest, Depends(body_of(GoOnRequest))]) -> OkAnswer:
     """Let the paused session go on, if it still waits for what was shown."""
-    if body.reason != session.paused:
+    if session.paused is None or body.reason != plain(session.paused):
         raise Refusal(409, "OtherPause", "the session does not wait for this answer", got=body.reason, field="reason")
     session.go_on()
     return OkAnswer()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import time
 from collections import deque
@@ -41,7 +42,7 @@ class Shown(NamedTuple):
 class View:
     """Follows one session. It keeps the last sweep, the last estimate and the last events, and no others.
 
-    The session's loop calls what a follower is told, the server's thread everything else.
+    The session's threads call what a follower is told, the server's thread everything else.
 
     Args:
         session: the session.
@@ -54,6 +55,7 @@ class View:
         self._coming: dict[tuple[int, str], Waveform] = {}
         self._sweep: dict[tuple[int, str], Waveform] = {}
         self._update: SessionUpdate | None = None
+        self._numbers = itertools.count(1)
         self._news = self._viewers = 0
         self._seen_s: float | None = None
         self._shown, self._made_s = Shown(None, ""), -UPDATE_S
@@ -70,12 +72,13 @@ class View:
             self._estimate = record
         elif isinstance(record, Event):
             self._events.append(record)
-        self._news += not isinstance(record, Intent)
+        if not isinstance(record, Intent):
+            self._news = next(self._numbers)
 
     def updated(self, update: SessionUpdate) -> None:
         """Keep what is left of the session."""
         self._update = update
-        self._news += 1
+        self._news = next(self._numbers)
 
     def ended(self) -> None:
         """Nothing more comes."""
