@@ -224,14 +224,23 @@
     tellTables();
     showButtons(last);
     element("now").hidden = false;
-    drawBelief(belief);
-    if (swept !== (last ? last.number : -1)) setTimeout(drawLastSweep); // the slowest, once words and points are there
+    later(draw);
   }
 
-  function drawLastSweep() {
+  // Words are painted first. Where news come faster than pictures, only the latest are drawn.
+  let waiting = null;
+  function later(task) {
+    clearTimeout(waiting);
+    waiting = setTimeout(task);
+  }
+
+  function draw() {
+    drawBelief(Object.values(shown.drawn.beliefs)[0]);
     const last = shown.drawn.trials.at(-1);
-    swept = last ? last.number : -1;
-    drawSweep(last);
+    if (swept !== (last ? last.number : -1)) later(() => {
+      swept = last ? last.number : -1;
+      drawSweep(last);
+    });
   }
 
   function repaint() {

@@ -25,8 +25,11 @@ __all__ = ["View"]
 MOST_EVENTS: Final = 100
 """Events that the page lists; the log has all."""
 
-UPDATE_S: Final = 0.2
-"""The shortest time between two updates [s]: a session faster than that is not slowed down by being looked at."""
+UPDATE_S: Final = 0.1
+"""The shortest time between two updates [s]."""
+
+SHARE: Final = 0.01
+"""Of the time that goes into making updates: a session that is faster than they are is not slowed down by them."""
 
 AWAY_S: Final = 60.0
 """Who was there a shorter time ago is taken to come back, as after loading the page again [s]."""
@@ -58,7 +61,7 @@ class View:
         self._numbers = itertools.count(1)
         self._news = self._viewers = 0
         self._seen_s: float | None = None
-        self._shown, self._made_s = Shown(None, ""), -UPDATE_S
+        self._shown, self._next_s = Shown(None, ""), 0.0
         self.over = False
 
     def logged(self, record: Record, channel_name: str | None) -> None:
@@ -106,9 +109,10 @@ class View:
     def shown(self) -> Shown:
         """What the page shows now; put together once for all who look, and not too often."""
         state = (self._news, self._session.paused, self._session.running, self.over)
-        if state != self._shown.state and (self.over or time.monotonic() - self._made_s >= UPDATE_S):
+        if state != self._shown.state and (self.over or time.monotonic() >= self._next_s):
+            begun_s = time.thread_time()
             self._shown = Shown(state, json.dumps(self._contents(), allow_nan=False, separators=(",", ":")))
-            self._made_s = time.monotonic()
+            self._next_s = time.monotonic() + max(UPDATE_S, (time.thread_time() - begun_s) / SHARE)
         return self._shown
 
     def _contents(self) -> dict[str, Any]:
