@@ -14,8 +14,8 @@ from isiw.trials import TrialTable
 __all__ = ["KEYS", "Desk", "Operated"]
 
 KEYS: Final = (
-    "p pause, x exclude the last trial, u undo that, a accept or j reject the last MEP, n note, ? these keys, "
-    "Ctrl-C pause, Ctrl-C twice end"
+    "p pause, x exclude the last trial, u undo that, n note, ? these keys,\n"
+    "a accept or j reject the last MEP, Ctrl-C pause, Ctrl-C twice end"
 )
 _WORTH_COUNTING_S = 15.0
 

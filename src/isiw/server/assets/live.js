@@ -203,7 +203,7 @@
     element("operate").hidden = !["running", "paused"].includes(phase);
     element("pause").hidden = phase === "paused";
     element("resume").hidden = phase !== "paused";
-    if (focused.hidden) element(phase === "paused" ? "resume" : "pause").focus(); // the button that was pressed is gone
+    if (focused?.hidden) element(phase === "paused" ? "resume" : "pause").focus(); // the button that was pressed is gone
     element("exclude").disabled = !last || last.kind === "mistrial";
     said("exclude", last && last.kind === "excluded" ? `Count trial ${last.number} again` : "Exclude the last trial");
   }

@@ -8,7 +8,6 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 from isiw.log.reader import SessionRecord
@@ -62,6 +61,7 @@ class View:
         self._news = self._viewers = 0
         self._seen_s: float | None = None
         self._shown, self._next_s = Shown(None, ""), 0.0
+        self._facts = [(fact.name, plain(fact.value)) for fact in first_facts(self._record())]
         self.over = False
 
     def logged(self, record: Record, channel_name: str | None) -> None:
@@ -129,10 +129,6 @@ class View:
             "leftS": None if update is None else update.left_s,
             "events": [[event.trial, event.kind, plain(event.text)] for event in tuple(self._events)],
         }
-
-    @cached_property
-    def _facts(self) -> list[tuple[str, str]]:
-        return [(fact.name, plain(fact.value)) for fact in first_facts(self._record())]
 
     def _phase(self) -> str:
         if self.over:
