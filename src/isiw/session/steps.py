@@ -17,6 +17,7 @@ from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus, Trial
 from isiw.visit import Control
+from isiw.window import WindowEstimate
 
 __all__ = ["Steps", "paused"]
 
@@ -144,24 +145,23 @@ class Steps:
             self._freely(learn, self.strategy, trial)
         if trial.told and self.strategy.trouble is not None:
             self._journal.log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
-        decision, next_isi_ms = self.log_estimate(trial.index)
+        estimate, decision, next_isi_ms = self.log_estimate(trial.index)
         self._journal.unconcluded = None
         if not decision.stop and self.delivery.watch.reason is not None:
             self._pausing.reason = self.delivery.watch.reason
         if self.on_trial is not None:
-            estimate = self._freely(self.strategy.estimate)
             left = self._stimuli_left()
             update = SessionUpdate(trial, estimate, decision, next_isi_ms, left, self._pace.left_s(left))
             self._freely(self.on_trial, update)
         return decision
 
-    def log_estimate(self, trial: int) -> tuple[StopDecision, float | None]:
-        """Put what is believed after a trial on disk; the decision and the next ISI [ms]."""
+    def log_estimate(self, trial: int) -> tuple[WindowEstimate, StopDecision, float | None]:
+        """Put what is believed after a trial on disk; the estimate, the decision, and the next ISI [ms]."""
         estimate, decision = self._freely(self.strategy.estimate), self._freely(self._decision)
         next_isi_ms = None if decision.stop else self._next_isi_ms()
         self._journal.log.append(Estimate.of(trial, estimate, decision, next_isi_ms))
         self._journal.log.sync()
-        return decision, next_isi_ms
+        return estimate, decision, next_isi_ms
 
     def _decision(self) -> StopDecision:
         """The strategy's decision; none is made on data that a person should look at first."""
