@@ -20,8 +20,8 @@ from isiw.text import plain
 
 __all__ = ["FILES", "router"]
 
-GLANCE_S: Final = 0.05
-"""How often is looked for news [s]."""
+GLANCE_S, MOST_S = 0.05, 0.5
+"""How often is looked for news, and how long at most where none is put together for a while [s]."""
 
 QUIET_S: Final = 2.0
 """After so long without news, the page is told that the session is still there [s]."""
@@ -108,8 +108,9 @@ async def _followed(view: View) -> AsyncIterator[str]:
                 yield ": still here\n\n"
             if over:
                 return
-            await asyncio.sleep(GLANCE_S)
-            quiet_s += GLANCE_S
+            glance_s = max(GLANCE_S, min(view.wait_s, MOST_S))
+            await asyncio.sleep(glance_s)
+            quiet_s += glance_s
 
 
 @router.post("/pause")

@@ -115,6 +115,11 @@ class View:
             self._next_s = time.monotonic() + max(UPDATE_S, (time.thread_time() - begun_s) / SHARE)
         return self._shown
 
+    @property
+    def wait_s(self) -> float:
+        """How long nothing new is put together [s]."""
+        return self._next_s - time.monotonic()
+
     def _contents(self) -> dict[str, Any]:
         record, update = self._record(), self._update
         return {
