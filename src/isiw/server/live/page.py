@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 import threading
 from types import TracebackType
@@ -54,9 +55,7 @@ class LivePage:
         self._listener = listening(_ADDRESS, port)
         self.url = f"http://{_ADDRESS}:{self._listener.getsockname()[1]}/#{token}"
         self._server = uvicorn.Server(config)
-        self._thread = threading.Thread(
-            target=self._server.run, args=([self._listener],), name="isiw live page", daemon=True
-        )
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="isiw live page", daemon=True)
         session.follow(self._view)
         self._thread.start()
 
@@ -67,6 +66,12 @@ class LivePage:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    async def _serve(self) -> None:
+        await self._server.serve([self._listener])
+        for connection in tuple(self._server.server_state.connections):  # of viewers that take nothing
+            connection.transport.abort()
+        await asyncio.sleep(0)
 
     def close(self) -> None:
         """Show the end to those who still look, and serve no longer."""
