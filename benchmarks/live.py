@@ -193,7 +193,7 @@ def main() -> None:
 
 
 def _compare(seed: int, trials: int, iti_s: float, pairs: int) -> None:
-    without, watched = [], []
+    without, watched = list[Run](), list[Run]()
     for pair in range(pairs):
         for many in (0, 2) if pair % 2 == 0 else (2, 0):
             (watched if many else without).append(ran(seed + pair, trials, iti_s, many))
