@@ -21,7 +21,7 @@
 
   const phases = {
     waiting: "The session has not begun.", running: "The session runs.",
-    over: "The session has ended. This page shows its last state; the log is complete.",
+    over: "The session has ended. This page shows its last state.",
   };
 
   function tellPhase() {
