@@ -45,6 +45,7 @@ from .devices.transports.line import LineDevice as LineDevice
 from .devices.transports.lsl import LslChannel as LslChannel
 from .devices.transports.lsl import LslDevice as LslDevice
 from .log.reader import read_session as read_session
+from .server.live.page import watch as watch
 from .session.loop import Session as Session
 from .session.recorder import Recorder as Recorder
 from .session.recorder import open_session as open_session

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 import pytest
 
 from isiw.errors import InvalidValueError
+from isiw.session.asking import Asking
 from isiw.session.desk import Desk
 from isiw.trials import Status, Trial, TrialTable
 
@@ -108,6 +109,18 @@ def test_a_pause_lasts_until_it_is_decided(key: str, goes_on: bool) -> None:  # 
         press(desk, key)
         paused.join(0.01)
     assert answers == [goes_on]
+
+
+def test_a_pause_is_decided_by_whoever_answers_first() -> None:
+    asking, answers = Asking(), list[bool]()
+    desk = Desk(Operated(trial(0)), asking)
+    paused = threading.Thread(target=lambda: answers.append(desk.goes_on("A break.")))
+    paused.start()
+    while not asking.asked:
+        paused.join(0.01)
+    asking.answer(goes_on=True)
+    paused.join()
+    assert answers == [True]
 
 
 def test_where_nobody_is_left_a_pause_is_answered_with_no() -> None:

@@ -145,7 +145,8 @@ class Operator:
         ready, _, _ = select.select([self._terminal], [], [], 0.02)
         if ready:
             try:
-                self.seen += os.read(self._terminal, 65536).decode(errors="ignore").replace("\r", "")
+                read = os.read(self._terminal, 65536).decode(errors="ignore").replace("\r", "")
+                self.seen = (self.seen + read).replace("\x1b[K", "\n")  # a line that is written over
             except OSError:  # how a terminal ends whose process has
                 time.sleep(0.02)
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from isiw.session.loop import Session
-from isiw.session.progress import PROGRESS_HEADINGS, progress_row
+from isiw.session.progress import COLUMNS, PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
 from isiw.session.updates import SessionUpdate
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import MistrialReason, Status, Trial
 from isiw.window import Window, WindowEstimate
-from scripted import ScriptedDevice, scripted_strategy
+from scripted import SPACE, ScriptedDevice, scripted_strategy
 
 
 def update_with(estimate: WindowEstimate, trial: Trial) -> SessionUpdate:
@@ -44,14 +44,47 @@ def test_a_tap_alone_is_told_from_tms_alone() -> None:
     assert progress_row(update_with(WindowEstimate(None, None), pulse))[1:3] == ("TMS alone", "50 µV")
 
 
+def test_the_longest_row_and_the_legend_fit_80_columns_and_terminals_obey_nothing_in_them() -> None:
+    row = ("99999", "\x1b[2J123.5 ms", "mistrial: a reason that is much too long", "0.99", "100–200 ms, 210–300 ms")
+    assert len(fitted((*row, "<–123", "123–>", "99999"))) <= COLUMNS
+    assert fitted(row).startswith("99999 123.5 ms  mistrial: a reason that is… 0.99 100–200 m…")
+    assert all(len(line) < COLUMNS for line in PROGRESS_LEGEND)
+
+
+def window_update(window: Window | None, *, told: int = 9) -> SessionUpdate:
+    grid = SPACE.grid_ms
+    profile = 0.01 + 0.1 * np.exp(-(((grid - 100.0) / 30.0) ** 2))
+    quantiles = np.stack([profile, profile, profile])
+    estimate = WindowEstimate(0.9, window, grid_ms=grid, profile_quantiles_mv=quantiles, pairs=told)
+    trial = Trial(3, Status.ACCEPTED, 40.0, isi_ms=41.0, mep_mv=0.0312)
+    return SessionUpdate(trial, estimate, StopDecision(stop=False, reason=""), 35.0, 17, 104.0)
+
+
+def test_a_line_draws_the_profile_with_the_window_and_tells_what_is_next_and_left() -> None:
+    line = standing(window_update(Window(80.0, 120.0)), SPACE)
+    assert line.endswith("▁ 200 ms  next 35 ms, 17 left, ~1:44 min")
+    assert len(line) < COLUMNS
+    inside = line[line.index("[") + 1 : line.index("]")]
+    assert len(inside) == sum(80.0 <= isi_ms < 120.0 for isi_ms in np.linspace(0, 200, 28))
+    assert "█" in inside
+    assert "█" not in line.replace(inside, "")
+
+
+def test_a_line_without_a_window_has_no_brackets_and_without_a_profile_no_signs() -> None:
+    assert "[" not in standing(window_update(None), SPACE)
+    bare = SessionUpdate(Trial(0, Status.ACCEPTED, 4.0, isi_ms=4.0, mep_mv=1.0), WindowEstimate(None, None),
+                         StopDecision(stop=False, reason=""), None, 17)  # fmt: skip
+    assert standing(bare, SPACE) == "17 left"
+
+
 @pytest.mark.parametrize(
     ("terminal", "progress", "own", "rows"),
     [
-        (True, None, False, 4),
+        (True, None, False, 6),
         (True, None, True, 0),
         (True, False, False, 0),
         (False, None, False, 0),
-        (False, True, True, 4),
+        (False, True, True, 6),
     ],
 )
 def test_progress_is_shown_in_a_terminal_and_can_be_turned_off_and_on(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -41,6 +42,9 @@ _INTERRUPTED = "Interrupted: the device is stopped and the log is closed."
 Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
 Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **NO_DEFAULT)]
 Overwrite = Annotated[bool, typer.Option(help="Replace a file that is there; a log never is.")]
+Live = Annotated[
+    bool, typer.Option("--live", help="Show the session in the browser while it runs, and operate it there.")
+]
 Seed = Annotated[int | None, typer.Option(help="Seed of the person, the trials and the strategy.", **NO_DEFAULT)]
 
 
@@ -83,6 +87,7 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
         int | None, typer.Option(help="The number of the person's visit, for the log.", **NO_DEFAULT)
     ] = None,
     operator: Annotated[str | None, typer.Option(help="Who runs the session, for the log.", **NO_DEFAULT)] = None,
+    live: Live = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Run a session with a simulated person, or with the device of a configuration, and say what was found."""
     with errors_reported():
@@ -97,7 +102,7 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
             day=day,
             operator=operator,
         )
-        _run_to_the_end(isiw.config.session_for(settings))
+        _run_to_the_end(isiw.config.session_for(settings), live=live)
 
 
 @app.command()
@@ -112,13 +117,14 @@ def resume(
         typer.Option(help="Where the log's end is missing: the pulses given that are not in it.", **NO_DEFAULT),
     ] = None,
     verify: Annotated[bool, typer.Option(help="Check that the strategy asks again what the log says it asked.")] = True,  # noqa: FBT002 - a flag of the command line
+    live: Live = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Go on with a session that was interrupted."""
     with errors_reported():
         record = isiw.read_session(log)
         settings = isiw.config.load_config(config) if config else isiw.config.config_of_log(record)
         device = isiw.config.device_for(settings.with_overrides(data=data))
-        _run_to_the_end(isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify))
+        _run_to_the_end(isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify), live=live)
 
 
 @app.command()
@@ -301,7 +307,7 @@ def _is_log(source: str) -> bool:
     return Path(closed).is_file() or Path(f"{closed}.part").is_file()
 
 
-def _run_to_the_end(session: Session) -> None:
+def _run_to_the_end(session: Session, *, live: bool) -> None:
     if session.log_path.suffix.lower() == ".png":
         raise isiw.errors.ConfigError(
             "the log would be overwritten by its picture", got=str(session.log_path), expected=".mcap"
@@ -309,7 +315,7 @@ def _run_to_the_end(session: Session) -> None:
     show(f"log: {session.log_path}")
     before = len(session.trials)
     try:
-        with errors_reported(_INTERRUPTED):
+        with errors_reported(_INTERRUPTED), _shown_live(session) if live else nullcontext():
             result = session.run(progress=True)
     except BaseException:
         if len(session.trials) > before:
@@ -322,6 +328,14 @@ def _run_to_the_end(session: Session) -> None:
         show(isiw.report.truth_sentence(record, truth))
     picture = isiw.plots.save_session_plot(record, _free_beside(result.log, ".png"), truth=truth)
     show(f"log:     {result.log}\npicture: {picture}")
+
+
+@contextmanager
+def _shown_live(session: Session) -> Iterator[None]:
+    """Within, the session has a page in the browser."""
+    with isiw.watch(session) as page:
+        show(f"live page: {page.url}", style="bold")
+        yield
 
 
 def _free_beside(log: Path, suffix: str) -> Path:

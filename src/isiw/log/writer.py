@@ -6,6 +6,7 @@ import itertools
 import shutil
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self, cast
@@ -40,7 +41,8 @@ _COPYING = ".resuming"
 class LogWriter:
     """One session's log: `FILE.part` while it is written, `FILE` once it is closed.
 
-    Use `LogWriter.create` or `LogWriter.continuing`; as a context manager it closes itself.
+    Use `LogWriter.create` or `LogWriter.continuing`; as a context manager it closes itself. `on_append` is told every
+    record, with the channel of a waveform, once it is appended.
 
     Args:
         path: where the log will be.
@@ -57,6 +59,7 @@ class LogWriter:
         self._records = 0
         self._log_time_ns = 0
         self._replaces: Fingerprint | None = None
+        self.on_append: Callable[[Record, str | None], None] | None = None
         self._writer.start(profile="isiw", library="isiw")
         for topic in CHANNEL_IDS:
             self._register(topic)
@@ -157,6 +160,8 @@ class LogWriter:
         data = encode(topic, record)
         with self._lock:
             self._copy(Message(topic, data, time.time_ns()))
+        if self.on_append is not None:
+            self.on_append(record, channel_name)
 
     def sync(self) -> None:
         """Return when everything appended is on the disk."""

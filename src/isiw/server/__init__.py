@@ -1,10 +1,10 @@
-"""Sessions over HTTP, for labs whose software is not written in Python. Needs `isiw[serve]`."""
+"""Sessions over HTTP: for labs whose software is not written in Python, and as a live page. Needs `isiw[serve]`."""
 
 import importlib.util
 
 from isiw.errors import ConfigError
 
-if importlib.util.find_spec("fastapi") is None or importlib.util.find_spec("uvicorn") is None:
+if any(importlib.util.find_spec(name) is None for name in ("fastapi", "plotly", "uvicorn")):
     raise ConfigError("the server's libraries are not installed", remedy='Install them with: pip install "isiw[serve]"')
 
 from isiw.server.app import make_app

@@ -20,7 +20,7 @@ from isiw.server.refusals import Refusal, answered, as_refusal
 from isiw.server.routes import router
 from isiw.server.sessions import Sessions
 
-__all__ = ["make_app"]
+__all__ = ["guarded", "make_app"]
 
 
 def make_app(folder: str | Path, rules: Rules) -> FastAPI:
@@ -42,11 +42,21 @@ def make_app(folder: str | Path, rules: Rules) -> FastAPI:
     )
     app.state.sessions = sessions
     app.include_router(router)
+    guarded(app, rules)
+    app.openapi = lambda: described(app)  # type: ignore[method-assign] # as FastAPI's documentation extends it
+    return app
+
+
+def guarded(app: FastAPI, rules: Rules) -> None:
+    """Put an application behind the guard, and answer every error in words.
+
+    Args:
+        app: the application.
+        rules: who may ask, and how much they may send.
+    """
     app.add_middleware(Guard, rules=rules)
     for kind, handler in _HANDLERS.items():
         app.add_exception_handler(kind, handler)
-    app.openapi = lambda: described(app)  # type: ignore[method-assign] # as FastAPI's documentation extends it
-    return app
 
 
 def _refused(request: Request, error: Exception) -> Response:

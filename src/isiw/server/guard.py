@@ -33,6 +33,7 @@ class Rules:
         hosts: the names under which the server may be asked; a page of another name that a browser shows is refused.
         most_bytes: the longest body [bytes].
         body_s: how long a body may take to arrive [s].
+        open_paths: what is answered without the token, as it says nothing of any session.
 
     Raises:
         InvalidValueError: a token that is too short, or a limit that is not positive.
@@ -42,6 +43,7 @@ class Rules:
     hosts: frozenset[str] = LOOPBACK
     most_bytes: int = 2**20
     body_s: float = 10.0
+    open_paths: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         check_texts(self, "token")
@@ -80,7 +82,8 @@ class Guard:
             return
         try:
             self._require_host(headers)
-            self._require_token(headers)
+            if scope["path"] not in self._rules.open_paths:
+                self._require_token(headers)
         except Refusal as refusal:
             await answered(refusal, as_200=as_200)(scope, receive, send)
             return

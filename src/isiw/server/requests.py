@@ -24,6 +24,7 @@ __all__ = [
     "AskRequest",
     "CreateRequest",
     "ExcludeRequest",
+    "GoOnRequest",
     "IncludeRequest",
     "MistrialRequest",
     "NoteRequest",
@@ -133,6 +134,12 @@ class IncludeRequest(_Request):
     """Which trial counts again."""
 
     trial: TrialNumber
+
+
+class GoOnRequest(_Request):
+    """That a paused session goes on."""
+
+    reason: Text = Field(description="Why it has paused, as it was shown; a later pause is not answered by this.")
 
 
 def body_of(kind: type[_Kind]) -> Callable[[Request], Awaitable[_Kind]]:

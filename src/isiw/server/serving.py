@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Final
 
 import uvicorn
+from fastapi import FastAPI
 
 from isiw.checks import check_texts, check_wholes
 from isiw.errors import ConfigError
 from isiw.server.app import make_app
 from isiw.server.guard import LOOPBACK, Rules
 
-__all__ = ["ServerSettings", "serve"]
+__all__ = ["ServerSettings", "listening", "new_token", "serve", "settings_of"]
 
 PORT: Final = 8473
 
@@ -25,7 +26,8 @@ _MOST_CONNECTIONS: Final = 200
 _LEAVING_S: Final = 2
 
 
-def _new_token() -> str:
+def new_token() -> str:
+    """A random token."""
     return secrets.token_urlsafe(32)
 
 
@@ -49,7 +51,7 @@ class ServerSettings:
     folder: Path
     host: str = "127.0.0.1"
     port: int = PORT
-    token: str = field(default_factory=_new_token, repr=False)
+    token: str = field(default_factory=new_token, repr=False)
     certificate: Path | None = None
     key: Path | None = None
 
@@ -93,37 +95,55 @@ def serve(settings: ServerSettings, ready: Callable[[str], None]) -> None:
         ConfigError: the port is taken, or the address is not this computer's.
     """
     app = make_app(settings.folder, settings.rules())
-    with _listening(settings) as listener:
+    with listening(settings.address, settings.port) as listener:
         host, port, *_ = listener.getsockname()
         name = f"[{host}]" if settings.address.version == 6 else host
-        config = uvicorn.Config(
-            app,
-            http="h11",
-            ws="none",
-            log_level="error",
-            access_log=False,
-            server_header=False,
-            proxy_headers=False,
-            limit_concurrency=_MOST_CONNECTIONS,
-            timeout_graceful_shutdown=_LEAVING_S,
-            ssl_certfile=settings.certificate,
-            ssl_keyfile=settings.key,
-        )
+        config = settings_of(app, settings.certificate, settings.key)
         config.load()  # which reads certificate and key
         ready(f"{'https' if settings.certificate else 'http'}://{name}:{port}")
         uvicorn.Server(config).run(sockets=[listener])
 
 
-def _listening(settings: ServerSettings) -> socket.socket:
-    family = socket.AF_INET6 if settings.address.version == 6 else socket.AF_INET
+def settings_of(app: FastAPI, certificate: Path | None = None, key: Path | None = None) -> uvicorn.Config:
+    """How uvicorn serves an application of isiw.
+
+    Args:
+        app: the application.
+        certificate: the file of a TLS certificate.
+        key: the file of its key.
+    """
+    return uvicorn.Config(
+        app,
+        http="h11",
+        ws="none",
+        log_level="error",
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,
+        limit_concurrency=_MOST_CONNECTIONS,
+        timeout_graceful_shutdown=_LEAVING_S,
+        ssl_certfile=certificate,
+        ssl_keyfile=key,
+    )
+
+
+def listening(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int) -> socket.socket:
+    """A socket that listens.
+
+    Args:
+        address: where.
+        port: the port; 0 for any that is free.
+
+    Raises:
+        ConfigError: the port is taken, or the address is not this computer's.
+    """
+    family = socket.AF_INET6 if address.version == 6 else socket.AF_INET
     try:
-        listener = socket.create_server(
-            (str(settings.address), settings.port), family=family, backlog=_MOST_CONNECTIONS
-        )
+        listener = socket.create_server((str(address), port), family=family, backlog=_MOST_CONNECTIONS)
     except OSError as error:
         raise ConfigError(
             f"the server cannot listen: {error.strerror}",
-            got=f"{settings.host}, port {settings.port}",
+            got=f"{address}, port {port}",
             remedy="Choose another port; 0 takes any that is free.",
         ) from error
     listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # or each answer waits 40 ms for the one before

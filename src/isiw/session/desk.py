@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Final, Protocol
 
 from isiw.errors import InvalidValueError, LogError
-from isiw.session.terminal import Keys, Screen
+from isiw.session.asking import Asking
+from isiw.session.terminal import ERASED, Keys, Screen
 from isiw.trials import TrialTable
 
 __all__ = ["KEYS", "Desk", "Operated"]
 
 KEYS: Final = (
-    "p pause, x exclude the last trial, u undo that, a accept or j reject the last MEP, n note, ? these keys, "
-    "Ctrl-C pause, Ctrl-C twice end"
+    "p pause, x exclude the last trial, u undo that, n note, ? these keys,\n"
+    "a accept or j reject the last MEP, Ctrl-C pause, Ctrl-C twice end"
 )
 _WORTH_COUNTING_S = 15.0
-_NAP_S = 0.05
 
 
 class Operated(Protocol):
@@ -57,13 +56,13 @@ class Desk:
 
     Args:
         session: what is operated.
+        asking: whether a paused session goes on; others may answer, too.
     """
 
-    def __init__(self, session: Operated) -> None:
-        self._session, self.screen = session, Screen()
+    def __init__(self, session: Operated, asking: Asking | None = None) -> None:
+        self._session, self.screen, self._asking = session, Screen(), asking or Asking()
         self._note: str | None = None
-        self._asking = self._left_alone = False
-        self._answer: bool | None = None
+        self._left_alone = False
         self._counted: int | None = None
         self.away: Callable[[], AbstractContextManager[None]] = nullcontext
 
@@ -88,13 +87,16 @@ class Desk:
         self.screen.say(f"{reason} The device is disarmed. r goes on, q ends the session, which can be resumed later.")
         if self._note is not None:
             self.screen.say("First finish the note with Enter, or drop it with Esc.")
-        self._asking = True
-        try:
-            while self._answer is None and not self._left_alone:
-                time.sleep(_NAP_S)
-            return bool(self._answer)
-        finally:
-            self._asking, self._answer = False, None
+        return self._asking.wait(lambda: self._left_alone)
+
+    def show(self, row: str, standing: str) -> None:
+        """Show a row of the table, and below it how the session stands.
+
+        Args:
+            row: the row.
+            standing: how it stands, in a line.
+        """
+        self.screen.say(row, standing)
 
     def count_down(self, left_s: float, text: str) -> None:
         """Show how long a wait still lasts, where it is worth it.
@@ -144,8 +146,8 @@ class Desk:
         }
 
     def _decide(self, key: str) -> None:
-        if self._asking:
-            self._answer = key == "r"
+        if self._asking.asked:
+            self._asking.answer(goes_on=key == "r")
         else:
             self.screen.say("The session is not paused; p pauses it.")
 
@@ -173,7 +175,6 @@ class Desk:
 
     def _begin_note(self) -> None:
         self._note = ""
-        self.screen.counted_down()
         self.screen.type("Note (Enter keeps it, Esc drops it): ")
 
     def _type(self, note: str, key: str) -> None:
@@ -188,7 +189,7 @@ class Desk:
             self.screen.type("\n")
         elif key in "\x7f\b":
             self._note = note[:-1]
-            self.screen.type("\b \b" if note else "")
+            self.screen.type(ERASED if note else "")
         elif key.isprintable():
             self._note = note + key
             self.screen.type(key)

@@ -85,6 +85,11 @@ class Journal:
             self._log = None
 
     @property
+    def is_open(self) -> bool:
+        """Whether the log is open."""
+        return self._log is not None
+
+    @property
     def last(self) -> int | None:
         """The number of the last trial; None before the first."""
         return len(self.trials) - 1 if self.trials else None

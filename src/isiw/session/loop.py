@@ -22,11 +22,12 @@ from isiw.log.schema import Event, Header, Record
 from isiw.log.writer import LogWriter
 from isiw.session.delivery import Delivery
 from isiw.session.desk import Desk
+from isiw.session.following import Follower, Followers
 from isiw.session.header import header_of, require_parts
 from isiw.session.journal import Journal
 from isiw.session.judging import Judging
 from isiw.session.pausing import Pausing
-from isiw.session.progress import PROGRESS_HEADINGS, progress_row, show_progress
+from isiw.session.progress import fitted, progress_row, show_legend, show_progress, standing
 from isiw.session.rig import Rig, require_matching
 from isiw.session.safeguards import Safeguards
 from isiw.session.steps import Steps, paused
@@ -124,6 +125,7 @@ class Session(Judging):
         self._resumed = False
         self._journal, self._space = Journal(), strategy.space
         self._pausing = Pausing(self._rig, self._journal, self._safeguards)
+        self._followers = Followers(self._rig.faults)
         self._steps = self._steps_with(strategy)
 
     def _steps_with(self, strategy: Strategy) -> Steps:
@@ -136,6 +138,24 @@ class Session(Judging):
     def strategy(self) -> Strategy:
         """What proposes ISIs and learns; another object once a trial was judged anew."""
         return self._steps.strategy
+
+    @property
+    def header(self) -> Header:
+        """What the session is, as its log says it."""
+        return self._header
+
+    @property
+    def paused(self) -> str | None:
+        """Why the session waits for somebody to say whether it goes on; None where it does not."""
+        return self._pausing.waiting
+
+    def follow(self, follower: Follower) -> None:
+        """Let somebody look on; before `run`. Where there is no terminal, pauses are decided by who looks on.
+
+        Args:
+            follower: is told what is logged; what fails in it does not stop the session.
+        """
+        self._followers.add(follower)
 
     def continue_from(
         self,
@@ -175,11 +195,17 @@ class Session(Judging):
             LogError: the log cannot be written, or is no longer at its path; nothing is delivered without a log.
             StrategyError: the strategy knows of trials that are not this session's; nothing was delivered.
         """
+        try:
+            return self._run(progress=progress, keys=keys)
+        finally:
+            self._followers.ended()
+
+    def _run(self, *, progress: bool | None, keys: bool) -> SessionResult:
         self._require_own_strategy()
         earlier_s = self._earlier_s()
         self._steps.on_trial = self._reporting(progress=progress)
         with self._rig.driven(), self._open_log(self._header) as log, self._journal.writing(log):
-            self._rig.log = log
+            self._rig.log, log.on_append = log, self._followers.logged
             try:
                 self._log_beginning()
                 with self._operated(keys=keys), self._rig.armed(len(self.trials), earlier_s):
@@ -196,24 +222,35 @@ class Session(Judging):
     def _reporting(self, *, progress: bool | None) -> Callable[[SessionUpdate], None] | None:
         """What is called after every trial."""
         shown = self._on_trial is None and is_terminal(sys.stdout) if progress is None else progress
-        if not shown:
-            return self._on_trial
-        show_progress(PROGRESS_HEADINGS)
+        if shown:
+            show_legend()
 
         def report(update: SessionUpdate) -> None:
-            show_progress(progress_row(update))
+            self._followers.updated(update)
+            if shown:
+                self._show(update)
             if self._on_trial is not None:
                 self._on_trial(update)
 
-        return report
+        return report if shown or self._followers else self._on_trial
+
+    def _show(self, update: SessionUpdate) -> None:
+        """Show a trial: in a terminal with a last line that says how the session stands."""
+        row, desk = progress_row(update), self._steps.desk
+        if desk is not None and is_terminal(sys.stdout):
+            desk.show(fitted(row), standing(update, self._space))
+        else:
+            show_progress(row)
 
     @contextmanager
     def _operated(self, *, keys: bool) -> Iterator[None]:
         """Within, the operator's keys are heard, where there is an operator at a terminal."""
+        if self._safeguards.on_pause is None and self._followers:
+            self._pausing.decide = lambda _: self._pausing.asking.wait(self._followers.nobody)
         if not keys or self._safeguards.on_pause is not None or not somebody_there():
             yield
             return
-        desk = Desk(self)
+        desk = Desk(self, self._pausing.asking)
         with desk.staffed():
             self._steps.desk, self._pausing.decide, self._rig.interrupts.away = desk, desk.goes_on, desk.away
             try:
@@ -231,6 +268,27 @@ class Session(Judging):
             reason: why, for the operator and the log.
         """
         self._pausing.now(reason)
+
+    def go_on(self) -> None:
+        """Let a paused session go on, as the key r does; from any thread.
+
+        Raises:
+            InvalidValueError: it is not paused, or `Safeguards.on_pause` decides.
+        """
+        self._pausing.asking.answer(goes_on=True)
+
+    def end(self, reason: str) -> None:
+        """Disarm now, and end before the next stimulus; from any thread. The session can be resumed later.
+
+        Args:
+            reason: why, for the log.
+        """
+        self._pausing.end(reason)
+
+    @property
+    def running(self) -> bool:
+        """Whether its log is open."""
+        return self._journal.is_open
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         self._journal.judge(verdict)

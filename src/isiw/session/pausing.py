@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from isiw.session.asking import Asking
 from isiw.session.journal import Journal
 from isiw.session.operator import goes_on
 from isiw.session.rig import Rig
@@ -25,6 +26,9 @@ class Pausing:
         self._rig, self._journal = rig, journal
         self.decide = safeguards.on_pause or goes_on
         self.reason: str | None = None
+        self.waiting: str | None = None
+        self.asking = Asking()
+        self._ending = False
 
     @property
     def due(self) -> bool:
@@ -39,6 +43,20 @@ class Pausing:
         """
         self.reason = reason
         self._rig.disarm()
+
+    def end(self, reason: str) -> None:
+        """Disarm, and end before the next stimulus; from any thread.
+
+        Args:
+            reason: why, for the log.
+        """
+        self._ending = True
+        if self.waiting is None:
+            self.now(reason)
+            return
+        self._journal.event("pause", reason)
+        if self.asking.asked:
+            self.asking.answer(goes_on=False)
 
     def until_decided(self) -> str | None:
         """Pause until somebody says that the session goes on; where nobody does, the reason that it ends with.
@@ -55,7 +73,7 @@ class Pausing:
         reason, self.reason = self.reason or _INTERRUPTED, None
         self._journal.event("pause", reason)
         self._journal.log.sync()
-        if not interrupts.freely(self.decide, reason):
+        if not self._goes_on(reason):
             if interrupts.heard:
                 raise KeyboardInterrupt
             return reason
@@ -63,3 +81,10 @@ class Pausing:
         self._journal.event("pause", "The operator goes on.")
         rig.stage()
         return None
+
+    def _goes_on(self, reason: str) -> bool:
+        self.waiting = reason
+        try:
+            return not self._ending and self._rig.interrupts.freely(self.decide, reason) and not self._ending
+        finally:
+            self.waiting = None

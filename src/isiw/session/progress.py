@@ -1,22 +1,48 @@
-"""The live table of a session: a row a trial."""
+"""The live table of a session: a row a trial, and below it a line that says how it stands. All fits 80 columns."""
 
 from __future__ import annotations
 
+import itertools
 import math
 import sys
 from collections.abc import Sequence
+from typing import Final
 
+import numpy as np
+
+from isiw.design import DesignSpace
 from isiw.session.updates import SessionUpdate
 from isiw.text import plain
 from isiw.trials import Trial
 from isiw.window import Interval, WindowEstimate
 
-__all__ = ["PROGRESS_HEADINGS", "aligned", "asked", "outcome", "progress_row", "show_progress"]
+__all__ = [
+    "PROGRESS_HEADINGS",
+    "PROGRESS_LEGEND",
+    "aligned",
+    "asked",
+    "fitted",
+    "outcome",
+    "progress_row",
+    "show_legend",
+    "show_progress",
+    "standing",
+]
 
-PROGRESS_HEADINGS = ("trial", "ISI", "MEP", "P(window)", "window", "start", "end", "left")
+PROGRESS_HEADINGS: Final = ("trial", "ISI", "MEP", "P", "window", "start", "end", "left")
 """What `progress_row` holds; start and end are 90 % intervals, left is what the budget still allows."""
 
-_WIDTHS = (5, 9, 30, 9, 14, 8, 8, 4)
+PROGRESS_LEGEND: Final = (
+    "P: probability of a window. start, end: 90 % intervals of its edges [ms],",
+    "< before and > after the range of ISIs. left: stimuli that are still allowed.",
+)
+"""What the headings and signs of the table mean."""
+
+COLUMNS: Final = 80
+SPARKS: Final = "▁▂▃▄▅▆▇█"
+MOST_SPARKS: Final = 28
+
+_WIDTHS = (5, 9, 27, 4, 10, 7, 7, 4)
 
 
 def progress_row(update: SessionUpdate) -> tuple[str, ...]:
@@ -36,13 +62,72 @@ def show_progress(row: Sequence[str]) -> None:
     Args:
         row: its cells.
     """
-    sys.stdout.write(f"{plain(aligned(row))}\n")
+    sys.stdout.write(f"{fitted(row)}\n")
+    sys.stdout.flush()
+
+
+def show_legend() -> None:
+    """Print what comes before the first row: what the headings mean, and the headings."""
+    sys.stdout.write("".join(f"{line}\n" for line in (*PROGRESS_LEGEND, fitted(PROGRESS_HEADINGS))))
     sys.stdout.flush()
 
 
 def aligned(row: Sequence[str]) -> str:
     """A row whose cells stand below those of other rows."""
-    return "  ".join(cell.ljust(width) for cell, width in zip(row, _WIDTHS, strict=False)).rstrip()
+    return " ".join(cell.ljust(width) for cell, width in zip(row, _WIDTHS, strict=False)).rstrip()
+
+
+def fitted(row: Sequence[str]) -> str:
+    """The same within 80 columns: what is too long for its column is cut short.
+
+    Args:
+        row: its cells.
+    """
+    return aligned([_short_of(plain(cell), width) for cell, width in zip(row, _WIDTHS, strict=False)])
+
+
+def _short_of(text: str, width: int) -> str:
+    return text if len(text) <= width else f"{text[: width - 1]}…"
+
+
+def standing(update: SessionUpdate, space: DesignSpace) -> str:
+    """How a session stands, in a line: the expected MEP over the ISIs, [ ] around the window, what is next and left.
+
+    Args:
+        update: what is known after the last trial.
+        space: the ISIs.
+    """
+    following = "" if update.next_isi_ms is None else f"next {update.next_isi_ms:.4g} ms, "
+    pace = "" if update.left_s is None else f", ~{_minutes(update.left_s)} min"
+    text = f"{_profile(update.estimate, space)}{following}{update.stimuli_left} left{pace}"
+    return _short_of(text, COLUMNS - 1)
+
+
+def _minutes(duration_s: float) -> str:
+    return f"{round(duration_s) // 60}:{round(duration_s) % 60:02d}"
+
+
+def _profile(estimate: WindowEstimate, space: DesignSpace) -> str:
+    """The expected MEP, on a logarithmic scale from its smallest to its largest; empty where there is none."""
+    if estimate.grid_ms is None:
+        return ""
+    isi_ms = np.linspace(space.low_ms, space.high_ms, MOST_SPARKS)
+    band = estimate.profile(isi_ms)
+    if band is None:
+        return ""
+    size = np.log(np.maximum(band.median_mv, 1e-6))
+    level = (size - size.min()) / max(float(np.ptp(size)), math.log(2.0))  # what hardly differs is drawn flat
+    sparks = [SPARKS[round(float(height) * (len(SPARKS) - 1))] for height in level]
+    return f"{space.low_ms:g} {_bracketed(sparks, isi_ms.tolist(), estimate)} {space.high_ms:g} ms  "
+
+
+def _bracketed(sparks: Sequence[str], isi_ms: Sequence[float], estimate: WindowEstimate) -> str:
+    """The signs of a profile, with brackets around each segment of the window."""
+    window = estimate.window if estimate.rests_on_data else None
+    inside = [False, *([False] * len(sparks) if window is None else window.mask(isi_ms).tolist()), False]
+    edges = {(False, True): "[", (True, False): "]"}
+    marks = [edges.get(pair, "") for pair in itertools.pairwise(inside)]
+    return "".join(itertools.chain(*zip(marks, [*sparks, ""], strict=True)))
 
 
 def asked(trial: Trial) -> str:

@@ -10,6 +10,7 @@ from isiw.session.believed import believed
 from isiw.session.delivery import Delivery
 from isiw.session.desk import Desk
 from isiw.session.journal import Journal, learn, relearned
+from isiw.session.pace import Pace
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig
 from isiw.session.updates import SessionUpdate
@@ -17,6 +18,7 @@ from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus, Trial
 from isiw.visit import Control
+from isiw.window import WindowEstimate
 
 __all__ = ["Steps", "paused"]
 
@@ -55,6 +57,7 @@ class Steps:
         self.on_trial: Callable[[SessionUpdate], None] | None = None
         self.desk: Desk | None = None
         self._rig, self._journal, self._pausing, self._header = rig, journal, pausing, header
+        self._pace = Pace()
         self._backoffs_s, self._freely = backoffs_s, rig.interrupts.freely
 
     def next(self) -> StopDecision | None:
@@ -113,6 +116,7 @@ class Steps:
         if not self._disturbed:
             fallback = None if stimulus.isi_ms is None else self.strategy.fallback_reason
             self.delivery.deliver(stimulus, fallback)
+            self._pace.passed(self._rig.clock.now_s())
 
     def _wait(self) -> None:
         """Sleep until limits and protocol allow the next stimulus, or an operator has another wish."""
@@ -142,23 +146,23 @@ class Steps:
             self._freely(learn, self.strategy, trial)
         if trial.told and self.strategy.trouble is not None:
             self._journal.log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
-        decision, next_isi_ms = self.log_estimate(trial.index)
+        estimate, decision, next_isi_ms = self.log_estimate(trial.index)
         self._journal.unconcluded = None
         if not decision.stop and self.delivery.watch.reason is not None:
             self._pausing.reason = self.delivery.watch.reason
         if self.on_trial is not None:
-            estimate = self._freely(self.strategy.estimate)
-            update = SessionUpdate(trial, estimate, decision, next_isi_ms, self._stimuli_left())
+            left = self._stimuli_left()
+            update = SessionUpdate(trial, estimate, decision, next_isi_ms, left, self._pace.left_s(left))
             self._freely(self.on_trial, update)
         return decision
 
-    def log_estimate(self, trial: int) -> tuple[StopDecision, float | None]:
-        """Put what is believed after a trial on disk; the decision and the next ISI [ms]."""
-        decision = self._freely(self._decision)
+    def log_estimate(self, trial: int) -> tuple[WindowEstimate, StopDecision, float | None]:
+        """Put what is believed after a trial on disk; the estimate, the decision, and the next ISI [ms]."""
+        estimate, decision = self._freely(self.strategy.estimate), self._freely(self._decision)
         next_isi_ms = None if decision.stop else self._next_isi_ms()
         self._journal.log.append(self._freely(believed, self.strategy, trial, decision, next_isi_ms))
         self._journal.log.sync()
-        return decision, next_isi_ms
+        return estimate, decision, next_isi_ms
 
     def _decision(self) -> StopDecision:
         """The strategy's decision; none is made on data that a person should look at first."""

@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Final, Self
 
 from isiw.text import plain
 
@@ -24,10 +24,12 @@ else:
     import termios
     import tty
 
-__all__ = ["Keys", "Screen", "is_terminal", "restore", "somebody_there"]
+__all__ = ["ERASED", "Keys", "Screen", "is_terminal", "restore", "somebody_there"]
 
 _GLANCE_S = 0.1
 _LAST_WORDS_S = 1.0
+ERASED: Final = "\b \b"
+"""What takes back the last sign that was typed."""
 
 _as_they_were: dict[int, Any] = {}
 """The settings of terminals that are read key by key, for `restore`: a process that ends itself runs nothing else."""
@@ -55,7 +57,7 @@ class Screen:
 
     def __init__(self) -> None:
         self._texts: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        self._counting = False
+        self._typed = self._counting = self._standing = ""
         self._thread = threading.Thread(target=self._write, name="isiw screen", daemon=True)
 
     def __enter__(self) -> Self:
@@ -65,36 +67,65 @@ class Screen:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._line:
+            self._texts.put("\n")
         self._texts.put(None)
         self._thread.join(_LAST_WORDS_S)  # a terminal that takes no output must not keep a session open
 
-    def say(self, text: str) -> None:
-        """Show a line."""
-        self._texts.put(f"{self._line_begun()}{plain(text)}\n")
+    def say(self, text: str, standing: str | None = None) -> None:
+        """Show a line, above the last one, which stays.
+
+        Args:
+            text: the line.
+            standing: how things stand now, for the last line.
+        """
+        cleared = self._cleared
+        if standing is not None:
+            self._standing = plain(standing)
+        self._texts.put(f"{cleared}{plain(text)}\n{self._line}")
 
     def type(self, text: str) -> None:
-        """Show what is being typed."""
-        self._texts.put(text)
+        """Show what is being typed, in the last line."""
+        begun = "" if self._typed else self._cleared
+        if text == "\n":
+            self._typed = ""
+            self._texts.put(f"\n{self._line}")
+        else:
+            self._typed = self._typed[:-1] if text == ERASED else self._typed + text
+            self._texts.put(f"{begun}{text}")
 
     def count_down(self, text: str) -> None:
         """Show a line in the place of the last one that counted down."""
-        self._texts.put(f"\r{plain(text)}\x1b[K")
-        self._counting = True
+        self._counting = plain(text)
+        if not self._typed:
+            self._texts.put(f"\r{self._counting}\x1b[K")
 
     def counted_down(self) -> None:
         """Clear the line that counted down, where there is one."""
-        if begun := self._line_begun():
-            self._texts.put(begun)
+        if self._counting:
+            self._counting = ""
+            self._texts.put(f"\r\x1b[K{self._line}")
 
-    def _line_begun(self) -> str:
-        counting, self._counting = self._counting, False
-        return "\r\x1b[K" if counting else ""
+    @property
+    def _line(self) -> str:
+        """The last line, which is written over."""
+        return self._typed or self._counting or self._standing
+
+    @property
+    def _cleared(self) -> str:
+        return "\r\x1b[K" if self._line else ""
 
     def _write(self) -> None:
         with suppress(OSError, ValueError):  # the terminal is gone
             while (text := self._texts.get()) is not None:
-                sys.stderr.write(text)
+                sys.stderr.write(_writable(text))
                 sys.stderr.flush()
+
+
+def _writable(text: str) -> str:
+    """A text with a question mark for each sign that the terminal does not have."""
+    encoding = sys.stderr.encoding or "utf-8"
+    return text.encode(encoding, "replace").decode(encoding)
 
 
 class Keys:

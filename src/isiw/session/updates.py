@@ -22,6 +22,7 @@ class SessionUpdate:
         decision: whether the session stops here, and why.
         next_isi_ms: what is asked next [ms]; None where the session stops, or a control trial comes next.
         stimuli_left: how many stimuli the budget and the limits still allow.
+        left_s: about how long so many take at the pace of the last ones [s]; None where there is no pace yet.
     """
 
     trial: Trial
@@ -29,6 +30,7 @@ class SessionUpdate:
     decision: StopDecision
     next_isi_ms: float | None
     stimuli_left: int
+    left_s: float | None = None
 
 
 @dataclass(frozen=True)

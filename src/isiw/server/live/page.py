@@ -1,0 +1,98 @@
+"""Serving the live page of one session to this computer, in a thread beside the session's loop."""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import threading
+from types import TracebackType
+from typing import Final, Self
+
+import uvicorn
+from fastapi import FastAPI
+
+import isiw
+from isiw.checks import whole
+from isiw.server.app import guarded
+from isiw.server.guard import Rules
+from isiw.server.live.routes import FILES, router
+from isiw.server.live.view import View
+from isiw.server.serving import listening, new_token, settings_of
+from isiw.session.loop import Session
+
+__all__ = ["LivePage", "make_live_app", "watch"]
+
+_ADDRESS: Final = ipaddress.IPv4Address("127.0.0.1")
+_LEAVING_S: Final = 5.0
+
+
+def make_live_app(session: Session, view: View, token: str) -> FastAPI:
+    """The application that serves a session's page.
+
+    Args:
+        session: the session.
+        view: what is shown of it.
+        token: what updates and buttons must carry.
+    """
+    app = FastAPI(title="isiw", version=isiw.__version__, docs_url=None, redoc_url=None, openapi_url=None)
+    app.state.session, app.state.view = session, view
+    app.include_router(router)
+    guarded(app, Rules(token, open_paths=frozenset(FILES)))
+    return app
+
+
+class LivePage:
+    """The live page of a session, served until it is closed; a context manager.
+
+    Args:
+        session: the session.
+        port: the port; 0 for any that is free.
+    """
+
+    def __init__(self, session: Session, port: int) -> None:
+        self._view, token = View(session), new_token()
+        config = settings_of(make_live_app(session, self._view, token))
+        self._listener = listening(_ADDRESS, port)
+        self.url = f"http://{_ADDRESS}:{self._listener.getsockname()[1]}/#{token}"
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="isiw live page", daemon=True)
+        session.follow(self._view)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    async def _serve(self) -> None:
+        await self._server.serve([self._listener])
+        for connection in tuple(self._server.server_state.connections):  # of viewers that take nothing
+            connection.transport.abort()
+        await asyncio.sleep(0)
+
+    def close(self) -> None:
+        """Show the end to those who still look, and serve no longer."""
+        self._view.ended()
+        self._server.should_exit = True
+        self._thread.join(_LEAVING_S)
+        self._listener.close()
+
+
+def watch(session: Session, *, port: int = 0) -> LivePage:
+    """Show a session in the browser while it runs: `with isiw.watch(session) as page: print(page.url); session.run()`.
+
+    The page is served to this computer alone, from now until it is closed. Its address holds a token that is good for
+    as long. Where the session has no terminal, a pause is decided on the page.
+
+    Args:
+        session: a session that does not run yet.
+        port: the port; 0 for any that is free.
+
+    Raises:
+        ConfigError: the libraries of `isiw[serve]` are not installed, or the port is taken.
+        InvalidValueError: no port.
+    """
+    return LivePage(session, whole("port", port, least=0, most=65535))

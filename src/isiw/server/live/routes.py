@@ -1,0 +1,157 @@
+"""The live page's own calls: its files, its updates, and its buttons."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from importlib import resources
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Depends, Request, Response
+from fastapi.responses import StreamingResponse
+from plotly.offline import get_plotlyjs
+
+from isiw.server.answers import OkAnswer
+from isiw.server.live.view import View
+from isiw.server.refusals import Refusal
+from isiw.server.requests import ExcludeRequest, GoOnRequest, IncludeRequest, NoteRequest, body_of
+from isiw.session.loop import Session
+from isiw.text import plain
+
+__all__ = ["FILES", "router"]
+
+GLANCE_S, MOST_S = 0.05, 0.5
+"""How often is looked for news, and how long at most where none is put together for a while [s]."""
+
+QUIET_S: Final = 2.0
+"""After so long without news, the page is told that the session is still there [s]."""
+
+BY_PAGE: Final = "on the live page"
+
+FILES: Final = {
+    "/": ("text/html", lambda: _asset("isiw.server", "live.html")),
+    "/page.css": ("text/css", lambda: _asset("isiw.report", "page.css")),
+    "/live.css": ("text/css", lambda: _asset("isiw.server", "live.css")),
+    "/live.js": ("text/javascript", lambda: _asset("isiw.server", "live.js")),
+    "/plotly.js": ("text/javascript", get_plotlyjs),
+}
+"""What says nothing of the session: the files of the page, by path, with their type."""
+
+_POLICY: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; connect-src 'self'; "
+    "img-src data: blob:; form-action 'none'; base-uri 'none'; frame-ancestors 'none'"
+)
+_HEADERS: Final = {
+    "Content-Security-Policy": _POLICY,
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+
+router = APIRouter()
+
+
+def _asset(room: str, name: str) -> str:
+    return (resources.files(room) / "assets" / name).read_text(encoding="utf-8")
+
+
+def _file(kind: str, text: Callable[[], str]) -> Callable[[], Response]:
+    def file() -> Response:
+        return Response(text(), media_type=kind, headers=_HEADERS)
+
+    return file
+
+
+for path, (kind, text) in FILES.items():
+    router.get(path)(_file(kind, text))
+
+
+def _view(request: Request) -> View:
+    view: View = request.app.state.view
+    return view
+
+
+def _session(request: Request) -> Session:
+    """The session, while it runs.
+
+    Raises:
+        Refusal: it does not.
+    """
+    session: Session = request.app.state.session
+    _view(request).seen()
+    if not session.running:
+        raise Refusal(409, "NotRunning", "the session is not running", remedy="Nothing was done.")
+    return session
+
+
+Running = Annotated[Session, Depends(_session)]
+
+
+@router.get("/updates")
+async def updates(view: Annotated[View, Depends(_view)]) -> StreamingResponse:
+    """What the page shows, whenever it changes, as Server-Sent Events; until the session has ended."""
+    return StreamingResponse(_followed(view), media_type="text/event-stream", headers=_HEADERS)
+
+
+async def _followed(view: View) -> AsyncIterator[str]:
+    """Each viewer gets the latest when it has taken what came before; what it missed it need not know."""
+    seen: object = None
+    quiet_s = 0.0
+    with view.attended():
+        while True:
+            over, shown = view.over, view.shown()
+            if shown.state != seen:
+                seen, quiet_s = shown.state, 0.0
+                yield f"data: {shown.json}\n\n"
+            elif quiet_s >= QUIET_S:
+                quiet_s = 0.0
+                yield ": still here\n\n"
+            if over:
+                return
+            glance_s = max(GLANCE_S, min(view.wait_s, MOST_S))
+            await asyncio.sleep(glance_s)
+            quiet_s += glance_s
+
+
+@router.post("/pause")
+def pause(session: Running) -> OkAnswer:
+    """Disarm now, and pause."""
+    session.pause(f"Paused {BY_PAGE}.")
+    return OkAnswer()
+
+
+@router.post("/resume")
+def resume(session: Running, body: Annotated[GoOnRequest, Depends(body_of(GoOnRequest))]) -> OkAnswer:
+    """Let the paused session go on, if it still waits for what was shown."""
+    if session.paused is None or body.reason != plain(session.paused):
+        raise Refusal(409, "OtherPause", "the session does not wait for this answer", got=body.reason, field="reason")
+    session.go_on()
+    return OkAnswer()
+
+
+@router.post("/stop")
+def stop(session: Running) -> OkAnswer:
+    """Disarm now, and end the session, which can be resumed later."""
+    session.end(f"Ended {BY_PAGE}.")
+    return OkAnswer()
+
+
+@router.post("/exclude")
+def exclude(session: Running, body: Annotated[ExcludeRequest, Depends(body_of(ExcludeRequest))]) -> OkAnswer:
+    """Let a trial not count."""
+    session.exclude(body.trial, body.reason or f"Excluded {BY_PAGE}.")
+    return OkAnswer()
+
+
+@router.post("/include")
+def include(session: Running, body: Annotated[IncludeRequest, Depends(body_of(IncludeRequest))]) -> OkAnswer:
+    """Let a trial count again that was excluded."""
+    session.include(body.trial)
+    return OkAnswer()
+
+
+@router.post("/note")
+def note(session: Running, body: Annotated[NoteRequest, Depends(body_of(NoteRequest))]) -> OkAnswer:
+    """Log a remark."""
+    session.note(body.text)
+    return OkAnswer()

@@ -1,0 +1,155 @@
+"""What the live page shows of a session: gathered while it runs, and put into words when somebody looks."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Final, NamedTuple
+
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import Estimate, Event, Intent, Record, Waveform
+from isiw.report.drawn import drawn
+from isiw.report.facts import first_facts
+from isiw.session.loop import Session
+from isiw.session.updates import SessionUpdate
+from isiw.text import plain
+from isiw.trials import Trial
+
+__all__ = ["View"]
+
+MOST_EVENTS: Final = 100
+"""Events that the page lists; the log has all."""
+
+UPDATE_S: Final = 0.1
+"""The shortest time between two updates [s]."""
+
+SHARE: Final = 0.01
+"""Of the time that goes into making updates: a session that is faster than they are is not slowed down by them."""
+
+AWAY_S: Final = 60.0
+"""Who was there a shorter time ago is taken to come back, as after loading the page again [s]."""
+
+
+class Shown(NamedTuple):
+    """What a page shows, and of which state of the session."""
+
+    state: object
+    json: str
+
+
+class View:
+    """Follows one session. It keeps the last sweep, the last estimate and the last events, and no others.
+
+    The session's threads call what a follower is told, the server's thread everything else.
+
+    Args:
+        session: the session.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._estimate: Estimate | None = None
+        self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
+        self._coming: dict[tuple[int, str], Waveform] = {}
+        self._sweep: dict[tuple[int, str], Waveform] = {}
+        self._update: SessionUpdate | None = None
+        self._numbers = itertools.count(1)
+        self._news = self._viewers = 0
+        self._seen_s: float | None = None
+        self._shown, self._next_s = Shown(None, ""), 0.0
+        self._facts = [(fact.name, plain(fact.value)) for fact in first_facts(self._record())]
+        self.over = False
+
+    def logged(self, record: Record, channel_name: str | None) -> None:
+        """Keep what was logged."""
+        if isinstance(record, Waveform):
+            self._coming[record.trial, channel_name or ""] = record
+            return
+        if isinstance(record, Trial):
+            self._sweep, self._coming = self._coming, {}
+        elif isinstance(record, Estimate):
+            self._estimate = record
+        elif isinstance(record, Event):
+            self._events.append(record)
+        if not isinstance(record, Intent):
+            self._news = next(self._numbers)
+
+    def updated(self, update: SessionUpdate) -> None:
+        """Keep what is left of the session."""
+        self._update = update
+        self._news = next(self._numbers)
+
+    def ended(self) -> None:
+        """Nothing more comes."""
+        self.over = True
+
+    def is_attended(self) -> bool:
+        """Whether somebody has the page open, or had it a moment ago."""
+        seen_s = self._seen_s
+        return self._viewers > 0 or (seen_s is not None and time.monotonic() - seen_s < AWAY_S)
+
+    @contextmanager
+    def attended(self) -> Iterator[None]:
+        """Within, somebody has the page open."""
+        self._viewers += 1
+        try:
+            yield
+        finally:
+            self.seen()
+            self._viewers -= 1
+
+    def seen(self) -> None:
+        """Somebody was there just now."""
+        self._seen_s = time.monotonic()
+
+    def shown(self) -> Shown:
+        """What the page shows now; put together once for all who look, and not too often."""
+        state = (self._news, self._session.paused, self._session.running, self.over)
+        if state != self._shown.state and (self.over or time.monotonic() >= self._next_s):
+            begun_s = time.thread_time()
+            self._shown = Shown(state, json.dumps(self._contents(), allow_nan=False, separators=(",", ":")))
+            self._next_s = time.monotonic() + max(UPDATE_S, (time.thread_time() - begun_s) / SHARE)
+        return self._shown
+
+    @property
+    def wait_s(self) -> float:
+        """How long nothing new is put together [s]."""
+        return self._next_s - time.monotonic()
+
+    def _contents(self) -> dict[str, Any]:
+        record, update = self._record(), self._update
+        return {
+            "phase": self._phase(),
+            "pause": plain(self._session.paused or ""),
+            "subject": plain(record.header.subject) or "an unnamed subject",
+            "facts": self._facts,
+            "drawn": drawn(record),
+            "delivered": len(record.table),
+            "most": record.header.limits.max_pulses,
+            "left": None if update is None else update.stimuli_left,
+            "leftS": None if update is None else update.left_s,
+            "events": [[event.trial, event.kind, plain(event.text)] for event in tuple(self._events)],
+        }
+
+    def _phase(self) -> str:
+        if self.over:
+            return "over"
+        if self._session.paused is not None:
+            return "paused"
+        return "running" if self._session.running else "waiting"
+
+    def _record(self) -> SessionRecord:
+        """The session as a log would tell it that had the last estimate and the last sweep alone."""
+        estimate = self._estimate
+        return SessionRecord(
+            path=self._session.log_path,
+            header=self._session.header,
+            history=(*self._session.trials, *(() if estimate is None else (estimate,))),
+            waveforms={key: waveform.channel() for key, waveform in self._sweep.items()},
+            losses=(),
+            finished=False,
+        )

@@ -1,0 +1,23 @@
+"""A session with its live page, from the command line."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from isiw.cli import app
+from isiw.log.reader import read_session
+
+
+@pytest.mark.slow
+def test_run_and_resume_print_the_address_of_the_live_page_on_this_computer(tmp_path: Path) -> None:
+    log, config = tmp_path / "s.mcap", tmp_path / "short.toml"
+    config.write_text("[strategy.settings]\nmax_trials = 2\nparticles = 100\n")
+    for command in (["run", str(config), "--log", str(log)], ["resume", str(log)]):
+        result = CliRunner().invoke(app, [*command, "--live"])
+        assert result.exit_code == 0, result.output
+        assert re.search(r"^live page: http://127\.0\.0\.1:\d+/#[\w-]{43}$", result.output, re.MULTILINE)
+    assert len(read_session(log).table) == 2

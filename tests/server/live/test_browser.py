@@ -1,0 +1,179 @@
+"""The live page as a browser shows it; skipped where there is no Chromium."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, sync_playwright
+
+from isiw.text import plain
+from server.live.watched import HOSTILE, Watched
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page in"),
+]
+TRIALS = 8
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"], timeout=60_000)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
+    with Watched(tmp_path_factory.mktemp("live") / "s.mcap", trials=TRIALS) as watched:
+        yield watched
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any, watched: Watched) -> Iterator[Page]:
+    page = browser.new_page(viewport={"width": 1000, "height": 900})
+    page.set_default_timeout(20_000)
+    said: list[str] = []
+    asked: list[str] = []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(watched.page.url)
+    page.get_by_text("The session has not begun.").wait_for()
+    watched.start(trials=3)
+    shows(page, "#last", "2: ")
+    yield page
+    page.close()
+    assert said == []
+    own = str(watched.client.base_url)
+    assert [url for url in asked if not url.startswith((own, "data:", "blob:"))] == []
+
+
+def shows(page: Page, selector: str, text: str) -> None:
+    """Wait until an element shows a text."""
+    page.locator(selector).filter(has_text=text).wait_for()
+
+
+def drawn(page: Page, script: str) -> Any:
+    return page.evaluate(f"() => document.getElementById('belief').{script}")
+
+
+def test_what_is_drawn_are_the_logs_numbers(page: Page, watched: Watched) -> None:
+    page.wait_for_function("() => document.getElementById('belief').data?.[3]?.x.length === 3")
+    shows(page, "#next", " ms")
+    record = watched.record
+    shown = drawn(page, "data.find(trace => trace.name === 'trial')")
+    assert dict(zip(shown["customdata"], shown["x"], strict=True)) == {t.index: t.isi_ms for t in record.table}
+    assert shown["y"] == pytest.approx([1e3 * (t.mep_mv or 0.0) for t in record.table], abs=0.01)
+    estimate = record.estimates[-1]
+    marks = drawn(page, "layout.shapes.filter(shape => shape.line.dash === 'dash')")
+    assert [mark["x0"] for mark in marks] == [estimate.next_isi_ms]
+    assert page.inner_text("#left") == f"at most {TRIALS - 3}"
+    assert estimate.reason in page.inner_text("#reason")
+    pulses = page.evaluate(
+        "() => document.getElementById('sweep').layout.shapes.filter(s => s.line.dash === 'solid').map(s => s.x0)"
+    )
+    assert set(pulses) == {record.table[-1].t_tms_ms}
+
+
+def test_hostile_names_and_notes_are_text(page: Page, watched: Watched) -> None:
+    assert page.inner_text("h1") == f"Session of {plain(HOSTILE)}"
+    page.fill("#note", "<img src=x onerror=alert(1)>")
+    page.get_by_label("Note").press("Enter")
+    shows(page, "#done", "The note is in the log.")
+    shows(page, "#events", "<img src=x onerror=alert(1)>")
+    assert page.locator("main b, main img").count() == 0
+    assert page.title() == f"Session of {plain(HOSTILE)}"
+    assert watched.events[-1] == ("note", "<img src=x onerror=alert(1)>")
+
+
+def test_a_new_trial_appears_by_itself(page: Page, watched: Watched) -> None:
+    watched.clock.let = 4
+    shows(page, "#last", "3: ")
+    assert page.inner_text("#sweep-title") == "Sweep of trial 3"
+
+
+def test_the_session_is_operated_by_keyboard_alone(page: Page, watched: Watched) -> None:
+    for _ in range(20):
+        if page.evaluate("document.activeElement.id") == "pause":
+            break
+        page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    shows(page, "#phase", "Paused: Paused on the live page. The device is disarmed.")
+    assert page.evaluate("document.activeElement.id") == "resume"
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    shows(page, "#exclude", "Count trial 3 again")
+    page.keyboard.press("Enter")
+    shows(page, "#exclude", "Exclude the last trial")
+    page.locator("#resume").press("Enter")
+    shows(page, "#phase", "The session runs.")
+    assert [kind for kind, _ in watched.events[-4:]] == ["pause", "exclusion", "inclusion", "pause"]
+
+
+def test_the_page_loaded_again_and_a_second_one_show_the_same(page: Page, watched: Watched, browser: Any) -> None:
+    page.reload()
+    shows(page, "#last", "3: ")
+    second = browser.new_page()
+    second.goto(watched.page.url)
+    shows(second, "#last", "3: ")
+    assert second.inner_text("#found") == page.inner_text("#found")
+    second.close()
+
+
+def test_without_the_token_nothing_is_shown(watched: Watched, browser: Any) -> None:
+    stranger = browser.new_page()
+    stranger.goto(str(watched.client.base_url))
+    shows(stranger, "#trouble", "Open that one.")
+    assert "P07" not in stranger.inner_text("body")
+    assert not stranger.locator("#operate").is_visible()
+    stranger.close()
+
+
+def test_everything_that_can_be_used_has_a_name(page: Page) -> None:
+    nameless = page.evaluate(
+        "() => [...document.querySelectorAll('a, button, input, [tabindex=\"0\"]')].filter(e => !(e.textContent.trim() "
+        "|| e.getAttribute('aria-label') || (e.labels && e.labels.length))).length"
+    )
+    assert nameless == 0
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_words_stand_out_from_what_is_behind_them(page: Page, scheme: Any) -> None:
+    page.emulate_media(color_scheme=scheme)
+    weakest = page.evaluate(CONTRAST)
+    page.emulate_media(color_scheme="light")
+    assert weakest >= 4.5
+
+
+CONTRAST = """() => {
+  const parts = (colour) => colour.match(/[\\d.]+/g).map(Number);
+  const linear = (part) => (part / 255 <= 0.04045 ? part / 255 / 12.92 : ((part / 255 + 0.055) / 1.055) ** 2.4);
+  const luminance = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+  const behind = (e) => {
+    const paint = e ? parts(getComputedStyle(e).backgroundColor) : [255, 255, 255];
+    return paint.length === 4 && paint[3] === 0 ? behind(e.parentElement) : paint;
+  };
+  const seen = [...document.querySelectorAll("h1, h2, p, dt, dd, strong, th, td, label, button, footer")]
+    .filter((e) => e.textContent.trim() && e.checkVisibility() && !e.disabled);
+  return Math.min(...seen.map((e) => {
+    const [a, b] = [luminance(parts(getComputedStyle(e).color)), luminance(behind(e))];
+    return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+  }));
+}"""
+
+
+def test_stopping_asks_again_and_the_end_is_told(page: Page, watched: Watched) -> None:
+    page.click("#stop")
+    page.click("#stop-not")
+    page.click("#stop")
+    page.click("#stop-sure")
+    shows(page, "#phase", "The session has ended.")
+    assert not page.locator("#operate").is_visible()
+    watched.finish()
+    assert watched.events[-1] == ("pause", "Ended on the live page.")

@@ -1,0 +1,185 @@
+"""What the live page's server answers, and that nobody who looks on can hold a session up."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+import isiw
+from isiw.errors import ConfigError
+from isiw.server.live.routes import FILES
+from isiw.server.live.view import Shown, View
+from isiw.text import plain
+from server.live.watched import HOSTILE, Watched
+from server.serving import done, refused
+
+
+@pytest.fixture
+def watched(tmp_path: Path) -> Iterator[Watched]:
+    with Watched(tmp_path / "s.mcap") as watched:
+        yield watched
+
+
+def test_the_pages_files_need_no_token_as_they_say_nothing_of_the_session(watched: Watched) -> None:
+    for path in FILES:
+        answer = httpx.get(watched.client.base_url.join(path))
+        assert answer.status_code == 200
+        assert "P07" not in answer.text
+        assert "script-src 'self';" in answer.headers["Content-Security-Policy"]
+
+
+def test_what_is_of_the_session_needs_the_token_and_the_pages_own_origin(watched: Watched) -> None:
+    for path in ("updates", "pause", "stop", "exclude", "note", "resume", "include"):
+        method = "GET" if path == "updates" else "POST"
+        url = watched.client.base_url.join(path)
+        refused(httpx.request(method, url), 401, "Unauthorized")
+        refused(httpx.request(method, url, headers={"Authorization": "Bearer not-the-token"}), 401, "Unauthorized")
+        refused(watched.client.request(method, path, headers={"Host": "evil.example"}), 403, "ForeignHost")
+        refused(watched.client.request(method, path, headers={"Origin": "http://127.0.0.1:1"}), 403, "ForeignOrigin")
+
+
+def test_what_is_shown_is_what_the_log_holds(watched: Watched) -> None:
+    watched.start(trials=3)
+    with watched.viewer() as news:
+        shown = next(state for state in news if "2" in state["drawn"]["beliefs"] and state["left"] == 3)
+    record = watched.record
+    (belief,) = shown["drawn"]["beliefs"].values()
+    assert shown["phase"] == "running"
+    assert shown["subject"] == plain(HOSTILE)
+    assert [trial["isiMs"] for trial in shown["drawn"]["trials"]] == [trial.isi_ms for trial in record.table]
+    assert belief["nextMs"] == record.estimates[-1].next_isi_ms
+    assert (shown["delivered"], shown["left"], shown["leftS"]) == (3, 3, pytest.approx(15.0))
+    sweeps = [trial["sweep"] for trial in shown["drawn"]["trials"]]
+    assert [len(waves) for waves in sweeps] == [0, 0, 2]
+    assert sweeps[2][1]["values"] == pytest.approx(record.waveforms[2, "emg"].values.tolist(), abs=1e-3)
+
+
+def test_a_reload_and_a_second_viewer_see_the_same(watched: Watched) -> None:
+    watched.start(trials=2)
+    for _ in range(2):
+        with watched.viewer() as one, watched.viewer() as other:
+            assert next(one) == next(other)
+
+
+def test_the_buttons_are_events_in_the_log(watched: Watched) -> None:
+    watched.start(trials=2)
+    done(watched.press("note", text="coil moved"))
+    done(watched.press("exclude", trial=1))
+    done(watched.press("include", trial=1))
+    done(watched.press("pause"))
+    watched.until(lambda: watched.session.paused)
+    refused(watched.press("resume", reason="another"), 409, "OtherPause")
+    done(watched.press("resume", reason="Paused on the live page."))
+    watched.until(lambda: watched.session.paused is None)
+    done(watched.press("exclude", trial=0))
+    done(watched.press("stop"))
+    watched.finish()
+    assert watched.events == [
+        ("note", "coil moved"),
+        ("exclusion", "Excluded on the live page."),
+        ("inclusion", "Included again by the operator."),
+        ("pause", "Paused on the live page."),
+        ("pause", "The operator goes on."),
+        ("exclusion", "Excluded on the live page."),
+        ("pause", "Ended on the live page."),
+    ]
+    assert len(watched.record.table) == 2
+    assert not watched.record.estimates[-1].stop
+
+
+def test_a_paused_session_can_be_ended(watched: Watched) -> None:
+    watched.start()
+    done(watched.press("pause"))
+    watched.until(lambda: watched.session.paused)
+    done(watched.press("stop"))
+    watched.finish()
+    assert watched.events[-1] == ("pause", "Ended on the live page.")
+
+
+def test_a_pause_whose_reason_holds_what_terminals_obey_can_be_answered(watched: Watched) -> None:
+    with watched.viewer() as news:
+        watched.start()
+        watched.session.pause("The device said \x1b[2J.")
+        reason = next(state["pause"] for state in news if state["phase"] == "paused")
+        assert reason == "The device said ."
+        done(watched.press("resume", reason=reason))
+        watched.until(lambda: watched.session.paused is None)
+
+
+def test_what_cannot_be_done_is_said(watched: Watched) -> None:
+    refused(watched.press("pause"), 409, "NotRunning")
+    watched.start()
+    refused(watched.press("exclude", trial=7), 422, "InvalidValueError")
+    refused(watched.press("resume", reason="Paused on the live page."), 409, "OtherPause")
+    refused(watched.press("note"), 422, "InvalidValueError")
+    watched.finish()
+    late: dict[str, dict[str, Any]] = {"pause": {}, "stop": {}, "note": {"text": "late"}, "exclude": {"trial": 0}}
+    for button, body in late.items():
+        refused(watched.press(button, **body), 409, "NotRunning")
+
+
+def test_the_end_is_shown_and_ends_the_updates(watched: Watched) -> None:
+    with watched.viewer() as news:
+        assert next(news)["phase"] == "waiting"
+        watched.start()
+        watched.finish()
+        *_, last = news
+    assert last["phase"] == "over"
+    assert len(last["drawn"]["trials"]) == 6
+
+
+def test_where_nobody_looks_on_and_there_is_no_terminal_a_pause_ends_the_session(watched: Watched) -> None:
+    watched.start()
+    watched.session.pause("A look at the coil.")
+    watched.finish()
+    assert watched.events == [("pause", "A look at the coil.")]
+
+
+def test_viewers_that_never_read_or_vanish_do_not_hold_a_session_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(View, "shown", _larger_than_any_buffer)
+    with Watched(tmp_path / "s.mcap", trials=20) as watched:
+        silent, vanishing = _asking(watched.client), _asking(watched.client)
+        watched.start(trials=2)
+        vanishing.close()
+        watched.finish()
+        assert watched.events == []
+        with watched.viewer() as news:
+            assert next(news)["phase"] == "over"
+        watched.page.close()
+        silent.close()
+    assert len(watched.record.table) == 20
+
+
+def _larger_than_any_buffer(view: View, shown: Callable[[View], Shown] = View.shown) -> Shown:
+    """What is shown, and so many blanks behind it that who does not read stops whoever sends."""
+    state, text = shown(view)
+    return Shown(state, text + " " * 5_000_000)
+
+
+def _asking(client: httpx.Client) -> socket.socket:
+    """A connection that asks for updates and takes none."""
+    connection = socket.socket()
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
+    connection.connect((client.base_url.host, client.base_url.port or 0))
+    head: dict[str, Any] = {"Host": client.base_url.netloc.decode(), **client.headers}
+    connection.sendall(
+        b"GET /updates HTTP/1.1\r\n" + b"".join(f"{k}: {v}\r\n".encode() for k, v in head.items()) + b"\r\n"
+    )
+    return connection
+
+
+def test_a_port_that_is_taken_is_refused(watched: Watched) -> None:
+    with pytest.raises(ConfigError, match="cannot listen"):
+        isiw.watch(watched.session, port=known_port(watched))
+
+
+def known_port(watched: Watched) -> int:
+    assert watched.client.base_url.port is not None
+    return watched.client.base_url.port

@@ -1,0 +1,121 @@
+"""Those who look on while a session runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.log.reader import read_session
+from isiw.log.schema import Intent, Record
+from isiw.session.asking import Asking
+from isiw.session.loop import Session
+from isiw.session.pace import Pace
+from isiw.session.safeguards import Safeguards
+from isiw.session.updates import SessionUpdate
+from isiw.trials import Trial
+from scripted import ScriptedDevice, scripted_strategy
+
+
+@dataclass
+class Remembering:
+    """Remembers what it was told."""
+
+    records: list[Record] = field(default_factory=list)
+    updates: list[SessionUpdate] = field(default_factory=list)
+    ends: int = 0
+
+    def logged(self, record: Record, channel_name: str | None) -> None:
+        del channel_name
+        self.records.append(record)
+
+    def updated(self, update: SessionUpdate) -> None:
+        self.updates.append(update)
+
+    def ended(self) -> None:
+        self.ends += 1
+
+    def is_attended(self) -> bool:
+        return False
+
+
+class Failing(Remembering):
+    def logged(self, record: Record, channel_name: str | None) -> None:
+        if isinstance(record, Trial):
+            raise OSError("no more room")
+        super().logged(record, channel_name)
+
+
+def test_who_follows_is_told_every_record_and_update_and_the_end(tmp_path: Path) -> None:
+    session, follower = Session(ScriptedDevice(), scripted_strategy(3), log=tmp_path / "s.mcap"), Remembering()
+    session.follow(follower)
+    session.run()
+    assert tuple(follower.records) == read_session(session.log_path).history
+    assert [update.stimuli_left for update in follower.updates] == [2, 1, 0]
+    assert [update.left_s for update in follower.updates] == [None, 5.0, 0.0]
+    assert follower.ends == 1
+
+
+def test_who_fails_is_told_nothing_more_and_the_session_goes_on(tmp_path: Path) -> None:
+    session, failing = Session(ScriptedDevice(), scripted_strategy(3), log=tmp_path / "s.mcap"), Failing()
+    session.follow(failing)
+    session.run()
+    record = read_session(session.log_path)
+    assert len(record.table) == 3
+    (fault,) = [event for event in record.events if event.kind == "fault"]
+    assert "no more room" in fault.text
+    assert [type(entry) for entry in failing.records] == [Intent]
+
+
+def test_where_a_program_decides_about_pauses_nobody_else_does(tmp_path: Path) -> None:
+    answers: list[str] = []
+
+    def on_pause(reason: str) -> bool:
+        with pytest.raises(InvalidValueError, match="does not wait"):
+            session.go_on()
+        answers.append(session.paused or "")
+        return bool(reason)
+
+    def on_trial(update: SessionUpdate) -> None:
+        if update.trial.index == 0:
+            session.pause("A break.")
+
+    session = Session(
+        ScriptedDevice(), scripted_strategy(3), log=tmp_path / "s.mcap",
+        safeguards=Safeguards(on_pause=on_pause), on_trial=on_trial,
+    )  # fmt: skip
+    session.follow(Remembering())
+    session.run()
+    assert answers == ["A break."]
+    assert len(session.trials) == 3
+
+
+def test_a_session_that_is_ended_within_a_pause_of_a_program_ends_all_the_same(tmp_path: Path) -> None:
+    def on_pause(reason: str) -> bool:
+        session.end("Enough.")
+        return bool(reason)
+
+    session = Session(
+        ScriptedDevice(), scripted_strategy(3), log=tmp_path / "s.mcap", safeguards=Safeguards(on_pause=on_pause),
+        on_trial=lambda update: session.pause("A break.") if update.trial.index == 0 else None,
+    )  # fmt: skip
+    result = session.run()
+    assert not result.decision.stop
+    assert [event.text for event in read_session(result.log).events] == ["A break.", "Enough."]
+
+
+def test_an_answer_that_came_too_late_is_none_to_the_next_question() -> None:
+    asking = Asking()
+    with pytest.raises(InvalidValueError):
+        asking.answer(goes_on=True)
+    assert asking.wait(lambda: True) is False
+
+
+def test_the_pace_is_the_usual_one_whatever_rests_were_between() -> None:
+    pace = Pace()
+    assert pace.left_s(10) is None
+    for end_s in (0.0, 5.0, 10.0, 600.0, 605.0):
+        pace.passed(end_s)
+    assert pace.left_s(10) == pytest.approx(50.0)

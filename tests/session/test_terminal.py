@@ -1,0 +1,76 @@
+"""What the operator's screen shows, as a terminal would."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from isiw.session.terminal import ERASED, Screen
+
+
+def seen(written: str) -> list[str]:
+    """The lines that a terminal shows after it was sent a text."""
+    lines = []
+    for line in written.split("\n"):
+        last = re.split(r"\r\x1b\[K|\r", line)[-1].removesuffix("\x1b[K")
+        while ERASED in last:
+            at = last.index(ERASED)
+            last = last[: at - 1] + last[at + len(ERASED) :]
+        lines.append(last)
+    return lines
+
+
+def test_how_things_stand_stays_below_what_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    with Screen() as screen:
+        screen.say("trial 0", "17 left")
+        screen.say("paused")
+        screen.say("trial 1", "16 left")
+    assert seen(capsys.readouterr().err) == ["trial 0", "paused", "trial 1", "16 left", ""]
+
+
+def test_a_countdown_takes_the_last_line_and_gives_it_back(capsys: pytest.CaptureFixture[str]) -> None:
+    with Screen() as screen:
+        screen.say("trial 0", "17 left")
+        screen.count_down("Rest: 1:00 left")
+        screen.say("paused")
+        screen.counted_down()
+    assert seen(capsys.readouterr().err) == ["trial 0", "paused", "17 left", ""]
+
+
+def test_what_is_being_typed_is_not_torn_apart(capsys: pytest.CaptureFixture[str]) -> None:
+    with Screen() as screen:
+        screen.say("trial 0", "17 left")
+        for sign in ("Note: ", "a", "b", ERASED, "c"):
+            screen.type(sign)
+        screen.say("trial 1", "16 left")
+        screen.type("d")
+        screen.type("\n")
+        screen.say("The note is in the log.")
+    written = capsys.readouterr().err
+    assert seen(written) == ["trial 0", "trial 1", "Note: acd", "The note is in the log.", "16 left", ""]
+
+
+def test_terminals_obey_nothing_that_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    with Screen() as screen:
+        screen.say("\x1b]0;taken\x07P07\x1b[2J", "\x1b[2Jleft")
+    assert capsys.readouterr().err == "P07\nleft\n"
+
+
+def test_signs_that_a_terminal_lacks_do_not_silence_the_screen(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("isiw.session.terminal.sys.stderr", Ascii())
+    with Screen() as screen:
+        screen.say("▁▂▃ left")
+    assert capsys.readouterr().out == "??? left\n"
+
+
+class Ascii:
+    encoding = "ascii"
+
+    def write(self, text: str) -> None:
+        print(text.encode("ascii").decode(), end="")  # noqa: T201 - what pytest captures
+
+    def flush(self) -> None:
+        """Nothing is held back."""
