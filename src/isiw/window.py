@@ -194,10 +194,13 @@ class WindowEstimate:
         largest_excluded: an enhancement that, with 90 % probability, is larger than the largest at any ISI.
         unusual: how probable it is that parts of this person are of another law than the usual one, by their names.
         pairs: how many pairs of stimuli it rests on; None where that is not known.
+        depressed: the ISIs that depress the MEP, as far as they are reported; None where there are none, or where
+            nobody looked for them.
+        depressed_probability: probability that there are any; None where nobody looked for them.
 
     Raises:
-        InvalidValueError: a probability outside 0–1, a window reported against it, not one hypothesis a sample, or one
-            without a name.
+        InvalidValueError: a probability outside 0–1, a window or a depression reported against it, not one hypothesis a
+            sample, or one without a name.
     """
 
     probability: float | None
@@ -216,10 +219,16 @@ class WindowEstimate:
     largest_excluded: Enhancement | None = None
     unusual: Mapping[str, float] = field(default_factory=dict, repr=False)
     pairs: int | None = None
+    depressed: Window | None = None
+    depressed_probability: float | None = None
 
     def __post_init__(self) -> None:
         self._check_hypotheses()
-        check_probabilities(self, "expected_f1", optional=True)
+        check_probabilities(self, "expected_f1", "depressed_probability", optional=True)
+        if self.depressed is not None and (self.depressed_probability or 0.0) < 0.5:
+            raise InvalidValueError(
+                "a depression is reported although none is more probable", got=self.depressed_probability
+            )
         if self.probability is None:
             return
         check_probabilities(self, "probability")
@@ -251,7 +260,10 @@ class WindowEstimate:
 
     def __str__(self) -> str:
         start, end = self.interval(0.9) or ((None, None), (None, None))
-        return finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end))
+        found = finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end))
+        if self.depressed_probability is None:
+            return found
+        return f"{found}\nDepressed: {self.depressed or 'nowhere'} (probability: {self.depressed_probability:.2f})"
 
     @property
     def rests_on_data(self) -> bool:

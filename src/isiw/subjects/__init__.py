@@ -3,7 +3,7 @@
 from isiw.subjects.cohorts import COHORTS, WIDTHS_KIM_MS, cohort
 from isiw.subjects.days import another_day
 from isiw.subjects.labs import LABS, Lab, lab
-from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
+from isiw.subjects.profiles import OpposedProfile, PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.subjects.subject import Drift, Responder, Response, SimulatedSubject
 
@@ -15,6 +15,7 @@ __all__ = [
     "EmgFloor",
     "GainResponse",
     "Lab",
+    "OpposedProfile",
     "PeakProfile",
     "Profile",
     "RecruitmentResponse",

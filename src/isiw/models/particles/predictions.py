@@ -9,14 +9,14 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.models.particles.likelihood import in_pieces, levels
-from isiw.models.particles.noise import NODES, evoked_mean, log_gain, outcome_density
+from isiw.models.particles.noise import NODES, Response, evoked_mean, log_gain, outcome_density
 from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import highest_facilitation
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
 from isiw.models.windows import least_excess_mv
 
-__all__ = ["PersonSample"]
+__all__ = ["PersonSample", "outcome_table"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,22 +78,32 @@ class PersonSample:
     @cached_property
     def _outcome_table(self) -> Tensor:
         """Probability of each outcome of the next trial at the tables' levels, shape (b, s, l, y)."""
-        response = self.person.response
-        gain = log_gain(response, torch.full_like(response.drift, self.order).unsqueeze(-1)).squeeze(-1)
-        response = response._replace(log_ratio=response.log_ratio + gain)
-        top = response.log_floor + torch.log1p(self._evoked.amax(-1))
-        low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
-        high = torch.quantile(top, 0.95, dim=-1) + 1.5
-        # Cells are narrow where MEPs are as small as the floor, which varies little.
-        ends = torch.linspace(0.0, 1.0, OUTCOMES + 1, device=low.device).pow(1.5)
-        middle, width = 0.5 * (ends[1:] + ends[:-1]), ends.diff()
-        log_mep = (low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)).unsqueeze(-2)
-        density = in_pieces(
-            lambda r, grid: outcome_density(r, self._levels, grid), response, (log_mep,), LEVELS * OUTCOMES * NODES
-        )
-        mass = density * width
-        return mass / mass.sum(-1, keepdim=True)
+        levels = self._levels.expand(len(self.person.present), -1, -1)
+        return outcome_table(self.person.response, levels, self._evoked, self.order)
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
         return interpolated(self._outcome_table, levels(self.person, isi_ms.unsqueeze(0)))
+
+
+def outcome_table(response: Response, levels: Tensor, evoked: Tensor, order: int) -> Tensor:
+    """Probability of each outcome of the next trial at some levels of facilitation, shape (b, s, l, y).
+
+    Args:
+        response: response parameters, fields of shape (b, s).
+        levels: facilitation, shape (b, 1 or s, l).
+        evoked: expected MEP above the floor there, in floors, shape (b, s, l).
+        order: how many trials came before.
+    """
+    gain = log_gain(response, torch.full_like(response.drift, order).unsqueeze(-1)).squeeze(-1)
+    response = response._replace(log_ratio=response.log_ratio + gain)
+    top = response.log_floor + torch.log1p(evoked.amax(-1))
+    low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
+    high = torch.quantile(top, 0.95, dim=-1) + 1.5
+    # Cells are narrow where MEPs are as small as the floor, which varies little.
+    ends = torch.linspace(0.0, 1.0, OUTCOMES + 1, device=low.device).pow(1.5)
+    middle, width = 0.5 * (ends[1:] + ends[:-1]), ends.diff()
+    log_mep = (low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)).unsqueeze(-2)
+    density = in_pieces(outcome_density, response, (levels, log_mep), levels.shape[-1] * OUTCOMES * NODES)
+    mass = density * width
+    return mass / mass.sum(-1, keepdim=True)
