@@ -260,10 +260,8 @@ class WindowEstimate:
 
     def __str__(self) -> str:
         start, end = self.interval(0.9) or ((None, None), (None, None))
-        found = finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end))
-        if self.depressed_probability is None:
-            return found
-        return f"{found}\nDepressed: {self.depressed or 'nowhere'} (probability: {self.depressed_probability:.2f})"
+        depressed = self.depressed, self.depressed_probability
+        return finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end), depressed)
 
     @property
     def rests_on_data(self) -> bool:
@@ -337,14 +335,21 @@ class WindowEstimate:
         return ProfileBand(median, low, high)
 
 
-def finding(probability: float | None, window: Window | None, start: _Edge, end: _Edge) -> str:
-    """A window in a line, and each of its edges in another, where they are known.
+def finding(
+    probability: float | None,
+    window: Window | None,
+    start: _Edge,
+    end: _Edge,
+    depressed: tuple[Window | None, float | None] = (None, None),
+) -> str:
+    """A window in a line, and each of its edges in another, where they are known; and where the MEP is depressed.
 
     Args:
         probability: that there is a window.
         window: the reported decision.
         start: median, and lower and upper end of the 90 % interval, of its start [ms]; None where not known.
         end: those of its end [ms].
+        depressed: the reported ISIs that depress the MEP, and the probability of any; None where nobody looked.
     """
     chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
     lines = [f"Window: {'none' if window is None else window}{chance}"]
@@ -352,6 +357,9 @@ def finding(probability: float | None, window: Window | None, start: _Edge, end:
         median, low, high = ("" if edge_ms is None else _edge(edge_ms) for edge_ms in edge)
         if window is not None and low:
             lines.append(f"{name}: {median}, 90 % interval {low} to {high}")
+    segment, anywhere = depressed
+    if anywhere is not None:
+        lines.append(f"Depressed: {'nowhere' if segment is None else segment} (probability of it: {anywhere:.2f})")
     return "\n".join(lines)
 
 
