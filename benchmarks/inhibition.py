@@ -1,16 +1,19 @@
 """TMS above the motor threshold: segments that enhance and that depress the MEP, found; and section 8.1.3, again.
 
-    python benchmarks/inhibition.py --out benchmarks/results/inhibition
+    python -m benchmarks.inhibition --out benchmarks/results/inhibition
 
-writes tables (Markdown), figures with versions, command and seeds and the claims of the dissertation beside ours (JSON),
-and a picture. A session has 60 stimuli, a sixth of them TMS alone; the oracle, which knows the MEP without a tap, has 60
-pairs. Sessions are kept beside the tables as they finish: the same command goes on where it was interrupted, and
-`--minutes` interrupts it. Reported people come from seed 10,000 on; seeds below 1,000 are for work.
+writes tables (Markdown), figures with versions, command and seeds and the claims of the dissertation beside ours
+(JSON), and a picture. A session has 60 stimuli, a sixth of them TMS alone; the oracle, which knows the MEP without a
+tap, has 60 pairs. Sessions are kept beside the tables as they finish: the same command goes on where it was interrupted.
+After `--minutes` the tables are of the sessions that are there, and say how many. Reported people come from seed 10,000 on; seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
 
 import json
+import platform
+import shlex
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -20,19 +23,20 @@ from typing import Annotated, Any, Final
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import torch
 import typer
 
-from acquisition import facts_of
-from inhibition_claims import all_claims, choices_of_curves
+import isiw
+from benchmarks.inhibition_claims import all_claims, choices_of_curves
+from benchmarks.opposed_oracle import OpposedOracle
 from isiw import DesignSpace, VisitProtocol, make_strategy
 from isiw.metrics import f1
 from isiw.subjects import OpposedProfile, RecruitmentResponse, SimulatedSubject, cohort
-from opposed_oracle import OpposedOracle
 
 SPACE: Final = DesignSpace(0, 120, reference="impact")
 MARKS: Final = (20, 40, 60)
 PROTOCOL: Final = VisitProtocol(tms_alone=1 / 6)
-GROUPS: Final = ("supra-threshold", "never depressed", "recruitment", "gaussian")
+GROUPS: Final = ("supra-threshold", "recruitment", "gaussian", "never depressed")
 """Cohorts; `never depressed` are those of `supra-threshold` without their depressed segment."""
 
 
@@ -91,20 +95,20 @@ def rows_of(group: str, method: str, number: int, subject: SimulatedSubject, see
     ]
 
 
-def sessions(people: int, seed: int, kept: Path, minutes: float) -> pd.DataFrame | None:
-    """All sessions, those that are there already and those that are missing; None where time ran out."""
+def sessions(people: int, seed: int, kept: Path, minutes: float, groups: tuple[str, ...] = GROUPS) -> pd.DataFrame:
+    """All sessions: those that are there already, and those that are missing, as far as there is time."""
     done = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
     known = {(row["group"], row["method"], row["person"]) for row in done}
     until = time.monotonic() + 60.0 * minutes
     with kept.open("a") as file:
-        for group in GROUPS:
-            methods = ("supra-threshold", "oracle", "default") if group == GROUPS[0] else ("supra-threshold",)
+        for group in groups:
+            methods = ("supra-threshold", "oracle") if group == GROUPS[0] else ("supra-threshold",)
             for number, subject in enumerate(people_of(group, people, seed)):
                 for method in methods:
                     if (group, method, number) in known:
                         continue
                     if time.monotonic() > until:
-                        return None
+                        return pd.DataFrame(done)
                     rows = rows_of(group, method, number, subject, seed + number)
                     file.writelines(json.dumps(row) + "\n" for row in rows)
                     file.flush()
@@ -115,7 +119,7 @@ def sessions(people: int, seed: int, kept: Path, minutes: float) -> pd.DataFrame
 def by_trial(rows: pd.DataFrame) -> pd.DataFrame:
     """Mean F1 of each kind, and how many are called depressed, with standard errors, by group, method and trial."""
     values = ["f1_enhanced", "f1_depressed", "called_depressed", "p_depressed"]
-    numbers = rows.astype({name: float for name in values})
+    numbers = rows.astype(dict.fromkeys(values, float))
     grouped = numbers.groupby(["group", "method", "trial"], sort=False)[values]
     means, errors = grouped.mean(), grouped.sem().drop(columns="p_depressed").add_suffix("_se")
     return pd.concat([grouped.size().rename("n"), means, errors], axis=1).reset_index()
@@ -123,9 +127,9 @@ def by_trial(rows: pd.DataFrame) -> pd.DataFrame:
 
 def behind_oracle(rows: pd.DataFrame) -> pd.DataFrame:
     """By how much the oracle's F1 is larger on the same people, and the standard error of that."""
-    both = rows[rows["group"] == GROUPS[0]].set_index(["trial", "person", "method"]).unstack("method")
-    gaps = [both[f"f1_{kind}"]["oracle"] - both[f"f1_{kind}"]["supra-threshold"] for kind in ("enhanced", "depressed")]
-    table = pd.concat(gaps, axis=1, keys=["enhanced", "depressed"]).groupby("trial")
+    kinds = ["f1_enhanced", "f1_depressed"]
+    both = rows[rows["group"] == GROUPS[0]].set_index(["method", "trial", "person"])[kinds]
+    table = (both.loc["oracle"] - both.loc["supra-threshold"]).groupby("trial")
     return pd.concat([table.mean(), table.sem().add_suffix("_se")], axis=1).reset_index()
 
 
@@ -145,10 +149,8 @@ def picture(table: pd.DataFrame, curves: pd.DataFrame, example: SimulatedSubject
     curves.set_index("curve").plot.bar(ax=middle, rot=45)
     middle.set(xlabel="", ylabel="share of people", title="Curve of the smallest AICc")
     chosen = table[table["group"] == GROUPS[0]]
-    for (method, rows), marker in zip(chosen.groupby("method", sort=False), "osd", strict=True):
+    for (method, rows), marker in zip(chosen.groupby("method", sort=False), "os", strict=True):
         for kind, style in (("enhanced", "-"), ("depressed", "--")):
-            if method == "default" and kind == "depressed":
-                continue
             errors = rows[f"f1_{kind}_se"]
             right.errorbar(rows["trial"], rows[f"f1_{kind}"], errors, fmt=marker + style, label=f"{method}, {kind}")
     right.set(xlabel="stimuli", ylabel="F1", ylim=(0, 1), title="Both kinds of segment, with standard errors")
@@ -156,21 +158,30 @@ def picture(table: pd.DataFrame, curves: pd.DataFrame, example: SimulatedSubject
     figure.savefig(out.with_suffix(".png"), dpi=110)
 
 
+def facts_of(seed: int, people: int) -> dict[str, Any]:
+    """What the run was."""
+    versions = {m.__name__: m.__version__ for m in (isiw, torch, np)} | {"python": platform.python_version()}
+    command = shlex.join(["python", "-m", "benchmarks.inhibition", *sys.argv[1:]])
+    return {"command": command, "versions": versions, "seed": seed, "people": people}
+
+
 def main(
     people: Annotated[int, typer.Option(help="People a group.")] = 60,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 10_000,
     minutes: Annotated[float, typer.Option(help="Interrupt the sessions after so many minutes.")] = np.inf,
+    only: Annotated[str, typer.Option(help="Run the sessions of these groups, comma-separated, and no tables.")] = "",
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("inhibition"),
 ) -> None:
     """Run sessions above the motor threshold, and section 8.1.3 again."""
-    rows = sessions(people, seed, out.with_suffix(".parts"), minutes)
-    if rows is None:
-        print("Interrupted; the same command goes on.")
+    groups = tuple(only.split(",")) if only else GROUPS
+    rows = sessions(people, seed, out.with_suffix(".parts"), minutes, groups)
+    if only:
+        print("The sessions are kept; the same command without --only makes the tables.")
         return
     curves, example = choices_of_curves(people, seed), cohort(GROUPS[0], 4, seed)[3]
     tables = {"By trial": by_trial(rows), "Behind the oracle": behind_oracle(rows), "Curves": curves}
     claims = all_claims(people, seed, curves)
-    facts = facts_of("benchmarks/inhibition.py", seed, people)
+    facts = facts_of(seed, people)
     header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
     parts = [f"## {title}\n\n{part.to_markdown(index=False, floatfmt='.3f')}\n" for title, part in tables.items()]
     said = pd.DataFrame(claims).to_markdown(index=False)

@@ -1,4 +1,4 @@
-"""Section 8.1.3 and appendix B of the dissertation beside simulated people: what is printed, and what comes out here."""
+"""Section 8.1.3 and appendix B of the dissertation beside simulated people: what is printed, and what comes out."""
 
 from __future__ import annotations
 
@@ -137,7 +137,9 @@ def _normality(people: int, seed: int) -> list[dict[str, str]]:
                 f"are {expected[name]}",
                 "none" if fits else "the number of values",
                 "under reading: the values tested are the mean MEPs, one for each ISI, every 5 ms, and above the "
-                "threshold every 1 ms from 30 to 60 ms" if fits else "not, because no number of ISIs gives it",
+                "threshold every 1 ms from 30 to 60 ms"
+                if fits
+                else "not, because no number of ISIs gives it",
             )
         )
     wanted = share["Subthreshold"] > share["Suprathreshold"]

@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 from scipy.stats import norm, qmc
 
+from benchmarks.oracle import outcome_table
 from isiw.design import DesignSpace
 from isiw.subjects.profiles import OpposedProfile
 from isiw.subjects.responses import RecruitmentResponse
@@ -19,7 +20,6 @@ from isiw.subjects.subject import SimulatedSubject
 from isiw.subjects.supra import RANGE_MS, WIDTH_LIMITS_MS
 from isiw.types import BoolArray, FloatArray
 from isiw.window import Window, least_excess_mv
-from oracle import outcome_table
 
 HYPOTHESES = 2**16
 LEVELS = 61

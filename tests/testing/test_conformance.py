@@ -40,7 +40,7 @@ def settings_of(name: str) -> dict[str, Any]:
     """Settings with which a strategy is quick."""
     if name.startswith("parametric"):
         return {"samples": 64, "effort": EFFORT}
-    return FEW if name in {"default", "even", "random"} or name.startswith("particles") else {}
+    return FEW if name in {"default", "even", "random", "supra-threshold"} or name.startswith("particles") else {}
 
 
 @cache  # a posterior never changes

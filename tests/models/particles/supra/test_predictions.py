@@ -10,8 +10,8 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.metrics import f1
-from isiw.models.particles.noise import draw_log_mep
 from isiw.models.particles.likelihood import levels
+from isiw.models.particles.noise import draw_log_mep
 from isiw.models.particles.prior import Person
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import LATENTS, SupraLatents, SupraPrior

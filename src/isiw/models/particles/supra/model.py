@@ -47,7 +47,7 @@ class SupraModel:
     """
 
     prior: SupraPrior = field(default_factory=SupraPrior)
-    particles: int = 1000
+    particles: int = 2000
     thinned: int = 192
     moves: Moving = field(default_factory=Moving)
     detection_limit_mv: float = 0.005

@@ -1,7 +1,7 @@
 """Markov chain moves of particles with both kinds of segment; as `isiw.models.particles.moves`, with other jumps.
 
-Half of the particles move at a time, by differences within the other half [terBraak2006], or draw a segment, its place or
-the recruitment curve anew from the prior.
+Half of the particles move at a time, by differences within the other half [terBraak2006], or draw a segment, its place,
+both places or the recruitment curve anew from the prior.
 """
 
 from __future__ import annotations
@@ -22,14 +22,23 @@ from isiw.models.shared.history import History
 
 __all__ = ["SupraMoved", "SupraMover"]
 
-JUMPS: Final = {"enhanced": 0.25, "depressed": 0.3, "place": 0.15, "depressed place": 0.2, "curve": 0.1}
-"""Shares of the jumps. They draw anew: whether there is a segment, and all of it; where and how wide it is; the curve."""
+JUMPS: Final = {
+    "enhanced": 0.2,
+    "depressed": 0.25,
+    "place": 0.15,
+    "depressed place": 0.15,
+    "both places": 0.15,
+    "curve": 0.1,
+}
+"""Shares of the jumps. They draw anew: whether there is a segment, and all of it; where and how wide one is, or both
+are; the curve."""
 
 REDRAWN: Final = {
     "enhanced": BLOCKS["enhanced"],
     "depressed": BLOCKS["depressed"],
     "place": BLOCKS["enhanced"][:2],
     "depressed place": BLOCKS["depressed"][:2],
+    "both places": (*BLOCKS["enhanced"][:2], *BLOCKS["depressed"][:2]),
     "curve": BLOCKS["curve"],
 }
 """The latents that each jump draws anew."""

@@ -1,7 +1,7 @@
 """The prior over people under TMS above the motor threshold.
 
-Both segments shift the input of one recruitment curve: the enhanced one up, the depressed one down. A tap can be seen to
-depress an MEP only where that is well above the EMG floor without a tap, so that all noise is that of the curve.
+Both segments shift the input of one recruitment curve: the enhanced one up, the depressed one down. A tap can be seen
+to depress an MEP only where that is well above the EMG floor without a tap, so that all noise is that of the curve.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from isiw.models.particles.prior import Depression, Person
 from isiw.models.particles.shapes import Shape, ShapeKind
 from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale, check_scales
-from isiw.models.shared.start import StartPrior
+from isiw.models.shared.start import Span, StartPrior
 
 __all__ = ["BLOCKS", "LATENTS", "Curve", "Segment", "SupraLatents", "SupraPrior"]
 
@@ -119,6 +119,7 @@ class Curve:
         check_scales(self, "rest_pct", positive=False, tailed=False)
 
 
+_START: Final = StartPrior(spans=(Span(0.85, 0.0, 95.0, 5.0), Span(0.15, -30.0, 260.0, 20.0)), p_anywhere=0.02)
 _WIDTHS: Final = (Width(0.85, Scale(30.0, 0.35)), Width(0.15, Scale(80.0, 0.5)))
 
 
@@ -135,7 +136,7 @@ class SupraPrior:
         session: of what changes within a session.
     """
 
-    start: StartPrior = field(default_factory=StartPrior)
+    start: StartPrior = _START
     enhanced: Segment = field(default_factory=lambda: Segment(0.9, _WIDTHS, Scale(11.3, 0.36)))
     depressed: Segment = field(default_factory=lambda: Segment(0.85, _WIDTHS, Scale(8.3, 0.35)))
     curves: tuple[Curve, ...] = (
@@ -183,9 +184,7 @@ class SupraPrior:
         uniform = torch.rand((4, *size), generator=generator, device=generator.device)
         starts_ms = self.start.start_ms(uniform[:2], space).movedim(0, -1)
         values = torch.cat([starts_ms, self._joint.sample(size, generator)], dim=-1)
-        return SupraLatents(
-            values, uniform[2] < self.enhanced.probability, uniform[3] < self.depressed.probability
-        )
+        return SupraLatents(values, uniform[2] < self.enhanced.probability, uniform[3] < self.depressed.probability)
 
     def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
         """Log density of latents but for a constant, shape (b, p).
