@@ -4,8 +4,9 @@
 
 writes tables (Markdown), figures with versions, command and seeds and the claims of the dissertation beside ours
 (JSON), and a picture. A session has 60 stimuli, a sixth of them TMS alone; the oracle, which knows the MEP without a
-tap, has 60 pairs. Sessions are kept beside the tables as they finish: the same command goes on where it was interrupted.
-After `--minutes` the tables are of the sessions that are there, and say how many. Reported people come from seed 10,000 on; seeds below 1,000 are for work.
+tap, has 60 pairs. Sessions are kept beside the tables as they finish: the same command goes on where it was
+interrupted, and after `--minutes` the tables are of the sessions that are there, and say how many. Reported people come
+from seed 10,000 on; seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
