@@ -32,26 +32,16 @@ from benchmarks.inhibition_claims import all_claims, choices_of_curves
 from benchmarks.opposed_oracle import OpposedOracle
 from isiw import DesignSpace, VisitProtocol, make_strategy
 from isiw.metrics import f1
-from isiw.subjects import OpposedProfile, RecruitmentResponse, SimulatedSubject, cohort
+from isiw.subjects import RecruitmentResponse, SimulatedSubject, cohort
 
 SPACE: Final = DesignSpace(0, 120, reference="impact")
 MARKS: Final = (20, 40, 60)
 PROTOCOL: Final = VisitProtocol(tms_alone=1 / 6)
-GROUPS: Final = ("supra-threshold", "recruitment", "gaussian", "never depressed")
-"""Cohorts; `never depressed` are those of `supra-threshold` without their depressed segment."""
+SWEPT: Final = 30
+"""People who are swept over all ISIs, for the claims of the dissertation."""
 
-
-def people_of(group: str, people: int, seed: int) -> list[SimulatedSubject]:
-    """The people of a group."""
-    if group != "never depressed":
-        return cohort(group, people, seed)
-    return [_never_depressed(subject) for subject in cohort("supra-threshold", people, seed)]
-
-
-def _never_depressed(subject: SimulatedSubject) -> SimulatedSubject:
-    if not isinstance(subject.profile, OpposedProfile):
-        raise TypeError(subject.profile)
-    return replace(subject, profile=subject.profile.facilitated)
+GROUPS: Final = ("supra-threshold", "recruitment", "gaussian")
+"""Cohorts: people above the motor threshold, and two kinds of people below it."""
 
 
 def by_strategy(subject: SimulatedSubject, name: str, seed: int) -> Iterator[dict[str, Any]]:
@@ -99,12 +89,13 @@ def rows_of(group: str, method: str, number: int, subject: SimulatedSubject, see
 def sessions(people: int, seed: int, kept: Path, minutes: float, groups: tuple[str, ...] = GROUPS) -> pd.DataFrame:
     """All sessions: those that are there already, and those that are missing, as far as there is time."""
     done = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
+    done = [row for row in done if row["person"] < people]
     known = {(row["group"], row["method"], row["person"]) for row in done}
     until = time.monotonic() + 60.0 * minutes
     with kept.open("a") as file:
         for group in groups:
             methods = ("supra-threshold", "oracle") if group == GROUPS[0] else ("supra-threshold",)
-            for number, subject in enumerate(people_of(group, people, seed)):
+            for number, subject in enumerate(cohort(group, people, seed)):
                 for method in methods:
                     if (group, method, number) in known:
                         continue
@@ -179,9 +170,9 @@ def main(
     if only:
         print("The sessions are kept; the same command without --only makes the tables.")
         return
-    curves, example = choices_of_curves(people, seed), cohort(GROUPS[0], 4, seed)[3]
+    curves, example = choices_of_curves(SWEPT, seed), cohort(GROUPS[0], 4, seed)[3]
     tables = {"By trial": by_trial(rows), "Behind the oracle": behind_oracle(rows), "Curves": curves}
-    claims = all_claims(people, seed, curves)
+    claims = all_claims(SWEPT, seed, curves)
     facts = facts_of(seed, people)
     header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
     parts = [f"## {title}\n\n{part.to_markdown(index=False, floatfmt='.3f')}\n" for title, part in tables.items()]

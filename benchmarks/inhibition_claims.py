@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -19,6 +20,11 @@ from isiw.types import FloatArray
 SUB_ISIS_MS: Final = np.arange(30.0, 131.0, 5.0)
 SUPRA_ISIS_MS: Final = np.concatenate([np.arange(30.0, 61.0), np.arange(65.0, 106.0, 5.0)])
 """Every 5 ms; and every 1 ms from 30 to 60 ms, as the text has it, and every 5 ms behind."""
+
+_PLANS: Final = {
+    "Subthreshold": "from 30 to 130 ms every 5 ms",
+    "Suprathreshold": "from 30 to 60 ms every 1 ms, and on to 105 ms every 5 ms",
+}
 
 TRIALS: Final = 10
 """At each ISI (4.2)."""
@@ -53,6 +59,7 @@ def at_intensity(subject: SimulatedSubject, pct_rmt: float) -> SimulatedSubject:
     return replace(subject, response=replace(subject.response, intensity_pct_rmt=pct_rmt))
 
 
+@cache
 def sweeps(people: int, seed: int) -> dict[str, list[tuple[FloatArray, FloatArray]]]:
     """A sweep of each person: of `recruitment` below the threshold, of `supra-threshold` above it."""
     plans = {"Subthreshold": ("recruitment", SUB_ISIS_MS), "Suprathreshold": ("supra-threshold", SUPRA_ISIS_MS)}
@@ -98,7 +105,7 @@ def _sizes(people: int, seed: int) -> list[dict[str, str]]:
         pct: np.array([at_intensity(s, pct).expected_mep_mv(space).max() for s in drawn]) for pct in (90.0, 120.0)
     }
     low, median, high = np.quantile(peaks_mv[120.0] / peaks_mv[90.0], [0.05, 0.5, 0.95])
-    depressed = {pct: np.mean([at_intensity(s, pct).depressed(space) is not None for s in drawn]) for pct in peaks_mv}
+    deficits_uv = {pct: 1e3 * np.median([_deficit_mv(at_intensity(s, pct), space) for s in drawn]) for pct in peaks_mv}
     tops = {pct: f"{np.median(peak_mv):.2f} mV" for pct, peak_mv in peaks_mv.items()}
     return [
         _claim(
@@ -114,12 +121,16 @@ def _sizes(people: int, seed: int) -> list[dict[str, str]]:
             "Fig. 8.1",
             "Inhibition can be seen above the motor threshold only.",
             "only enhancement at 90 % RMT; inhibition possible at 120 % RMT",
-            f"a deficit by the window's rule in {depressed[90.0]:.0%} of the people at 90 % RMT, and in "
-            f"{depressed[120.0]:.0%} at 120 % RMT",
+            f"the expected MEP falls by at most {deficits_uv[90.0]:.0f} µV at 90 % RMT in the median person, where the "
+            f"EMG floor is about 10 µV, and by {deficits_uv[120.0]:.0f} µV at 120 % RMT",
             "the figure marks no depressed ISIs",
             "under reading: the law of the simulated people has a depressed segment, which the figure only suggests",
         ),
     ]
+
+
+def _deficit_mv(subject: SimulatedSubject, space: DesignSpace) -> float:
+    return float(subject.baseline_mv - subject.expected_mep_mv(space).min())
 
 
 def _normality(people: int, seed: int) -> list[dict[str, str]]:
@@ -133,11 +144,10 @@ def _normality(people: int, seed: int) -> list[dict[str, str]]:
                 "Table 8.1",
                 f"{name}: W and p of the test of Shapiro and Wilk belong together.",
                 f"W {w}, p {p}, number of values not given",
-                f"W gives this p with {' or '.join(map(str, values)) or 'no number of'} values; the ISIs of the text "
-                f"are {expected[name]}",
+                f"W gives this p with {' or '.join(map(str, values)) or 'no number of'} values; there are "
+                f"{expected[name]} ISIs {_PLANS[name]}",
                 "none" if fits else "the number of values",
-                "under reading: the values tested are the mean MEPs, one for each ISI, every 5 ms, and above the "
-                "threshold every 1 ms from 30 to 60 ms"
+                "under reading: the values tested are the mean MEPs, one for each of these ISIs"
                 if fits
                 else "not, because no number of ISIs gives it",
             )
@@ -151,7 +161,7 @@ def _normality(people: int, seed: int) -> list[dict[str, str]]:
             f"{share['Subthreshold']:.0%} of the simulated profiles pass at 90 % RMT, {share['Suprathreshold']:.0%} at "
             "120 % RMT",
             "the test asks whether amplitudes could be normal, not whether their course by ISI is a Gaussian",
-            "reproduced" if wanted else "not, because simulated profiles pass as often above the threshold",
+            "reproduced" if wanted else "not, because simulated profiles pass no less often above the threshold",
         )
     )
     return claims

@@ -27,7 +27,7 @@ from isiw.window import Window, WindowEstimate
 
 FEW: dict[str, Any] = {"particles": 100}
 NAMES = sorted(list_strategies())
-FITTED = ("parametric-", "gp-")
+FITTED = ("parametric-", "gp-", "supra-")
 """Strategies whose fits take seconds begin so."""
 SLOW_FITS = [pytest.param(name, marks=pytest.mark.slow) if name.startswith(FITTED) else name for name in NAMES]
 SCORING = sorted(name for name, make in ACQUISITIONS.items() if ProposesIsi not in make(0).needs)

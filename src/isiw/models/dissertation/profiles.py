@@ -31,7 +31,7 @@ MOST_GAUSSIANS: Final = 5
 LEAST_ISIS: Final = 5
 """A smoothing spline needs as many ISIs."""
 
-_STIFFNESSES: Final = np.geomspace(1e-2, 1e7, 46)
+_STIFFNESSES: Final = np.geomspace(1e-2, 1e7, 19)
 _START_SDS_MS: Final = (3.0, 6.0, 12.0, 24.0)
 
 

@@ -140,7 +140,8 @@ class SupraMover:
 
     def _jump(self, mine: SupraLatents) -> SupraLatents:
         """Draw some latents, and whether their segment is there, anew from the prior."""
-        fresh = self.prior.sample(*mine.enhanced.shape, self.generator, self.space)
+        people, size = mine.enhanced.shape
+        fresh = self.prior.sample(people, size, self.generator, self.space)
         jump = drawn(tuple(JUMPS.values()), self._uniform(mine.enhanced))
         redraw = torch.stack([_latents(*names, device=mine.values.device) for names in REDRAWN.values()])[jump]
         return SupraLatents(

@@ -152,7 +152,8 @@ class SupraPrior:
     @cached_property
     def _mixtures(self) -> tuple[Mixture, ...]:
         """What is believed of each latent but the starts, in the order of `LATENTS`."""
-        session = [(0.0, self.session.drift_sd), tuple(self.session.startup[:2])]
+        startup = self.session.startup
+        session = [(0.0, self.session.drift_sd), (startup.median, startup.sd)]
         return (
             *(mixture for segment in (self.enhanced, self.depressed) for mixture in _of_segment(segment)),
             Mixture.of([(f.share, [_log(f.median_mv), _log(f.log_sd)]) for f in self.floors], "cpu"),
