@@ -180,9 +180,9 @@ def _curves(curves: pd.DataFrame) -> list[dict[str, str]]:
             f"{one['Suprathreshold']:.0%} at 120 % RMT, where {most} is best most often "
             f"({share['Suprathreshold'].max():.0%})",
             "ours are sums on a baseline; the figure's fall to 0",
-            "reproduced"
-            if one["Suprathreshold"] < min(0.5, one["Subthreshold"])
-            else "not, because the profiles of ten trials an ISI are too noisy to need more than one Gaussian",
+            "under reading: by AICc one Gaussian is best less often above the threshold than below it"
+            if one["Suprathreshold"] < one["Subthreshold"]
+            else "not, because one Gaussian is best as often above the threshold as below it",
         )
     ]
 
