@@ -129,18 +129,20 @@ def _evoked_cdf(response: ResponseCurve, level: float, amplitude_mv: FloatArray)
     return np.where(amplitude_mv > 0, below, 0.0)
 
 
-def outcome_table(subject: SimulatedSubject) -> tuple[FloatArray, FloatArray]:
+def outcome_table(
+    subject: SimulatedSubject, levels: FloatArray = LEVELS, top_mv: float = 1.5
+) -> tuple[FloatArray, FloatArray]:
     """Edges of the bins of the MEP [mV], shape (y - 1,), and the probability of each bin by level, shape (l, y)."""
     floor = subject.response.floor
-    edges = np.geomspace(0.3 * floor.median_mv, 1.5, BINS - 1)
+    edges = np.geomspace(0.3 * floor.median_mv, top_mv, BINS - 1)
     floors = floor.median_mv * np.exp(floor.log_sd * _quantile_nodes(24))
     cdf = np.stack(
-        [_evoked_cdf(subject.response, level, edges[:, None] - floors).mean(-1) for level in LEVELS.tolist()]
+        [_evoked_cdf(subject.response, level, edges[:, None] - floors).mean(-1) for level in levels.tolist()]
     )
     low_mv, high_mv = OUTLIERS_MV
     outliers = np.clip((edges - low_mv) / (high_mv - low_mv), 0.0, 1.0)
     cdf += subject.outlier_probability * (outliers - cdf)
-    padded = np.concatenate([np.zeros((len(LEVELS), 1)), cdf, np.ones((len(LEVELS), 1))], axis=1)
+    padded = np.concatenate([np.zeros((len(levels), 1)), cdf, np.ones((len(levels), 1))], axis=1)
     mass = np.maximum(np.diff(padded, axis=1), 0.0) + 1e-9
     return edges, mass / mass.sum(1, keepdims=True)
 

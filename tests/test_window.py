@@ -257,3 +257,18 @@ def test_the_profile_is_interpolated_between_grid_points() -> None:
     np.testing.assert_allclose(band.low_mv, [0.0, 0.5])
     np.testing.assert_allclose(band.median_mv, [1.0, 1.5])
     np.testing.assert_allclose(band.high_mv, [2.0, 3.5])
+
+
+def test_a_depression_that_is_less_probable_than_none_is_not_reported() -> None:
+    for probability in (None, 0.4):
+        with pytest.raises(InvalidValueError, match="depression is reported"):
+            WindowEstimate(0.9, Window(50, 80), depressed=Window(10, 35), depressed_probability=probability)
+    assert WindowEstimate(0.9, Window(50, 80), depressed_probability=0.4).depressed is None
+
+
+def test_an_estimate_says_where_the_mep_is_depressed_only_where_that_was_looked_for() -> None:
+    found = WindowEstimate(0.9, Window(50, 80), depressed=Window(10, 35), depressed_probability=0.7)
+    assert str(found).endswith("Depressed: 10–35 ms (probability of it: 0.70)")
+    nowhere = WindowEstimate(0.9, Window(50, 80), depressed_probability=0.1)
+    assert str(nowhere).endswith("Depressed: nowhere (probability of it: 0.10)")
+    assert "epressed" not in str(WindowEstimate(0.9, Window(50, 80)))

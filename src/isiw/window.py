@@ -194,10 +194,13 @@ class WindowEstimate:
         largest_excluded: an enhancement that, with 90 % probability, is larger than the largest at any ISI.
         unusual: how probable it is that parts of this person are of another law than the usual one, by their names.
         pairs: how many pairs of stimuli it rests on; None where that is not known.
+        depressed: the ISIs that depress the MEP, as far as they are reported; None where there are none, or where
+            nobody looked for them.
+        depressed_probability: probability that there are any; None where nobody looked for them.
 
     Raises:
-        InvalidValueError: a probability outside 0–1, a window reported against it, not one hypothesis a sample, or one
-            without a name.
+        InvalidValueError: a probability outside 0–1, a window or a depression reported against it, not one hypothesis a
+            sample, or one without a name.
     """
 
     probability: float | None
@@ -216,10 +219,16 @@ class WindowEstimate:
     largest_excluded: Enhancement | None = None
     unusual: Mapping[str, float] = field(default_factory=dict, repr=False)
     pairs: int | None = None
+    depressed: Window | None = None
+    depressed_probability: float | None = None
 
     def __post_init__(self) -> None:
         self._check_hypotheses()
-        check_probabilities(self, "expected_f1", optional=True)
+        check_probabilities(self, "expected_f1", "depressed_probability", optional=True)
+        if self.depressed is not None and (self.depressed_probability or 0.0) < 0.5:
+            raise InvalidValueError(
+                "a depression is reported although none is more probable", got=self.depressed_probability
+            )
         if self.probability is None:
             return
         check_probabilities(self, "probability")
@@ -251,7 +260,8 @@ class WindowEstimate:
 
     def __str__(self) -> str:
         start, end = self.interval(0.9) or ((None, None), (None, None))
-        return finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end))
+        depressed = self.depressed, self.depressed_probability
+        return finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end), depressed)
 
     @property
     def rests_on_data(self) -> bool:
@@ -325,14 +335,21 @@ class WindowEstimate:
         return ProfileBand(median, low, high)
 
 
-def finding(probability: float | None, window: Window | None, start: _Edge, end: _Edge) -> str:
-    """A window in a line, and each of its edges in another, where they are known.
+def finding(
+    probability: float | None,
+    window: Window | None,
+    start: _Edge,
+    end: _Edge,
+    depressed: tuple[Window | None, float | None] = (None, None),
+) -> str:
+    """A window in a line, and each of its edges in another, where they are known; and where the MEP is depressed.
 
     Args:
         probability: that there is a window.
         window: the reported decision.
         start: median, and lower and upper end of the 90 % interval, of its start [ms]; None where not known.
         end: those of its end [ms].
+        depressed: the reported ISIs that depress the MEP, and the probability of any; None where nobody looked.
     """
     chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
     lines = [f"Window: {'none' if window is None else window}{chance}"]
@@ -340,6 +357,9 @@ def finding(probability: float | None, window: Window | None, start: _Edge, end:
         median, low, high = ("" if edge_ms is None else _edge(edge_ms) for edge_ms in edge)
         if window is not None and low:
             lines.append(f"{name}: {median}, 90 % interval {low} to {high}")
+    segment, anywhere = depressed
+    if anywhere is not None:
+        lines.append(f"Depressed: {'nowhere' if segment is None else segment} (probability of it: {anywhere:.2f})")
     return "\n".join(lines)
 
 

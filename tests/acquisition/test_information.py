@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ from isiw.acquisition.information import (
 )
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.errors import InvalidValueError
-from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesWindows
+from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesWindows, Tensor
 
 ROUNDING = 1e-5
 ALL = [mutual_information, window_gain, window_information]
@@ -51,6 +51,21 @@ def test_mutual_information_is_what_the_entropy_of_the_samples_is_expected_to_lo
 def test_window_gain_is_the_expected_reduction_of_summed_variance(seed: int) -> None:
     p = some_posterior(seed)
     np.testing.assert_allclose(window_gain(p, ISIS_MS), expected_gain(p.mass, p.masks, summed_variance), atol=ROUNDING)
+
+
+@dataclass(frozen=True)
+class WithDepression(HandMadePosterior):
+    """The same with depressed segments: all ISIs that are not in the window."""
+
+    def depressed_masks(self, isi_ms: Tensor) -> Tensor:
+        return 1.0 - self.window_masks(isi_ms)
+
+
+def test_depressed_segments_count_as_much_as_the_window() -> None:
+    p = some_posterior(4)
+    both = WithDepression(p.mass, p.masks, p.profiles, p.baselines)
+    # What is not in the window varies exactly as what is.
+    np.testing.assert_allclose(window_gain(both, ISIS_MS), 2.0 * window_gain(p, ISIS_MS), rtol=1e-4)
 
 
 @given(seeds)

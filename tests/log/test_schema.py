@@ -103,6 +103,21 @@ def test_an_estimate_keeps_window_intervals_and_profile() -> None:
     assert record.next_isi_ms == 7.0
 
 
+def test_an_estimate_keeps_the_isis_that_depress_the_mep() -> None:
+    estimate = WindowEstimate(0.9, Window(50, 80), depressed=Window(10, 35), depressed_probability=0.7)
+    written = encode("/estimate", Estimate.of(4, estimate, StopDecision(stop=False, reason="r"), 7.0))
+    record = instance(Estimate, decode("/estimate", written))
+    assert (record.depressed, record.depressed_probability) == (Window(10, 35), 0.7)
+    assert str(record) == str(estimate)
+    assert "Depressed: 10–35 ms (probability of it: 0.70)" in str(record)
+
+
+def test_an_estimate_of_a_strategy_that_looks_for_enhancement_alone_says_nothing_of_depression() -> None:
+    record = Estimate.of(4, WindowEstimate(0.9, Window(50, 80)), StopDecision(stop=False, reason="r"), 7.0)
+    assert (record.depressed, record.depressed_probability) == (None, None)
+    assert "epressed" not in str(record)
+
+
 def test_an_estimate_of_a_method_without_posterior_has_gaps() -> None:
     record = Estimate.of(0, WindowEstimate(None, Window(1, 2)), StopDecision(stop=True, reason=""), None)
     assert record.window == Window(1, 2)

@@ -19,6 +19,7 @@ from isiw.models.protocol import ResponseModel
 from isiw.models.shared.scales import Scale
 from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
 from isiw.strategy.settings.particles import ParticleSettings
+from isiw.strategy.settings.supra import SupraSettings
 from known import instance, known
 
 NAMES = sorted(list_strategies())
@@ -27,7 +28,7 @@ FEW: dict[str, Any] = {"particles": 64}
 
 
 def few(name: str) -> dict[str, Any]:
-    return FEW if name in PARTICLES else {}
+    return FEW if isinstance(settings_for(name), ParticleSettings | SupraSettings) else {}
 
 
 def asks(name: str, seed: int, meps_mv: tuple[float, ...] = (0.02, 0.1)) -> list[float]:

@@ -19,7 +19,7 @@ from isiw.errors import InvalidValueError
 from isiw.subjects.cohorts import COHORTS, cohort
 from isiw.subjects.days import another_day
 from isiw.subjects.labs import LABS, lab
-from isiw.subjects.profiles import PeakProfile, TwoPeakProfile
+from isiw.subjects.profiles import OpposedProfile, PeakProfile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
 from isiw.subjects.subject import Drift, SimulatedSubject
 from isiw.types import ArrayLike, FloatArray
@@ -28,7 +28,7 @@ from known import instance, known
 PEOPLE = 400
 KS_LEVEL = 1e-5
 OFF_THE_MAP = ("other-rig", "late", "very-wide", "steep", "flat", "weak", "rmt-off", "hand")
-OTHER_LAWS = {"odd", "kim11", "another-day", *LABS}
+OTHER_LAWS = {"odd", "kim11", "another-day", "supra-threshold", *LABS}
 USUAL_START = [name for name in COHORTS if name not in {"late", "very-wide", *OTHER_LAWS}]
 USUAL_DELAY = [name for name in COHORTS if name not in {"other-rig", *OTHER_LAWS}]
 USUAL_WIDTH = [name for name in COHORTS if name not in {"narrow", "wide", "very-wide", *OTHER_LAWS}]
@@ -64,6 +64,7 @@ GOLDEN = {  # person 3 of seed 7: start, width, hit delay [ms]; baseline, one ME
     "rmt-off": (74.218307886, 112.525712103, 188.232285430, 24.203424727, 37.024783464),
     "hand": (84.807565834, 40.000000000, 188.025895468, 405.512286791, 836.441568198),
     "odd": (90.440553468, 45.837527776, 184.314130489, 194.289659538, 464.222031414),
+    "supra-threshold": (24.866261922, 32.847816077, 189.879315173, 826.299001084, 825.329106370),
     "nonresponder": (26.795763804, 200.583631934, 171.477980223, 17.537323509, 27.809842272),
     "kim11": (29.786337130, 70.000000000, 183.644876006, 27.459353025, 130.665956671),
     "lab": (43.607468962, 98.778181474, 185.045472366, 16.924413868, 55.411189166),
@@ -98,8 +99,9 @@ def assert_log_normal(values: object, median: float, log_sd: float) -> None:
 
 
 def profile_of(subject: SimulatedSubject) -> PeakProfile | TwoPeakProfile:
-    assert isinstance(subject.profile, PeakProfile | TwoPeakProfile)
-    return subject.profile
+    profile = subject.profile.facilitated if isinstance(subject.profile, OpposedProfile) else subject.profile
+    assert isinstance(profile, PeakProfile | TwoPeakProfile)
+    return profile
 
 
 def gain_of(subject: SimulatedSubject) -> GainResponse:

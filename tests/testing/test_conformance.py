@@ -28,7 +28,7 @@ from isiw.window import Window, WindowEstimate
 
 FEW: dict[str, Any] = {"particles": 100}
 NAMES = sorted(list_strategies())
-FITTED = ("parametric-", "gp-")
+FITTED = ("parametric-", "gp-", "supra-")
 """Strategies whose fits take seconds begin so."""
 SLOW_FITS = [pytest.param(name, marks=pytest.mark.slow) if name.startswith(FITTED) else name for name in NAMES]
 SCORING = sorted(name for name, make in ACQUISITIONS.items() if ProposesIsi not in make(0).needs)
@@ -41,7 +41,7 @@ def settings_of(name: str) -> dict[str, Any]:
     """Settings with which a strategy is quick."""
     if name.startswith("parametric"):
         return {"samples": 64, "effort": EFFORT}
-    return FEW if name in {"default", "even", "random"} or name.startswith("particles") else {}
+    return FEW if name in {"default", "even", "random", "supra-threshold"} or name.startswith("particles") else {}
 
 
 @cache  # a posterior never changes

@@ -13,7 +13,7 @@ import torch
 
 from isiw.acquisition.lookahead import expected_variance_reduction
 from isiw.checks import check_wholes
-from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesWindows, Tensor
+from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesDepression, SamplesWindows, Tensor
 
 __all__ = [
     "Alternating",
@@ -86,11 +86,16 @@ def _quantile_cell(edge: Tensor, found: Tensor, cells: int) -> Tensor:
 def window_gain(posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
     """Expected reduction of the summed variance of membership in the window, shape (b, t).
 
+    Where a posterior has depressed segments too, membership in them counts as much.
+
     Args:
         posterior: what is believed.
         isi_ms: candidate ISIs [ms], shape (t,).
     """
-    return expected_variance_reduction(posterior.outcome_mass(isi_ms), posterior.window_masks(isi_ms))
+    masks = posterior.window_masks(isi_ms)
+    if isinstance(posterior, SamplesDepression):
+        masks = torch.cat((masks, posterior.depressed_masks(isi_ms)), dim=-1)
+    return expected_variance_reduction(posterior.outcome_mass(isi_ms), masks)
 
 
 @dataclass(frozen=True)

@@ -177,7 +177,9 @@ class Estimate(_Record):
     median and the ends of the 90 % interval; `excluded_mv` and `excluded_pct_rmt` are the largest enhancement that is
     excluded with 90 % probability. Nine of ten next MEPs lie between `predicted_low_mv` and `predicted_high_mv`, at the
     ISIs of the profile. `chosen_by` says what chose the next ISI (`isiw.strategy.choosing.ChosenBy`), and `scores` are
-    those of the acquisition function at `scored_ms`; both are empty where nothing is asked next.
+    those of the acquisition function at `scored_ms`; both are empty where nothing is asked next. `depressed_ms` are the
+    segments in which the tap depresses the MEP, and `depressed_probability` is that there are any; None where nobody
+    looked for them.
     """
 
     trial: TrialNumber
@@ -198,6 +200,8 @@ class Estimate(_Record):
     best_isi_ms: tuple[float, ...] = ()
     excluded_mv: float | None = None
     excluded_pct_rmt: float | None = None
+    depressed_ms: tuple[float, ...] = ()
+    depressed_probability: float | None = None
     grid_ms: tuple[float, ...] = ()
     profile_mv: Numbers = ()
     band_low_mv: Numbers = ()
@@ -221,13 +225,12 @@ class Estimate(_Record):
             decision: whether to stop, and why.
             next_isi_ms: what is asked next [ms]; None where the session stops, or a control trial comes next.
         """
-        segments = () if estimate.window is None else tuple(itertools.chain(*estimate.window.segments))
         start, end = estimate.interval(0.9) or ((None, None), (None, None))
         beyond, excluded = estimate.beyond_probability or (None, None), estimate.largest_excluded
         return cls(
             trial=trial,
             probability=estimate.probability,
-            segments_ms=segments,
+            segments_ms=_edges(estimate.window),
             start_ms=estimate.start_ms,
             end_ms=estimate.end_ms,
             start_low_ms=start[0],
@@ -243,6 +246,8 @@ class Estimate(_Record):
             best_isi_ms=tuple(estimate.best_isi or ()),
             excluded_mv=None if excluded is None else excluded.mep_mv,
             excluded_pct_rmt=None if excluded is None else excluded.shift_pct_rmt,
+            depressed_ms=_edges(estimate.depressed),
+            depressed_probability=estimate.depressed_probability,
             next_isi_ms=next_isi_ms,
             stop=decision.stop,
             reason=decision.reason,
@@ -251,19 +256,32 @@ class Estimate(_Record):
 
     def __str__(self) -> str:
         start = (self.start_ms, self.start_low_ms, self.start_high_ms)
-        return finding(self.probability, self.window, start, (self.end_ms, self.end_low_ms, self.end_high_ms))
+        end = (self.end_ms, self.end_low_ms, self.end_high_ms)
+        return finding(self.probability, self.window, start, end, (self.depressed, self.depressed_probability))
 
     @property
     def window(self) -> Window | None:
         """The reported window."""
-        edges = self.segments_ms
-        pairs = tuple(zip(edges[::2], edges[1::2], strict=True))
-        return Window(edges[0], edges[-1], pairs) if pairs else None
+        return _window(self.segments_ms)
+
+    @property
+    def depressed(self) -> Window | None:
+        """The reported ISIs that depress the MEP."""
+        return _window(self.depressed_ms)
 
     @property
     def decision(self) -> StopDecision:
         """Whether the session stops here, and why."""
         return StopDecision(self.stop, self.reason)
+
+
+def _edges(window: Window | None) -> tuple[float, ...]:
+    return () if window is None else tuple(itertools.chain(*window.segments))
+
+
+def _window(edges_ms: tuple[float, ...]) -> Window | None:
+    pairs = tuple(zip(edges_ms[::2], edges_ms[1::2], strict=True))
+    return Window(edges_ms[0], edges_ms[-1], pairs) if pairs else None
 
 
 def _profile(estimate: WindowEstimate) -> Mapping[str, Any]:

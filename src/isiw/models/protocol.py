@@ -32,6 +32,7 @@ __all__ = [
     "ProposesIsi",
     "ReportsTrouble",
     "ResponseModel",
+    "SamplesDepression",
     "SamplesProfiles",
     "SamplesWindows",
     "SimulatedPerson",
@@ -138,6 +139,14 @@ class SamplesWindows(Protocol):
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Which ISIs [ms] (shape (t,)) each sampled window holds, as 0 or 1, shape (b, s, t); all 0 means no window."""
+
+
+@runtime_checkable
+class SamplesDepression(Protocol):
+    """Capability: sampled segments in which the tap depresses the MEP, beside the windows in which it enhances it."""
+
+    def depressed_masks(self, isi_ms: Tensor) -> Tensor:
+        """Which ISIs [ms] (shape (t,)) each sample depresses, as 0 or 1, shape (b, s, t); all 0 means nowhere."""
 
 
 @runtime_checkable

@@ -11,6 +11,7 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate, Event
 from isiw.log.verdicts import VERDICTS
 from isiw.metrics import f1
+from isiw.report.depression import depression_sentence
 from isiw.report.evidence import contradiction, nothing_measured
 from isiw.session.progress import asked, outcome
 from isiw.strategy.catalogue import known_settings, list_strategies
@@ -91,6 +92,7 @@ def finding_sentences(record: SessionRecord) -> list[str]:
         _best_isi(estimate),
         _excluded(estimate),
         _expected_f1(estimate),
+        depression_sentence(record),
         _unusual(estimate),
     ]
     return [sentence for sentence in said if sentence]

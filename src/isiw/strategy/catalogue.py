@@ -54,6 +54,10 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
         "Particle posterior; evenly spaced ISIs, whatever the responses.", _PARTICLES, {"acquisition": "even"}
     ),
     "random": _Entry("Particle posterior; random ISIs, whatever the responses.", _PARTICLES, {"acquisition": "random"}),
+    "supra-threshold": _Entry(
+        "For TMS above the motor threshold: looks for depressed MEPs as well as for enhanced ones.",
+        "supra:SupraSettings",
+    ),
     "parametric-mi": _Entry(
         "Gaussian window in Pyro; asks what tells most about all unknowns.",
         _PARAMETRIC,

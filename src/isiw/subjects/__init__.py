@@ -4,7 +4,7 @@ from isiw.subjects.cohorts import COHORTS, WIDTHS_KIM_MS, cohort
 from isiw.subjects.days import another_day
 from isiw.subjects.labs import LABS, Lab, lab
 from isiw.subjects.plasticity import Plasticity
-from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
+from isiw.subjects.profiles import OpposedProfile, PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.subjects.subject import Drift, Responder, Response, SimulatedSubject
 from isiw.subjects.thresholds import THRESHOLD_COHORTS, HotSpot, StimulatedPerson, StimulatedResponder, threshold_cohort
@@ -19,6 +19,7 @@ __all__ = [
     "GainResponse",
     "HotSpot",
     "Lab",
+    "OpposedProfile",
     "PeakProfile",
     "Plasticity",
     "Profile",

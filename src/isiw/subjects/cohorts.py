@@ -17,6 +17,7 @@ from isiw.subjects.labs import LABS, lab
 from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import Drift, SimulatedSubject
+from isiw.subjects.supra import supra_threshold
 
 __all__ = ["COHORTS", "WIDTHS_KIM_MS", "cohort"]
 
@@ -198,6 +199,7 @@ _DRAW: Final[dict[str, Callable[[np.random.Generator], SimulatedSubject]]] = {
     "recruitment": _USUAL.subject,
     **{name: partial(_off_the_map, name=name) for name in _OFF_THE_MAP},
     "odd": _odd,
+    "supra-threshold": supra_threshold,
 }
 
 COHORTS: Final = (*_DRAW, "nonresponder", "kim11", *LABS, "another-day")

@@ -2,7 +2,8 @@
 
 A profile is a value that maps ISIs counted from the impact to facilitation in 0–1. The families are those that have
 been seen or argued for: a Gaussian [Kim2020, 4.2], skewed and flat-topped ones (8.1, appendix B), and two peaks
-(electrical conditioning has two facilitation windows).
+(electrical conditioning has two facilitation windows). Above the motor threshold a tap may depress the MEP too, and
+facilitation is negative there (8.1.3).
 """
 
 from __future__ import annotations
@@ -16,14 +17,14 @@ from isiw.checks import check_numbers, check_probabilities
 from isiw.errors import InvalidValueError
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = ["PeakProfile", "Profile", "TwoPeakProfile"]
+__all__ = ["OpposedProfile", "PeakProfile", "Profile", "TwoPeakProfile"]
 
 
 class Profile(Protocol):
-    """Facilitation by ISI."""
+    """Facilitation by ISI: at most 1, and negative where the tap depresses the MEP."""
 
     def __call__(self, isi_ms: ArrayLike) -> FloatArray:
-        """Facilitation in 0–1 at ISIs counted from the impact [ms], same shape."""
+        """Facilitation at ISIs counted from the impact [ms], same shape."""
 
 
 @dataclass(frozen=True)
@@ -89,3 +90,28 @@ class TwoPeakProfile:
         share = (np.asarray(isi_ms, dtype=np.float64) - self.start_ms) / self.width_ms
         peaks = [np.exp(-0.5 * ((share - at) * 7.5) ** 2) for at in (0.27, 0.73)]
         return np.asarray(self.first * peaks[0] + self.second * peaks[1])
+
+
+@dataclass(frozen=True)
+class OpposedProfile:
+    """A segment that facilitates and one that depresses, in either order.
+
+    Args:
+        facilitated: the facilitation.
+        depressed: where the tap depresses, as a share of the deepest depression.
+        depth: the deepest depression, in units of the largest facilitation.
+
+    Raises:
+        InvalidValueError: a depth that is not positive.
+    """
+
+    facilitated: PeakProfile
+    depressed: PeakProfile
+    depth: float
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "depth", above=0)
+
+    def __call__(self, isi_ms: ArrayLike) -> FloatArray:
+        """Facilitation at ISIs counted from the impact [ms], negative where the tap depresses, same shape."""
+        return self.facilitated(isi_ms) - self.depth * self.depressed(isi_ms)

@@ -68,13 +68,13 @@ class ResponseCurve(Protocol):
         """The EMG floor."""
 
     def expected_evoked_mv(self, facilitation: ArrayLike) -> FloatArray:
-        """Expected MEP above the EMG floor [mV], without drift, by facilitation in 0–1; same shape."""
+        """Expected MEP above the EMG floor [mV], without drift, by facilitation of at most 1; same shape."""
 
     def sample_evoked_mv(self, facilitation: float, noise: TrialNoise, rng: np.random.Generator) -> float:
         """One trial's MEP above the EMG floor [mV].
 
         Args:
-            facilitation: in 0–1.
+            facilitation: at most 1; negative where the tap depresses.
             noise: that of the trial.
             rng: what else is drawn from.
         """
@@ -155,7 +155,7 @@ class RecruitmentResponse:
         """MEP above the floor before output noise [mV], by facilitation and input noise; broadcast shape.
 
         Args:
-            facilitation: in 0–1.
+            facilitation: at most 1; negative where the tap depresses.
             input_z: input noise in SDs.
         """
         x = self.intensity_pct_rmt + self.boost_pct_rmt * np.asarray(facilitation, dtype=np.float64)
@@ -163,7 +163,7 @@ class RecruitmentResponse:
         return np.asarray(self.amplitude_mv * expit(drive))
 
     def expected_evoked_mv(self, facilitation: ArrayLike) -> FloatArray:
-        """Expected MEP above the EMG floor [mV], without drift, by facilitation in 0–1; same shape."""
+        """Expected MEP above the EMG floor [mV], without drift, by facilitation of at most 1; same shape."""
         by_node = self.evoked_mv(np.asarray(facilitation, dtype=np.float64)[..., None], _NODES)
         return np.asarray(by_node @ _NODE_WEIGHTS * np.exp(0.5 * self.sigma_y**2))
 

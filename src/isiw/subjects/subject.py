@@ -13,9 +13,10 @@ import numpy as np
 
 from isiw.checks import choice, number
 from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
 from isiw.subjects.plasticity import Plasticity
-from isiw.subjects.profiles import Profile
-from isiw.subjects.responses import ResponseCurve, TrialNoise
+from isiw.subjects.profiles import OpposedProfile, Profile
+from isiw.subjects.responses import RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.types import FloatArray, Reference
 from isiw.window import Window, window_from_excess
 
@@ -74,6 +75,9 @@ class SimulatedSubject:
             the tapping robot's, over people.
         plasticity: how the pairs that are delivered change the gain; None where they do not. The true window and
             profile are those before the first pair.
+
+    Raises:
+        InvalidValueError: a depressed segment, but a response that has no recruitment curve.
     """
 
     profile: Profile
@@ -89,8 +93,17 @@ class SimulatedSubject:
     stated_hit_delay_ms: tuple[float, float] = (180.0, 6.0)
     plasticity: Plasticity | None = None
 
+    def __post_init__(self) -> None:
+        if isinstance(self.profile, OpposedProfile) and not isinstance(self.response, RecruitmentResponse):
+            raise InvalidValueError(
+                "only an MEP on a recruitment curve can be depressed",
+                got=type(self.response).__name__,
+                expected=RecruitmentResponse.__name__,
+                remedy="Give the person a RecruitmentResponse, or a profile without a depressed segment.",
+            )
+
     def facilitation(self, isi_ms: FloatArray, reference: Reference) -> FloatArray:
-        """Facilitation in 0–1 at ISIs on a reference [ms], at the mean hit delay; same shape.
+        """Facilitation at ISIs on a reference [ms], at the mean hit delay; negative where depressed, same shape.
 
         Args:
             isi_ms: ISIs [ms], any shape.
@@ -111,6 +124,10 @@ class SimulatedSubject:
     def window(self, space: DesignSpace) -> Window | None:
         """The true window on the space's grid; None where there is none."""
         return window_from_excess(space.grid_ms, self.expected_mep_mv(space) - self.baseline_mv, self.baseline_mv)
+
+    def depressed(self, space: DesignSpace) -> Window | None:
+        """The true ISIs that depress the MEP: the window's rule for the deficit; None where there are none."""
+        return window_from_excess(space.grid_ms, self.baseline_mv - self.expected_mep_mv(space), self.baseline_mv)
 
     def begin(self, seed: int) -> Responder:
         """A session with this person, its trial noise from this seed."""

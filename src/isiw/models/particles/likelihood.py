@@ -21,13 +21,16 @@ CHUNK_ELEMENTS = 1 << 20
 
 
 def levels(person: Person, isi_ms: Tensor) -> Tensor:
-    """Facilitation of each particle, shape (b, p, n).
+    """Facilitation of each particle, negative where the tap depresses, shape (b, p, n).
 
     Args:
         person: particles, fields of shape (b, p).
         isi_ms: ISIs [ms], shape (b or 1, n); NaN is TMS alone.
     """
     level = facilitation(person.shape, isi_ms.unsqueeze(-2)).mul_(person.present.unsqueeze(-1))
+    if person.depression is not None:
+        shape, depth, present = person.depression
+        level -= facilitation(shape, isi_ms.unsqueeze(-2)).mul_((depth * present).unsqueeze(-1))
     return level.nan_to_num_(0.0)
 
 

@@ -9,14 +9,14 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.models.particles.likelihood import in_pieces, levels
-from isiw.models.particles.noise import NODES, evoked_mean, log_gain, outcome_density
+from isiw.models.particles.noise import NODES, Response, evoked_mean, log_gain, outcome_density
 from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import highest_facilitation, reaches
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
 from isiw.models.windows import least_excess_mv
 
-__all__ = ["PersonSample"]
+__all__ = ["PersonSample", "outcome_table"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,28 +75,10 @@ class PersonSample:
         return response.log_floor.exp().unsqueeze(-1) * (evoked + rest)
 
     @cached_property
-    def _log_ends(self) -> tuple[Tensor, Tensor]:
-        """Between which log MEPs outcomes lie, each of shape (b,)."""
-        response = self.person.response
-        top = response.log_floor + torch.log1p(self._evoked.amax(-1))
-        low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
-        return low, torch.quantile(top, 0.95, dim=-1) + 1.5
-
-    @cached_property
     def _outcome_table(self) -> Tensor:
         """Probability of each outcome of the next trial at the tables' levels, shape (b, s, l, y)."""
-        response = self.person.response
-        gain = log_gain(response, torch.full_like(response.drift, self.order).unsqueeze(-1)).squeeze(-1)
-        response = response._replace(log_ratio=response.log_ratio + gain)
-        low, high = self._log_ends
-        ends = _cell_ends(low.device)
-        middle, width = 0.5 * (ends[1:] + ends[:-1]), ends.diff()
-        log_mep = (low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)).unsqueeze(-2)
-        density = in_pieces(
-            lambda r, grid: outcome_density(r, self._levels, grid), response, (log_mep,), LEVELS * OUTCOMES * NODES
-        )
-        mass = density * width
-        return mass / mass.sum(-1, keepdim=True)
+        levels = self._levels.expand(len(self.person.present), -1, -1)
+        return outcome_table(self.person.response, levels, self._evoked, self.order)
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
@@ -115,8 +97,35 @@ class PersonSample:
         less, more = below.gather(-1, right - 1), below.gather(-1, right)
         ends = _cell_ends(below.device)
         place = torch.lerp(ends[right - 1], ends[right], (wanted - less) / (more - less).clamp_min(1e-12))
-        low, high = (end[:, None, None] for end in self._log_ends)
+        low, high = (end[:, None, None] for end in _log_ends(self.person.response, self._evoked))
         return torch.exp(low + place * (high - low))
+
+
+def outcome_table(response: Response, levels: Tensor, evoked: Tensor, order: int) -> Tensor:
+    """Probability of each outcome of the next trial at some levels of facilitation, shape (b, s, l, y).
+
+    Args:
+        response: response parameters, fields of shape (b, s).
+        levels: facilitation, shape (b, 1 or s, l).
+        evoked: expected MEP above the floor there, in floors, shape (b, s, l).
+        order: how many trials came before.
+    """
+    low, high = _log_ends(response, evoked)
+    gain = log_gain(response, torch.full_like(response.drift, order).unsqueeze(-1)).squeeze(-1)
+    response = response._replace(log_ratio=response.log_ratio + gain)
+    ends = _cell_ends(low.device)
+    middle, width = 0.5 * (ends[1:] + ends[:-1]), ends.diff()
+    log_mep = (low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)).unsqueeze(-2)
+    density = in_pieces(outcome_density, response, (levels, log_mep), levels.shape[-1] * OUTCOMES * NODES)
+    mass = density * width
+    return mass / mass.sum(-1, keepdim=True)
+
+
+def _log_ends(response: Response, evoked: Tensor) -> tuple[Tensor, Tensor]:
+    """Between which log MEPs outcomes lie, each of shape (b,)."""
+    top = response.log_floor + torch.log1p(evoked.amax(-1))
+    low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
+    return low, torch.quantile(top, 0.95, dim=-1) + 1.5
 
 
 def _cell_ends(device: torch.device) -> Tensor:

@@ -36,7 +36,7 @@ from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale
 
-__all__ = ["Person", "Prior"]
+__all__ = ["Depression", "Person", "Prior"]
 
 _WITHOUT_CURVE: Final = {
     NoiseKind.CONSTANT_CV: "constant-CV noise",
@@ -45,12 +45,24 @@ _WITHOUT_CURVE: Final = {
 }
 
 
+class Depression(NamedTuple):
+    """Where the tap depresses the MEP, how deeply in units of the largest facilitation, and whether it does; (b, p)."""
+
+    shape: Shape
+    depth: Tensor
+    present: Tensor
+
+
 class Person(NamedTuple):
-    """What the latents mean: a profile, a response, and whether there is any facilitation; fields (b, p)."""
+    """What the latents mean: a profile, a response, and whether there is any facilitation; fields (b, p).
+
+    A depression is there only where it is looked for.
+    """
 
     shape: Shape
     response: Response
     present: Tensor
+    depression: Depression | None = None
 
 
 @dataclass(frozen=True)

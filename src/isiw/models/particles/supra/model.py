@@ -1,0 +1,230 @@
+"""The particle posterior for TMS above the motor threshold: sequential Monte Carlo, as `isiw.models.particles.model`.
+
+Each particle has a segment in which the tap enhances the MEP, one in which it depresses it, or either, or none
+[Kim2020, 8.1.3].
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import torch
+
+from isiw.checks import MOST_OF_A_KIND, check_numbers, check_wholes
+from isiw.design import DesignSpace
+from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
+from isiw.models.particles.likelihood import total_log_likelihood
+from isiw.models.particles.model import Moving
+from isiw.models.particles.prior import Person
+from isiw.models.particles.supra.moves import SupraMover
+from isiw.models.particles.supra.predictions import SupraSample
+from isiw.models.particles.supra.prior import SupraLatents, SupraPrior
+from isiw.models.protocol import Observation, Tensor
+from isiw.models.randomness import step_generator, systematic
+from isiw.models.shared.history import History, observed
+from isiw.models.windows import SampledProfiles, best_window, profile_grid, sampled_estimate
+from isiw.window import WindowEstimate
+
+__all__ = ["SupraModel", "SupraPosterior"]
+
+
+@dataclass(frozen=True)
+class SupraModel:
+    """A particle posterior over enhancement, depression and recruitment.
+
+    Args:
+        prior: the prior over people.
+        particles: how many particles a person has.
+        thinned: how many of them represent the posterior where every candidate ISI is scored.
+        moves: how often particles move, and when they are resampled.
+        detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
+        response_threshold_mv: what a told response is known to be above [mV].
+
+    Raises:
+        InvalidValueError: fewer than two particles or more than a memory holds, or an invalid number.
+    """
+
+    prior: SupraPrior = field(default_factory=SupraPrior)
+    particles: int = 2000
+    thinned: int = 192
+    moves: Moving = field(default_factory=Moving)
+    detection_limit_mv: float = 0.005
+    response_threshold_mv: float = 0.02
+
+    def __post_init__(self) -> None:
+        check_wholes(self, "particles", least=2, most=MOST_OF_A_KIND)  # half of them move at a time
+        check_wholes(self, "thinned", least=1, most=MOST_OF_A_KIND)
+        check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
+
+    def begin(self, space: DesignSpace, seed: int, people: int = 1) -> SupraPosterior:
+        """The posterior before the first trial.
+
+        Args:
+            space: the design space.
+            seed: seed of all randomness.
+            people: how many people.
+        """
+        latents = self.prior.sample(people, self.particles, step_generator("cpu", seed, 0), space)
+        size = (people, self.particles)
+        return SupraPosterior(
+            model=self,
+            space=space,
+            seed=seed,
+            latents=latents,
+            log_weights=torch.full(size, -math.log(self.particles)),
+            log_likelihood=torch.zeros(size),
+            evidence=torch.zeros(people),
+            history=History.empty(people, torch.device("cpu")),
+        )
+
+    def update(self, posterior: SupraPosterior, observation: Observation) -> SupraPosterior:
+        """The posterior after one more trial."""
+        after = self.reweighted(posterior, observation)
+        generator = step_generator("cpu", posterior.seed, after.trials)
+        ess = ess_share(after.log_weights)
+        worn = ess < self.moves.min_ess
+        after = after.resampled(worn, torch.randperm(self.particles, generator=generator))
+        mover = SupraMover(self.prior, posterior.space, after.history, generator)
+        sweeps = self.moves.sweeps_after(after.trials, resampled=bool(worn.any()))
+        moved = mover.sweeps(sweeps, after.latents, after.log_likelihood)
+        health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))
+        return replace(after, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
+
+    def reweighted(self, posterior: SupraPosterior, observation: Observation) -> SupraPosterior:
+        """The same particles, weighted by one more trial as well.
+
+        Args:
+            posterior: what is believed before it.
+            observation: the trial.
+        """
+        known = self.detection_limit_mv, self.response_threshold_mv
+        trial = observed(observation, *known, order=posterior.trials).to("cpu", torch.float32)
+        gain = total_log_likelihood(posterior.person, trial)
+        return replace(
+            posterior,
+            log_weights=torch.log_softmax(posterior.log_weights + gain, dim=-1),
+            log_likelihood=posterior.log_likelihood + gain,
+            evidence=posterior.evidence + torch.logsumexp(posterior.log_weights + gain, dim=-1),
+            history=posterior.history.appended(trial),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SupraPosterior:
+    """What is believed about b people.
+
+    Args:
+        model: the model's settings.
+        space: the design space.
+        seed: seed of all randomness.
+        latents: the particles, fields of shape (b, p).
+        log_weights: their normalised log weights, shape (b, p).
+        log_likelihood: of the history under each of them, shape (b, p).
+        evidence: log marginal likelihood of the history [nat], shape (b,).
+        history: the trials so far.
+        health: how the particles took the last trial; None before the first.
+    """
+
+    model: SupraModel
+    space: DesignSpace
+    seed: int
+    latents: SupraLatents
+    log_weights: Tensor
+    log_likelihood: Tensor
+    evidence: Tensor
+    history: History
+    health: Health | None = None
+
+    @property
+    def trouble(self) -> str | None:
+        """What is wrong with the particles; see `ReportsTrouble`."""
+        return None if self.health is None else trouble_of(self.health)
+
+    @property
+    def trials(self) -> int:
+        """How many trials of each person it has been told."""
+        return self.history.isi_ms.shape[-1]
+
+    @cached_property
+    def person(self) -> Person:
+        """What the particles mean."""
+        return self.model.prior.person(self.latents)
+
+    def resampled(self, worn: Tensor, shuffled: Tensor) -> SupraPosterior:
+        """The same with equally weighted particles where they are worn.
+
+        Args:
+            worn: whose effective sample size has fallen, shape (b,).
+            shuffled: a permutation of the particles, so that both halves represent the posterior, shape (p,).
+        """
+        if not bool(worn.any()):
+            return self
+        worn = worn.unsqueeze(-1)
+        size = len(shuffled)
+        picks = torch.where(worn, systematic(self.log_weights, size)[:, shuffled], torch.arange(size))
+        return replace(
+            self,
+            latents=_picked(self.latents, picks),
+            log_weights=torch.where(worn, -math.log(size), self.log_weights),
+            log_likelihood=self.log_likelihood.gather(1, picks),
+        )
+
+    def _sample(self, size: int, order: int) -> SupraSample:
+        picks = systematic(self.log_weights, size)
+        return SupraSample(self.model.prior.person(_picked(self.latents, picks)), self.space, order)
+
+    @cached_property
+    def _thinned(self) -> SupraSample:
+        return self._sample(self.model.thinned, self.trials)
+
+    @cached_property
+    def _all(self) -> SupraSample:
+        return self._sample(self.model.particles, 0)
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
+        return self._thinned.outcome_mass(isi_ms)
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows; see `SamplesWindows`."""
+        return self._thinned.window_masks(isi_ms)
+
+    def depressed_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled depressed segments; see `SamplesDepression`."""
+        return self._thinned.depressed_masks(isi_ms)
+
+    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+        """Sampled profiles; see `SamplesProfiles`."""
+        return self._thinned.expected_mep_mv(isi_ms)
+
+    def baselines_mv(self) -> Tensor:
+        """Sampled baselines; see `SamplesProfiles`."""
+        return self._thinned.baselines_mv()
+
+    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> SupraPosterior:
+        """The same particles, weighted by an imagined trial; see `Conditions`."""
+        return self.model.reweighted(self, Observation.of(isi_ms, mep_mv))
+
+    def log_evidence(self) -> Tensor:
+        """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
+        return self.evidence
+
+    def estimate(self, person: int = 0) -> WindowEstimate:
+        """The window of one person, and the segment in which the tap depresses the MEP."""
+        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32)
+        profiles_mv, baselines_mv = self._thinned.expected_mep_mv(profile_grid(self.space)), self.baselines_mv()
+        profiles = SampledProfiles(profiles_mv[person], baselines_mv[person])
+        estimate = sampled_estimate(self._all.window_masks(grid)[person], profiles, self.space)
+        depressed = self._all.depressed_masks(grid)[person]
+        somewhere = depressed.any(-1)
+        probability = float(somewhere.double().mean())
+        segment = best_window(depressed[somewhere], self.space.grid_ms)[0] if probability >= 0.5 else None
+        return replace(estimate, depressed=segment, depressed_probability=probability)
+
+
+def _picked(latents: SupraLatents, picks: Tensor) -> SupraLatents:
+    """Some of the particles, by index (b, s)."""
+    values = latents.values.gather(1, picks.unsqueeze(-1).expand(-1, -1, latents.values.shape[-1]))
+    return SupraLatents(values, latents.enhanced.gather(1, picks), latents.depressed.gather(1, picks))

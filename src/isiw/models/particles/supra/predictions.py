@@ -1,0 +1,111 @@
+"""A sample of the posterior with both kinds of segment: predictive distributions, segments and profiles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import torch
+
+from isiw.design import DesignSpace
+from isiw.models.particles.likelihood import levels
+from isiw.models.particles.noise import evoked_mean
+from isiw.models.particles.predictions import outcome_table
+from isiw.models.particles.prior import Person
+from isiw.models.protocol import Tensor
+from isiw.models.shared.tables import LEVELS, interpolated
+from isiw.models.windows import least_excess_mv
+
+__all__ = ["SupraSample"]
+
+LEAST_BASELINE_MV = 0.05
+"""Where the expected MEP without a tap is smaller there is none to depress: what counts as an MEP [Rossini2015]."""
+
+MOST_RANGE_POINTS = 241
+"""ISIs at which the largest enhancement and the deepest depression in the range are looked for, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class SupraSample:
+    """What equally weighted particles say about the next MEP and about both kinds of segment.
+
+    Args:
+        person: the particles, with a depression, fields of shape (b, s).
+        space: the design space, in whose range segments are looked for.
+        order: how many trials came before the next one.
+    """
+
+    person: Person
+    space: DesignSpace
+    order: int = 0
+
+    @cached_property
+    def _depth(self) -> Tensor:
+        """Facilitation at the deepest depression is minus this, shape (b, s)."""
+        assert self.person.depression is not None  # noqa: S101 - a promise of ours, not a user's input
+        return self.person.depression.depth
+
+    @cached_property
+    def _levels(self) -> Tensor:
+        """Facilitation from the deepest depression to the largest enhancement, in equal steps, shape (b, s, l)."""
+        share = torch.linspace(0.0, 1.0, LEVELS, device=self._depth.device)
+        return share * (1.0 + self._depth.unsqueeze(-1)) - self._depth.unsqueeze(-1)
+
+    @cached_property
+    def _evoked(self) -> Tensor:
+        """Expected MEP above the floor at the tables' levels, in floors, shape (b, s, l)."""
+        return evoked_mean(self.person.response, self._levels)
+
+    def _at(self, table: Tensor, level: Tensor) -> Tensor:
+        """What lies between the rows of a table (b, s, l, y) at facilitations (b, s, t), shape (b, s, t, y)."""
+        depth = self._depth.unsqueeze(-1)
+        # `interpolated` has its rows at the squares of equal steps.
+        return interpolated(table, ((level + depth) / (1.0 + depth)).clamp(0.0, 1.0).square())
+
+    def _mean_mv(self, level: Tensor) -> Tensor:
+        """Expected MEP [mV] by facilitation (b, s, t), of the same shape."""
+        response = self.person.response
+        floors = self._at(self._evoked.unsqueeze(-1), level).squeeze(-1)
+        rest = torch.exp(0.5 * response.floor_log_sd.square()).unsqueeze(-1)
+        return response.log_floor.exp().unsqueeze(-1) * (floors + rest)
+
+    def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
+        """Expected MEP [mV], shape (b, s, t)."""
+        return self._mean_mv(levels(self.person, isi_ms.unsqueeze(0)))
+
+    @cached_property
+    def _baseline_mv(self) -> Tensor:
+        """Expected MEP without a tap [mV], shape (b, s, 1)."""
+        return self._mean_mv(torch.zeros_like(self._depth).unsqueeze(-1))
+
+    def baselines_mv(self) -> Tensor:
+        """Expected MEP without a tap [mV], shape (b, s)."""
+        return self._baseline_mv.squeeze(-1)
+
+    @cached_property
+    def _extremes_mv(self) -> tuple[Tensor, Tensor]:
+        """Largest excess over the baseline and largest deficit in the range [mV], each of shape (b, s, 1)."""
+        points = min(MOST_RANGE_POINTS, len(self.space.grid_ms))
+        range_ms = torch.linspace(self.space.low_ms, self.space.high_ms, points, device=self._depth.device)
+        excess_mv = self.expected_mep_mv(range_ms) - self._baseline_mv
+        return excess_mv.amax(-1, keepdim=True), -excess_mv.amin(-1, keepdim=True)
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows as 0 or 1, shape (b, s, t)."""
+        return self._masks(self.expected_mep_mv(isi_ms) - self._baseline_mv, self._extremes_mv[0])
+
+    def depressed_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled depressed segments as 0 or 1, by the window's rule for the deficit, shape (b, s, t)."""
+        masks = self._masks(self._baseline_mv - self.expected_mep_mv(isi_ms), self._extremes_mv[1])
+        return masks * (self._baseline_mv >= LEAST_BASELINE_MV)
+
+    def _masks(self, excess_mv: Tensor, largest_mv: Tensor) -> Tensor:
+        return (excess_mv >= least_excess_mv(largest_mv, self._baseline_mv)).to(excess_mv.dtype)
+
+    @cached_property
+    def _outcome_table(self) -> Tensor:
+        return outcome_table(self.person.response, self._levels, self._evoked, self.order)
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
+        return self._at(self._outcome_table, levels(self.person, isi_ms.unsqueeze(0)))

@@ -1,0 +1,243 @@
+"""The prior over people under TMS above the motor threshold.
+
+Both segments shift the input of one recruitment curve: the enhanced one up, the depressed one down. A tap can be seen
+to depress an MEP only where that is well above the EMG floor without a tap, so that all noise is that of the curve.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import torch
+
+from isiw.checks import check_probabilities
+from isiw.design import DesignSpace
+from isiw.models.particles.laws import Floor, SessionPrior, Width
+from isiw.models.particles.mixture import JointMixture, Mixture
+from isiw.models.particles.noise import NoiseKind, Response
+from isiw.models.particles.prior import Depression, Person
+from isiw.models.particles.shapes import Shape, ShapeKind
+from isiw.models.protocol import Tensor
+from isiw.models.shared.scales import Scale, check_scales
+from isiw.models.shared.start import Span, StartPrior
+
+__all__ = ["BLOCKS", "LATENTS", "Curve", "Segment", "SupraLatents", "SupraPrior"]
+
+LATENTS: Final = (
+    "start_ms",
+    "depressed_start_ms",
+    "log_width_ms",
+    "log_shift",
+    "depressed_log_width_ms",
+    "depressed_log_shift",
+    "log_floor_mv",
+    "log_floor_sd",
+    "drift",
+    "startup",
+    "log_ceiling",
+    "log_slope",
+    "log_input_sd",
+    "log_sigma_y",
+    "rest",
+)
+"""Names of the latents, in order."""
+
+BLOCKS: Final = {
+    "enhanced": ("start_ms", "log_width_ms", "log_shift"),
+    "depressed": ("depressed_start_ms", "depressed_log_width_ms", "depressed_log_shift"),
+    "session": ("log_floor_mv", "log_floor_sd", "drift", "startup"),
+    "curve": ("log_ceiling", "log_slope", "log_input_sd", "log_sigma_y", "rest"),
+}
+"""The latents by what they are about."""
+
+
+class SupraLatents(NamedTuple):
+    """Particles of b people.
+
+    Args:
+        values: of the latents, in the order of `LATENTS`, shape (b, p, d).
+        enhanced: whether there is any enhancement, shape (b, p).
+        depressed: whether there is any depression, shape (b, p).
+    """
+
+    values: Tensor
+    enhanced: Tensor
+    depressed: Tensor
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Of the ISIs at which the tap enhances, or depresses, the MEP.
+
+    Args:
+        probability: that there are any.
+        widths: how wide they are.
+        shift_pct: by how much the input of the recruitment curve is shifted in their middle [% RMT].
+
+    Raises:
+        InvalidValueError: an invalid probability or scale.
+    """
+
+    probability: float
+    widths: tuple[Width, ...]
+    shift_pct: Scale
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "probability")
+        check_scales(self, "shift_pct", tailed=False)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A law of recruitment curves above the motor threshold.
+
+    Args:
+        share: its probability.
+        ratio: the largest MEP over the floor.
+        slope_per_pct: slope [1 / % RMT].
+        input_sd: SD of the noise on the input, in logits.
+        sigma_y: SD of the noise on the output, natural log.
+        rest_pct: the input without a tap, intensity − intensity of the half-maximal MEP [% RMT].
+
+    Raises:
+        InvalidValueError: an invalid share or scale.
+    """
+
+    share: float
+    ratio: Scale
+    slope_per_pct: Scale
+    input_sd: Scale
+    sigma_y: Scale
+    rest_pct: Scale
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "share")
+        check_scales(self, "ratio", "slope_per_pct", "input_sd", "sigma_y", tailed=False)
+        check_scales(self, "rest_pct", positive=False, tailed=False)
+
+
+_START: Final = StartPrior(spans=(Span(0.85, 0.0, 95.0, 5.0), Span(0.15, -30.0, 260.0, 20.0)), p_anywhere=0.02)
+_WIDTHS: Final = (Width(0.85, Scale(30.0, 0.35)), Width(0.15, Scale(80.0, 0.5)))
+
+
+@dataclass(frozen=True)
+class SupraPrior:
+    """The prior over people under TMS above the motor threshold.
+
+    Args:
+        start: where either segment starts.
+        enhanced: of the enhanced ISIs.
+        depressed: of the depressed ones.
+        curves: of recruitment curves, the usual one first.
+        floors: of the EMG floor.
+        session: of what changes within a session.
+    """
+
+    start: StartPrior = _START
+    enhanced: Segment = field(default_factory=lambda: Segment(0.9, _WIDTHS, Scale(11.3, 0.36)))
+    depressed: Segment = field(default_factory=lambda: Segment(0.85, _WIDTHS, Scale(8.3, 0.35)))
+    curves: tuple[Curve, ...] = (
+        Curve(0.75, Scale(100.0, 0.5), Scale(0.23, 0.1), Scale(1.6, 0.2), Scale(0.39, 0.19), Scale(3.0, 3.5)),
+        Curve(0.25, Scale(30.0, 1.2), Scale(0.27, 0.3), Scale(1.9, 0.35), Scale(0.39, 0.3), Scale(-8.0, 10.0)),
+    )
+    floors: tuple[Floor, ...] = (
+        Floor(0.85, Scale(0.009, 0.38), Scale(0.22, 0.4)),
+        Floor(0.15, Scale(0.009, 1.2), Scale(0.22, 0.5)),
+    )
+    session: SessionPrior = field(default_factory=SessionPrior)
+
+    @cached_property
+    def _mixtures(self) -> tuple[Mixture, ...]:
+        """What is believed of each latent but the starts, in the order of `LATENTS`."""
+        startup = self.session.startup
+        session = [(0.0, self.session.drift_sd), (startup.median, startup.sd)]
+        return (
+            *(mixture for segment in (self.enhanced, self.depressed) for mixture in _of_segment(segment)),
+            Mixture.of([(f.share, [_log(f.median_mv), _log(f.log_sd)]) for f in self.floors], "cpu"),
+            Mixture.of([(1.0, session)], "cpu"),
+            Mixture.of([(c.share, _of_curve(c)) for c in self.curves], "cpu"),
+        )
+
+    @cached_property
+    def _joint(self) -> JointMixture:
+        return JointMixture(list(self._mixtures))
+
+    @cached_property
+    def spreads(self) -> Tensor:
+        """Usual SD of each latent, shape (d,)."""
+        first = self.start.spans[0]
+        starts = torch.full((2,), (first.high_ms - first.low_ms) / math.sqrt(12.0))
+        return torch.cat([starts, *(mixture.sds[0] for mixture in self._mixtures)])
+
+    def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> SupraLatents:
+        """Particles of the prior.
+
+        Args:
+            people: how many people.
+            particles: how many particles of each.
+            generator: source of randomness.
+            space: the design space that the segments are in.
+        """
+        size = (people, particles)
+        uniform = torch.rand((4, *size), generator=generator, device=generator.device)
+        starts_ms = self.start.start_ms(uniform[:2], space).movedim(0, -1)
+        values = torch.cat([starts_ms, self._joint.sample(size, generator)], dim=-1)
+        return SupraLatents(values, uniform[2] < self.enhanced.probability, uniform[3] < self.depressed.probability)
+
+    def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
+        """Log density of latents but for a constant, shape (b, p).
+
+        Args:
+            values: latents, shape (b, p, d).
+            space: the design space that the segments are in.
+        """
+        starts = self.start.log_density(values[..., :2], space).sum(-1)
+        return starts + self._joint.log_density(values[..., 2:])
+
+    def person(self, latents: SupraLatents) -> Person:
+        """What particles mean."""
+        z = dict(zip(LATENTS, latents.values.unbind(-1), strict=True))
+        enhanced = _bell(z["start_ms"], z["log_width_ms"])
+        depressed = _bell(z["depressed_start_ms"], z["depressed_log_width_ms"])
+        depth = (z["depressed_log_shift"] - z["log_shift"]).exp()
+        return Person(enhanced, _response(z), latents.enhanced, Depression(depressed, depth, latents.depressed))
+
+
+def _of_segment(segment: Segment) -> tuple[Mixture, Mixture]:
+    widths = Mixture.of([(width.share, [_log(width.width_ms)]) for width in segment.widths], "cpu")
+    return widths, Mixture.of([(1.0, [_log(segment.shift_pct)])], "cpu")
+
+
+def _of_curve(curve: Curve) -> list[tuple[float, float]]:
+    scales = (curve.ratio, curve.slope_per_pct, curve.input_sd, curve.sigma_y)
+    return [*map(_log, scales), (curve.rest_pct.median, curve.rest_pct.sd)]
+
+
+def _log(scale: Scale) -> tuple[float, float]:
+    return math.log(scale.median), scale.sd
+
+
+def _bell(start_ms: Tensor, log_width_ms: Tensor) -> Shape:
+    kind = torch.full_like(start_ms, ShapeKind.GAUSSIAN, dtype=torch.long)
+    return Shape(kind, start_ms, log_width_ms.exp(), torch.zeros_like(start_ms))
+
+
+def _response(z: dict[str, Tensor]) -> Response:
+    slope, nothing = z["log_slope"].exp(), torch.zeros_like(z["rest"])
+    return Response(
+        kind=torch.full_like(nothing, NoiseKind.RECRUITMENT, dtype=torch.long),
+        log_floor=z["log_floor_mv"],
+        floor_log_sd=z["log_floor_sd"].exp(),
+        log_ratio=z["log_ceiling"],
+        spread=z["log_input_sd"].exp(),
+        output_log_sd=z["log_sigma_y"].exp(),
+        boost=slope * z["log_shift"].exp(),
+        rest=slope * z["rest"],
+        max_probability=nothing + 1.0,
+        rest_probability=nothing,
+        drift=z["drift"],
+        startup=z["startup"],
+    )

@@ -1,0 +1,32 @@
+"""What a session says about ISIs that depress the MEP: where they are, or that nobody looked for them."""
+
+from __future__ import annotations
+
+from isiw.log.reader import SessionRecord
+
+__all__ = ["depression_sentence"]
+
+THRESHOLD_PCT_RMT = 100.0
+
+
+def depression_sentence(record: SessionRecord) -> str:
+    """Where the tap depresses the MEP, or that the strategy does not look for it above the motor threshold.
+
+    Args:
+        record: the session, with an estimate.
+
+    Returns:
+        One sentence; empty where the strategy did not look, and the pulse is not known to be above the threshold.
+    """
+    estimate, intensity_pct = record.estimates[-1], record.header.visit.intensity_pct_rmt
+    if estimate.depressed_probability is not None:
+        chance = f" (probability that it does so anywhere: {estimate.depressed_probability:.2f})"
+        if estimate.depressed is None:
+            return f"No ISIs were found at which the tap depresses the MEP{chance}."
+        return f"The tap depresses the MEP at ISIs of {estimate.depressed}{chance}."
+    if intensity_pct is None or intensity_pct <= THRESHOLD_PCT_RMT:
+        return ""
+    return (
+        f"This strategy looks for enhancement alone. At {intensity_pct:g} % of RMT the tap may depress the MEP too: "
+        "the strategy supra-threshold looks for both."
+    )

@@ -1,0 +1,48 @@
+"""Settings of the strategy for TMS above the motor threshold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from isiw.checks import check_wholes
+from isiw.models.particles.supra import SupraModel
+from isiw.strategy.settings.common import Asking
+from isiw.strategy.stopping import Budget, StoppingRule
+
+__all__ = ["SupraSettings", "SupraStopping"]
+
+
+@dataclass(frozen=True)
+class SupraStopping:
+    """When the strategy stops: the rules of the default look at the window alone, and would leave a depression unknown.
+
+    Args:
+        max_trials: stop after this many stimuli; mistrials count, control trials do not.
+
+    Raises:
+        InvalidValueError: not a whole number of at least 1.
+    """
+
+    max_trials: int = 60
+
+    def __post_init__(self) -> None:
+        check_wholes(self, "max_trials", least=1)
+
+    def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - the budget counts from the first stimulus
+        """The budget used up."""
+        return Budget(self.max_trials)
+
+
+@dataclass(frozen=True)
+class SupraSettings:
+    """The strategy for TMS above the motor threshold.
+
+    Args:
+        model: the particle posterior with both kinds of segment.
+        asking: what is asked.
+        stopping: when to stop.
+    """
+
+    model: SupraModel = field(default_factory=SupraModel)
+    asking: Asking = field(default_factory=Asking)
+    stopping: SupraStopping = field(default_factory=SupraStopping)

@@ -1,0 +1,117 @@
+"""The posterior above the motor threshold: what it learns, and that it keeps the promises of a model."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+import torch
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.metrics import f1
+from isiw.models.particles.supra import SupraModel
+from isiw.models.particles.supra.model import SupraPosterior
+from isiw.models.particles.supra.moves import SupraMover
+from isiw.models.particles.supra.prior import LATENTS, Segment, SupraPrior
+from isiw.models.protocol import SamplesDepression
+from isiw.models.shared.history import History
+from isiw.models.shared.scales import Scale
+from isiw.subjects.cohorts import cohort
+from isiw.testing import check_model
+from isiw.window import Window
+from known import known
+from models.told_trials import Trial, told
+
+SPACE = DesignSpace(0, 120, reference="impact")
+MODEL = SupraModel(particles=300, thinned=96)
+
+
+def clear_trials(depressed_mv: float) -> list[Trial]:
+    """Trials almost without noise: 0.6 mV at rest, 1.5 mV at 60–90 ms, and another MEP at 15–45 ms."""
+    isis_ms = [None, None, *np.linspace(0, 120, 25).tolist()]
+    ripple = np.exp(0.1 * np.random.default_rng(1).standard_normal(len(isis_ms)))
+    meps_mv = [
+        1.5
+        if isi_ms is not None and 60 <= isi_ms <= 90
+        else depressed_mv
+        if isi_ms in {15, 20, 25, 30, 35, 40, 45}
+        else 0.6
+        for isi_ms in isis_ms
+    ]
+    return [(isi_ms, float(mep_mv * r)) for isi_ms, mep_mv, r in zip(isis_ms, meps_mv, ripple, strict=True)]
+
+
+@cache
+def posterior_after(depressed_mv: float) -> SupraPosterior:
+    posterior: SupraPosterior = told(MODEL, clear_trials(depressed_mv), SPACE)
+    return posterior
+
+
+@pytest.mark.slow
+def test_the_model_conforms() -> None:
+    check_model(lambda: SupraModel(particles=200, thinned=64), SPACE, order_tolerance_ms=40.0)
+
+
+def test_both_kinds_of_segment_are_found_where_they_are_clear() -> None:
+    estimate = posterior_after(0.1).estimate()
+    assert known(estimate.depressed_probability) > 0.95
+    assert f1(estimate.depressed, Window(13, 47), SPACE) > 0.75
+    assert f1(estimate.window, Window(58, 92), SPACE) > 0.75
+
+
+def test_a_depression_becomes_less_probable_where_meps_are_as_large_as_without_a_tap() -> None:
+    before, after = MODEL.begin(SPACE, 1).estimate(), posterior_after(0.6).estimate()
+    assert known(after.depressed_probability) < known(before.depressed_probability) - 0.05
+    assert f1(after.window, Window(58, 92), SPACE) > 0.75
+
+
+def test_meps_near_the_floor_are_not_called_depressed() -> None:
+    person = cohort("recruitment", 1, 4)[0].begin(4)
+    trials = [person.respond(isi_ms, "impact") for isi_ms in [None] * 5 + np.linspace(0, 120, 25).tolist()]
+    estimate = told(MODEL, [(trial.isi_ms, trial.mep_mv) for trial in trials], SPACE).estimate()
+    assert estimate.depressed is None
+    assert estimate.depressed_probability < 0.2
+
+
+def test_what_is_sampled_has_both_kinds_of_segment() -> None:
+    posterior = posterior_after(0.1)
+    assert isinstance(posterior, SamplesDepression)
+    isi_ms = torch.tensor([30.0, 75.0, 110.0])
+    enhanced, depressed = posterior.window_masks(isi_ms), posterior.depressed_masks(isi_ms)
+    assert enhanced.shape == depressed.shape == (1, MODEL.thinned, 3)
+    assert depressed.mean(1)[0, :2].numpy() == pytest.approx([1.0, 0.0], abs=0.1)
+    assert enhanced.mean(1)[0, :2].numpy() == pytest.approx([0.0, 1.0], abs=0.1)
+    mean_mv = posterior.profiles_mv(isi_ms).mean(1)[0]
+    assert mean_mv[0] < posterior.baselines_mv().mean() < mean_mv[1]
+
+
+def test_moves_leave_the_prior_as_it_is() -> None:
+    prior, generator = SupraPrior(), torch.Generator().manual_seed(2)
+    drawn = prior.sample(1, 4000, generator, SPACE)
+    mover = SupraMover(prior, SPACE, History.empty(1, torch.device("cpu")), generator)
+    moved = mover.sweeps(6, drawn, torch.zeros(1, 4000))
+    assert (moved.latents.values != drawn.values).any(-1).double().mean() > 0.9
+    assert moved.shifts.item() > 0.1
+    fresh = prior.sample(1, 4000, generator, SPACE)
+    for name, ours, theirs in zip(LATENTS, moved.latents.values[0].T, fresh.values[0].T, strict=True):
+        apart = abs(ours.mean() - theirs.mean()) / (theirs.std() * math.sqrt(2 / 4000))
+        assert apart < 6, name  # particles that move together are fewer than they look
+    for ours, segment in ((moved.latents.enhanced, prior.enhanced), (moved.latents.depressed, prior.depressed)):
+        assert ours.double().mean().item() == pytest.approx(segment.probability, abs=0.03)
+
+
+def test_a_segment_needs_a_probability_and_a_positive_shift() -> None:
+    widths = SupraPrior().enhanced.widths
+    with pytest.raises(InvalidValueError, match="probability"):
+        Segment(1.5, widths, Scale(8.0, 0.3))
+    with pytest.raises(InvalidValueError, match="shift_pct"):
+        Segment(0.5, widths, Scale(-8.0, 0.3))
+
+
+@pytest.mark.parametrize("settings", [{"particles": 1}, {"thinned": 0}, {"detection_limit_mv": 0.0}])
+def test_invalid_settings_are_refused(settings: dict[str, float]) -> None:
+    with pytest.raises(InvalidValueError, match=next(iter(settings))):
+        SupraModel(**settings)  # type: ignore[arg-type] # what a user may write

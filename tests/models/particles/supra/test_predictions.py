@@ -1,0 +1,96 @@
+"""What particles say about both kinds of segment is what is true of the same person in a simulation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from isiw.design import DesignSpace
+from isiw.metrics import f1
+from isiw.models.particles.likelihood import levels
+from isiw.models.particles.noise import draw_log_mep
+from isiw.models.particles.prior import Person
+from isiw.models.particles.supra.predictions import SupraSample
+from isiw.models.particles.supra.prior import LATENTS, SupraLatents, SupraPrior
+from isiw.subjects.cohorts import cohort
+from isiw.subjects.profiles import OpposedProfile, PeakProfile
+from isiw.subjects.responses import RecruitmentResponse
+from isiw.subjects.subject import SimulatedSubject
+from isiw.window import Window
+from known import instance
+
+SPACE = DesignSpace(0, 120, reference="impact")
+GRID_MS = torch.tensor(SPACE.grid_ms, dtype=torch.float32)
+
+
+def latents_of(subject: SimulatedSubject) -> list[float]:
+    """What a particle must believe to be right about a simulated person."""
+    r, profile = instance(RecruitmentResponse, subject.response), instance(OpposedProfile, subject.profile)
+    places = [_place(peak) for peak in (profile.facilitated, profile.depressed)]
+    believed = {
+        "start_ms": places[0][0], "log_width_ms": places[0][1], "log_shift": math.log(r.boost_pct_rmt),
+        "depressed_start_ms": places[1][0], "depressed_log_width_ms": places[1][1],
+        "depressed_log_shift": math.log(r.boost_pct_rmt * profile.depth),
+        "log_floor_mv": math.log(r.floor.median_mv), "log_floor_sd": math.log(r.floor.log_sd),
+        "drift": 0.0, "startup": 0.0,
+        "log_ceiling": math.log(r.amplitude_mv / r.floor.median_mv), "log_slope": math.log(r.slope_per_pct),
+        "log_input_sd": math.log(r.slope_per_pct * r.sigma_x_pct_rmt), "log_sigma_y": math.log(r.sigma_y),
+        "rest": r.intensity_pct_rmt - r.x50_pct_rmt,
+    }  # fmt: skip
+    return [believed[name] for name in LATENTS]
+
+
+def _place(peak: PeakProfile) -> tuple[float, float]:
+    return peak.start_ms, math.log(peak.width_ms)
+
+
+def believed(subjects: list[SimulatedSubject]) -> Person:
+    values = torch.tensor([[latents_of(subject) for subject in subjects]])
+    there = torch.ones(values.shape[:2], dtype=torch.bool)
+    return SupraPrior().person(SupraLatents(values, there, there))
+
+
+@pytest.fixture(scope="module")
+def subjects() -> list[SimulatedSubject]:
+    return cohort("supra-threshold", 20, 5)
+
+
+def test_segments_and_profiles_are_those_of_the_simulated_person(subjects: list[SimulatedSubject]) -> None:
+    sample = SupraSample(believed(subjects), SPACE)
+    kinds = [(sample.window_masks(GRID_MS), "window"), (sample.depressed_masks(GRID_MS), "depressed")]
+    for masks, kind in kinds:
+        for subject, mask in zip(subjects, masks[0].numpy(), strict=True):
+            assert f1(Window.from_mask(SPACE.grid_ms, mask), getattr(subject, kind)(SPACE), SPACE) > 0.96
+    ours_mv = sample.expected_mep_mv(GRID_MS)[0].numpy()
+    np.testing.assert_allclose(ours_mv, [subject.expected_mep_mv(SPACE) for subject in subjects], rtol=0.05)
+    np.testing.assert_allclose(sample.baselines_mv()[0].numpy(), [s.baseline_mv for s in subjects], rtol=0.05)
+
+
+def test_nothing_is_depressed_where_tms_alone_gives_no_mep(subjects: list[SimulatedSubject]) -> None:
+    person = believed(subjects)
+    silent = person._replace(response=person.response._replace(rest=person.response.rest - 20.0))
+    assert not SupraSample(silent, SPACE).depressed_masks(GRID_MS).any()
+
+
+def test_predicted_outcomes_are_smallest_in_the_depression(subjects: list[SimulatedSubject]) -> None:
+    profile = instance(OpposedProfile, subjects[0].profile)
+    middles_ms = [peak.start_ms + 0.5 * peak.width_ms for peak in (profile.depressed, profile.facilitated)]
+    mass = SupraSample(believed(subjects[:1]), SPACE).outcome_mass(torch.tensor([*middles_ms, math.nan]))[0, 0]
+    assert mass.sum(-1).numpy() == pytest.approx(1.0, abs=1e-5)
+    low, high, rest = (mass * torch.arange(mass.shape[-1])).sum(-1).tolist()
+    assert low < rest < high
+
+
+def test_meps_drawn_by_the_likelihood_are_depressed(subjects: list[SimulatedSubject]) -> None:
+    profile = instance(OpposedProfile, subjects[0].profile)
+    inside_ms = profile.depressed.start_ms + 0.5 * profile.depressed.width_ms
+    person, generator = believed(subjects[:1]), torch.Generator().manual_seed(1)
+    isi_ms = torch.tensor([[inside_ms] * 400 + [math.nan] * 400])
+    level = levels(person, isi_ms)
+    assert level[0, 0, 0] == pytest.approx(-profile.depth, rel=1e-4)
+    assert (level[0, 0, 400:] == 0).all()
+    drawn = draw_log_mep(person.response, level, generator)[0, 0]
+    assert drawn[:400].median() < drawn[400:].median()
