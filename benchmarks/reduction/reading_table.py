@@ -24,7 +24,8 @@ Base: an observation is one recorded trial; MEPs outside the measured window as 
 raw); both edges, five values; the acquisition function, which the text does not define, is the profile's variance;
 with accelerometer the range ends 500 ms after the valve command. One factor at a time, then combinations. *Zero
 outside*: the text's record holds the windows alone (see the conventional sweep), so that elsewhere an MEP is zero.
-*Constant-CV noise*: people of `gaussian` instead of `kim11`.
+*TMS alone at 90 %*: the measured window is above that instead of TMS alone at 100 % RMT. *Constant-CV noise*:
+people of `gaussian` instead of `kim11-measured`; their TMS alone is the same at every intensity.
 
 Distance: the root mean square deviation from the text's figures over the four methods, with and without
 accelerometer: trials in units of 30 %, F1, correlation and convergence in units of 0.1; 1 is "within those units".
@@ -77,7 +78,7 @@ def summary(rows: pd.DataFrame, *, accelerometer: bool) -> pd.DataFrame:
     rows = rows[rows["accelerometer"] == accelerometer]
     word = WORDS[accelerometer]
     theirs = {"n": text.TRIALS[word], "F1": text.F1[word], "r": {} if accelerometer else text.CORRELATION}
-    columns = {"n": "trials", "F1": "f1, measured, baseline", "r": "correlation, measured"}
+    columns = {"n": "trials", "F1": "f1, measured", "r": "correlation, measured"}
     table = [
         {"reading": "dissertation"}
         | {f"{k} {NAMES[m]}": v.get(m, math.nan) for k, v in theirs.items() for m in text.METHODS}

@@ -83,7 +83,7 @@ PEOPLE: Final = "kim11-measured"
 
 _ALONE: Final[dict[str, dict[str, Any]]] = {
     "base": {},
-    "baseline: TMS alone at 90 %": {"baseline": BASELINES[1], "outside": "zero"},
+    "TMS alone at 90 %, zero outside": {"baseline": BASELINES[1], "outside": "zero"},
     "observation: mean of ten": {"observation": "mean"},
     "observation: live trial": {"observation": "live"},
     "outside the window: zero": {"outside": "zero"},
