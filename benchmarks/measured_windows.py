@@ -88,7 +88,7 @@ def verdicts(table: pd.DataFrame) -> list[str]:
         f"{_word(near[0])}: their mean within 10 % ({mean}).",
         f"{_word(near[1])}: their SD within 10 % ({sd}).",
         f"{_word(shown)}: peaks that a figure shows within their reading error.",
-        f"{_word(crossings <= 100 * MOST_CROSSINGS)}: TMS alone crosses a threshold in at most 2 % ({crossings:.2f} %).",
+        f"{_word(crossings <= 100 * MOST_CROSSINGS)}: TMS alone crosses a threshold in at most 2 % ({crossings:.2f}).",
     ]
 
 
