@@ -110,7 +110,7 @@ def _closest(found: Mapping[str, Found]) -> str:
 def share(ours: float, theirs: float) -> Found:
     """Whether a number is within 30 % of the text's."""
     off = ours / theirs - 1.0
-    return Found(abs(off) <= SHARE, f"{ours:.1f}", off, f"{ours - theirs:+.1f} ({100 * off:+.0f} %)")
+    return Found(abs(off) <= SHARE + 1e-9, f"{ours:.1f}", off, f"{ours - theirs:+.1f} ({100 * off:+.0f} %)")
 
 
 def number(ours: float, theirs: float, within: float = UNIT) -> Found:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import pandas as pd
@@ -55,7 +56,7 @@ def write(
     """
     out.parent.mkdir(parents=True, exist_ok=True)
     header = [f"- {key}: {value}" for key, value in facts.items()]
-    lines = ["# The dissertation's reduction of trials, reproduced", "", opening, "", *header, ""]
+    lines = ["# The dissertation's reduction of trials, reproduced", "", fill(opening, 120), "", *header, ""]
     for section in sections:
         lines += _markdown(section, out)
     out.with_suffix(".md").write_text("\n".join(lines).rstrip() + "\n")

@@ -199,7 +199,8 @@ def seven_claims(table: Table, pf_trials: float) -> list[Claim]:
         if method != "pf":
             curves = {cohort: _curve(table, cohort, method, "without") for cohort in (PEOPLE, "gaussian")}
             contexts = {_people(cohort): float(curve.loc[7, "trials"]) for cohort, curve in curves.items()}
-        what = f"{NAMES[method]} needs {mean} trials with seven initial observations."
+        initial = "" if method == "pf" else " with seven initial observations"
+        what = f"{NAMES[method]} needs {mean} trials{initial}."
         look: Callable[[float], Found] = lambda n, mean=mean: share(n, mean)  # noqa: E731 - one of several, in a loop
         claims.append(told(Statement(where, what, f"{mean}, SD {sd}", look), contexts))
     return claims

@@ -18,6 +18,7 @@ from benchmarks.reduction.size import Size
 
 TRIALS_UNIT = math.log(1.3)
 SCORE_UNIT = 0.1
+FLOORS = {"subtracted": "base", "as it is": "floor: raw"}
 
 PROSE = """\
 Base: an observation is one recorded trial; MEPs outside the measured window as recorded; the floor subtracted (PF:
@@ -98,6 +99,18 @@ def distances(rows: pd.DataFrame) -> pd.DataFrame:
     )
 
 
+def floors(rows: pd.DataFrame) -> pd.DataFrame:
+    """NR with the floor subtracted and with MEPs as they are, with and without accelerometer, side by side."""
+    columns = {"trials": "trials", "F1": "f1, measured", "F1: true": "f1, true", "r": "correlation, measured"}
+    table = []
+    for (flag, word), (kind, name) in itertools.product(WORDS.items(), FLOORS.items()):
+        group = rows_of(name, rows)
+        means = group[(group["method"] == "nr") & (group["accelerometer"] == flag)][list(columns.values())].mean()
+        ours = {label: means[column] for label, column in columns.items()}
+        table.append({"accelerometer": word, "floor": kind} | ours | {"text: F1": text.F1[word]["nr"]})
+    return pd.DataFrame(table)
+
+
 def section(rows: pd.DataFrame) -> Section:
     """This part of the report."""
     far = distances(rows)
@@ -108,6 +121,7 @@ def section(rows: pd.DataFrame) -> Section:
         Table("Distance from the text's figures.", far),
         Table("Without accelerometer.", summary(rows, accelerometer=False)),
         Table("With accelerometer.", summary(rows, accelerometer=True)),
+        Table("NR with and without the floor subtracted.", floors(rows)),
     ]
     best = (
         f"The reading that explains the figures best: **{first['reading']}**, judged by *{truth}*: distance "

@@ -51,13 +51,13 @@ FULL: Final = Size(
 )
 QUICK: Final = Size(
     kim=11,
-    kim_default=4,
-    people=5,
-    people_default=3,
-    headline=5,
+    kim_default=2,
+    people=4,
+    people_default=1,
+    headline=4,
     sweep=3,
     readings=3,
-    horizon=15,
+    horizon=12,
     intervals=1,
     online=1,
 )
