@@ -34,7 +34,8 @@ NOTE = """\
 Widths in ms. A window is above TMS alone at 100 % RMT, in the text's words (4.2.1). Above TMS alone at 90 %, which is
 silent, a sweep shows far wider ones, since every other mean outside is above that by chance. Three peaks are read from
 the ends of the text's axes, the others are 2.5 thresholds. The true window is by 0.135 of the largest excess. Where no
-mean of three ISIs is three standard errors above TMS alone at 100 % RMT, a sweep shows no window; widths leave it out."""
+mean of three ISIs is three standard errors above TMS alone at 100 % RMT, a sweep shows no window; widths are means of
+the others."""
 
 
 def widths_ms(sweeps: list[RecordedSweep], baseline: str) -> FloatArray:
@@ -108,7 +109,7 @@ def main(
     print("# Measured windows of `kim11-measured`\n")
     print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.measured_windows', *sys.argv[1:]])}`")
     print(f"- isiw {isiw.__version__}, numpy {np.__version__}; {sweeps} sweeps of each person, seed {seed}\n")
-    print("\n".join(f"- {sentence}" for sentence in verdicts(table)), "\n")
+    print("\n".join(f"- {sentence}" for sentence in verdicts(table)) + "\n")
     print(table.round(2).to_markdown(index=False))
     print(f"\n{NOTE}")
 

@@ -98,14 +98,18 @@ def opening(claims: Sequence[Claim], main: pd.DataFrame, zero: pd.DataFrame) -> 
     ranked = sorted(f1, key=lambda method: -f1[method])
     place = ("first", "second", "third", "last")[ranked.index("pf")]
     theirs = {name: {m: values["without"][m] for m in text.METHODS} for name, values in _THEIRS.items()}
-    return (
-        f"On simulated people whose measured windows are the text's (`{PEOPLE}`), {counts['reproduced']} of the text's "
-        f"{len(claims)} claims come out as printed (trials within 30 %, other numbers within 0.1), {counts['under …']} "
-        f"under another reading of the text, and {counts['not …']} do not. "
-        f"Without accelerometer, F1: {in_words(f1)} (text: {in_words(theirs['F1'])}); the text has PF last, and here it "
-        f"is {place}. Trials: {in_words(trials, 0)} (text: {in_words(theirs['trials'], 0)}). Runs that converge: {in_words(converged, 0)} % (text: "
-        f"{in_words({m: 100 * v for m, v in theirs['converged'].items()}, 0)} %). {before.in_words(zero)}"
+    shares = {method: 100 * value for method, value in theirs["converged"].items()}
+    sentences = (
+        f"On simulated people whose measured windows are the text's (`{PEOPLE}`), {counts['reproduced']} of the text's",
+        f"{len(claims)} claims come out as printed (trials within 30 %, other numbers within 0.1),",
+        f"{counts['under …']} under another reading or on other people, and {counts['not …']} do not.",
+        f"Without accelerometer, F1: {in_words(f1)} (text: {in_words(theirs['F1'])});",
+        f"the text has PF last, and here it is {place}.",
+        f"Trials: {in_words(trials, 0)} (text: {in_words(theirs['trials'], 0)}).",
+        f"Runs that converge: {in_words(converged, 0)} % (text: {in_words(shares, 0)} %).",
+        before.in_words(zero),
     )
+    return " ".join(sentences)
 
 
 _THEIRS = {"F1": text.F1, "trials": text.TRIALS, "converged": text.CONVERGED}
