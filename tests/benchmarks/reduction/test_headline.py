@@ -57,8 +57,9 @@ def test_curves_are_read_both_ways() -> None:
 def test_people_with_the_texts_windows_are_judged_by_the_measured_window_and_others_by_the_true_one() -> None:
     scores = {"f1, measured": 0.3, "f1_measured_by_trial": [0.3], "f1 before, measured": 0.1}
     true = {"f1, true": 0.8, "f1_by_trial": [0.8], "f1 before, true": 0.6}
-    rows = pd.DataFrame([{"cohort": cohort, **scores, **true} for cohort in ("kim11-measured", "gaussian")])
-    found = judged(rows)
+    sessions = [{"cohort": cohort, **scores, **true} for cohort in ("kim11-measured", "gaussian")]
+    without_a_window = sessions[0] | {"f1, measured": math.nan, "f1_measured_by_trial": [math.nan]}
+    found = judged(pd.DataFrame([*sessions, without_a_window]))
     assert found["f1"].tolist() == [0.3, 0.8]
     assert found["f1_by_trial"].tolist() == [[0.3], [0.8]]
     assert found["f1 before"].tolist() == [0.1, 0.6]
