@@ -1,8 +1,9 @@
-"""The results table and picture of the README, from the results in this folder.
+"""The results table and picture of the README, and its paragraph on the reproduction, from the results beside this.
 
     python benchmarks/readme_results.py
 
-prints the table, to be put between the two `results` marks of the README, and draws `docs/images/results.png`.
+prints the table and the paragraph, to be put between the `results` and the `reproduction` marks of the README, and
+draws `docs/images/results.png`.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from textwrap import fill
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -53,6 +55,11 @@ def table() -> str:
     return "\n".join(lines)
 
 
+def reproduction() -> str:
+    """What the reproduction of the dissertation says first."""
+    return fill(json.loads((RESULTS / "trial_reduction.json").read_text(encoding="utf-8"))["opening"], 120)
+
+
 def picture() -> Figure:
     """Mean F1 by trial, a panel a cohort."""
     figure = Figure(figsize=(9, 3.6), layout="constrained")
@@ -77,5 +84,5 @@ def _short(value: float) -> str:
 
 
 if __name__ == "__main__":
-    print(table())
+    print(table(), reproduction(), sep="\n\n")
     picture().savefig(ROOT / "docs" / "images" / "results.png", dpi=110)

@@ -33,7 +33,6 @@ from benchmarks.reduction import (
     gaussians,
     headline,
     initial,
-    intervals,
     online,
     particles,
     pf_readings,
@@ -45,8 +44,8 @@ from benchmarks.reduction.parallel import Workers, frame, in_parallel, run_sessi
 from benchmarks.reduction.size import FULL, QUICK, Size
 
 Rows = dict[ModuleType, pd.DataFrame]
-Measured = tuple[dict[str, pd.DataFrame], list[Any], list[Any]]
-"""The sessions' rows by part, interval production, and the sessions on waveforms."""
+Measured = tuple[dict[str, pd.DataFrame], list[Any]]
+"""The sessions' rows by part, and the sessions on waveforms."""
 
 RESULTS = Path("benchmarks/results/trial_reduction")
 PARTS = (comparison, reading_table, pf_readings, headline, initial, particles, gaussians)
@@ -58,14 +57,13 @@ def measured(size: Size, seed: int, workers: Workers) -> Measured:
     plans = {part: part.sessions(size, seed) for part in PARTS}
     outcomes = run_sessions((session for plan in plans.values() for session in plan), workers)
     rows = {part.__name__: frame(plan, outcomes) for part, plan in plans.items()}
-    lights = in_parallel(intervals.produce, intervals.runs(size.intervals, seed), workers, "interval production")
     waveforms = in_parallel(online.examine, online.plan(size.online, seed), workers, "online")
-    return rows, lights, waveforms
+    return rows, waveforms
 
 
 def report(found: Measured, facts: dict[str, Any], out: Path) -> None:
     """Tell it."""
-    named, lights, waveforms = found
+    named, waveforms = found
     rows = {part: named[part.__name__] for part in PARTS}
     claims = verdicts.all_claims(rows, waveforms)
     zero = before.table(rows[headline], facts["seed"])
@@ -82,13 +80,12 @@ def report(found: Measured, facts: dict[str, Any], out: Path) -> None:
         particles.section(rows[particles]),
         gaussians.section(rows[gaussians], rows[comparison]),
         online.section(waveforms),
-        intervals.section(lights),
     ]
     opening = verdicts.opening(claims, rows[comparison], zero)
     write(sections, facts, out, opening, [claim.record() for claim in claims])
 
 
-def facts_of(size: Size, seed: int, processes: int, took_s: float) -> dict[str, object]:
+def facts_of(size: Size, seed: int, processes: int, took: str) -> dict[str, object]:
     """What a run was; telling it again does not change it."""
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in VERSIONS)
     return {
@@ -96,7 +93,7 @@ def facts_of(size: Size, seed: int, processes: int, took_s: float) -> dict[str, 
         "versions": f"python {platform.python_version()}, {versions}",
         "seed": seed,
         "sessions": ", ".join(f"{name} {count}" for name, count in vars(size).items()),
-        "took": f"{took_s / 60:.1f} minutes with {processes} processes",
+        "took": f"{took} with {processes} process{'' if processes == 1 else 'es'}",
     }
 
 
@@ -127,7 +124,8 @@ def run(size: Size, seed: int, processes: int, kept: Path, *, go_on: bool) -> No
     if not go_on:
         shutil.rmtree(folder, ignore_errors=True)
     found = measured(size, seed, Workers(processes, folder))
-    joblib.dump((found, facts_of(size, seed, processes, time.monotonic() - began_s)), kept)
+    took = f"{(time.monotonic() - began_s) / 60:.1f} minutes{' after an interruption' if go_on else ''}"
+    joblib.dump((found, facts_of(size, seed, processes, took)), kept)
     shutil.rmtree(folder)
 
 

@@ -178,10 +178,10 @@ def section(rows: pd.DataFrame) -> Section:
     ]
     prose = f"""\
 {rows["person"].nunique()} people of each cohort, 500 ms from the valve command. `{PEOPLE}`: recorded trials, F1 by the
-measured window, as in the text, of sweeps that show one; GPR's F1 is {gpr:.2f} there (text .81). The others: live trials, F1 by the true
-window. The default looks for the true window, by 0.135, as NR, SVMR and GPR do. At equal trials: the default's F1
-after as many trials as each session of the other method took (at most {curve(rows, "default").shape[1]}), paired by
-person. At equal F1: from which trial on the default's mean F1 stays at or above the other method's mean at its stop. A
-trial is one pair of stimuli."""
+measured window, as in the text, of sweeps that show one; GPR's F1 is {gpr:.2f} there (text .81). The others: live
+trials, F1 by the true window. The default looks for the true window, by 0.135, as NR, SVMR and GPR do. At equal
+trials: the default's F1 after as many trials as each session of the other method took (at most
+{curve(rows, "default").shape[1]}), paired by person. At equal F1: from which trial on the default's mean F1 stays at or
+above the other method's mean at its stop. A trial is one pair of stimuli."""
     said = [sentence for cohort, noise in NOISE.items() for sentence in verdicts(tables[cohort], noise)]
     return Section("The headline: equal trials, equal F1", prose, shown, ("headline", figure(rows)), said)

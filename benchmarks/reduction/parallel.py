@@ -55,7 +55,7 @@ def in_parallel(
 
 def run_sessions(sessions: Iterable[Session], workers: Workers) -> Outcomes:
     """Run each different session once; those of one person share the recorded sweep."""
-    unique = sorted(set(sessions), key=_of_person)
+    unique = sorted(dict.fromkeys(sessions), key=_of_person)  # in one order, by which results are kept
     people = [list(group) for _, group in groupby(unique, key=_of_person)]
     results = in_parallel(_run_person, people, workers, "people's sessions")
     return {

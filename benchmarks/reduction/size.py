@@ -21,7 +21,6 @@ class Size:
         sweep: sessions for each number of initial observations or particles.
         readings: sessions for each reading.
         horizon: trials of the default's learning curve in the headline.
-        intervals: runs of interval production for each light.
         online: sessions on waveforms with each of two people.
     """
 
@@ -33,7 +32,6 @@ class Size:
     sweep: int
     readings: int
     horizon: int
-    intervals: int
     online: int
 
 
@@ -46,7 +44,6 @@ FULL: Final = Size(
     sweep=11,
     readings=11,
     horizon=40,
-    intervals=10,
     online=3,
 )
 QUICK: Final = Size(
@@ -58,6 +55,5 @@ QUICK: Final = Size(
     sweep=3,
     readings=3,
     horizon=12,
-    intervals=1,
     online=1,
 )
