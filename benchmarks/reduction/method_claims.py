@@ -86,7 +86,7 @@ def orders() -> Iterator[Statement[Table]]:
             yield Statement(
                 where,
                 f"The methods' order by {what}, {word} accelerometer.",
-                in_words(theirs),
+                in_words({method: theirs[method] for method in text.METHODS}),
                 lambda t, c=column, theirs=theirs, w=word: ordered(t, c, theirs, w),
             )
     yield Statement(
