@@ -18,8 +18,8 @@ from scipy.stats import gamma, norm
 
 from isiw.design import DesignSpace
 from isiw.studies import SimulatedSession, play
-from isiw.subjects.cohorts import WIDTHS_KIM_MS
 from isiw.subjects.labs import LABS, lab
+from isiw.subjects.measured import MEASURED_KIM, WIDTHS_KIM_MS, MeasuredPerson
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import OUTLIERS_MV, SimulatedSubject
@@ -70,6 +70,15 @@ _USUAL: Final = _any_with_any(_STARTS, _log_normal(100.0, 0.42, 40.0, 230.0))
 _LATE: Final = _any_with_any(_uniform(80, 200, 3), _log_normal(100.0, 0.42, 40.0, 230.0))
 _VERY_WIDE: Final = _any_with_any(_uniform(0, 60, 3), _log_normal(200.0, 0.25, 120.0, 320.0))
 
+
+def _profiles_of(person: MeasuredPerson) -> Spans:
+    """Profiles of one of `kim11-measured`, whose measured window starts anywhere in its law."""
+    boost = person.response().boost_pct_rmt
+    profiles = [person.profile(start_ms, boost) for start_ms in _uniform(50, 100, 2.5).tolist()]
+    starts_ms, widths_ms = (np.array([getattr(p, name) for p in profiles]) for name in ("start_ms", "width_ms"))
+    return Spans(starts_ms, *_even(widths_ms))
+
+
 _QUANTILES: Final = (np.arange(60) + 0.5) / 60
 _SHIFTED: Final = _any_with_any(
     np.sort((_uniform(5, 110, 7)[:, None] + norm.ppf(_QUANTILES[1::3], scale=12.0)).ravel()),
@@ -83,6 +92,7 @@ SPANS: Final[Mapping[str, Spans]] = {
     "narrow": _any_with_any(_STARTS, _even(_uniform(35, 50, 1))),
     "wide": _any_with_any(_STARTS, _even(_uniform(180, 230, 2))),
     "kim11": _any_with_any(_uniform(20, 100, 2.5), _even(np.array(WIDTHS_KIM_MS, dtype=float))),
+    "kim11-measured": _either(*((1 / len(MEASURED_KIM), _profiles_of(person)) for person in MEASURED_KIM)),
     **dict.fromkeys(("other-rig", "steep", "flat", "weak", "rmt-off", "hand"), _USUAL),
     "late": _LATE,
     "very-wide": _VERY_WIDE,

@@ -1,8 +1,9 @@
-"""The results table and picture of the README, from the results in this folder.
+"""The results table and picture of the README, and its paragraph on the reproduction, from the results beside this.
 
     python benchmarks/readme_results.py
 
-prints the table, to be put between the two `results` marks of the README, and draws `docs/images/results.svg`.
+prints the table and the paragraph, to be put between the `results` and the `reproduction` marks of the README, and
+draws `docs/images/results.svg`.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 import pandas as pd
@@ -61,6 +63,11 @@ def table() -> str:
         for method, name in METHODS.items():
             lines.append(f"| | {name} |" + "".join(f" {_short(curves[method][mark])} |" for mark in MARKS))
     return "\n".join(lines)
+
+
+def reproduction() -> str:
+    """What the reproduction of the dissertation says first."""
+    return fill(json.loads((RESULTS / "trial_reduction.json").read_text(encoding="utf-8"))["opening"], 120)
 
 
 def curves_of(cohort: str) -> pd.DataFrame:
@@ -120,5 +127,5 @@ def _short(value: float) -> str:
 
 
 if __name__ == "__main__":
-    print(table())
+    print(table(), reproduction(), sep="\n\n")
     save_figure(picture(), ROOT / "docs" / "images" / "results.svg", overwrite=True)

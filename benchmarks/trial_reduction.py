@@ -13,6 +13,7 @@ import importlib.metadata
 import os
 import platform
 import shlex
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -26,70 +27,65 @@ import pandas as pd
 import typer
 
 from benchmarks.reduction import (
+    before,
     comparison,
     conventional,
     gaussians,
     headline,
     initial,
-    intervals,
     online,
-    orderings,
     particles,
+    pf_readings,
     reading_table,
+    verdicts,
 )
-from benchmarks.reduction.document import Section, write
-from benchmarks.reduction.parallel import frame, in_parallel, run_sessions
+from benchmarks.reduction.document import write
+from benchmarks.reduction.parallel import Workers, frame, in_parallel, run_sessions
 from benchmarks.reduction.size import FULL, QUICK, Size
 
 Rows = dict[ModuleType, pd.DataFrame]
-Measured = tuple[dict[str, pd.DataFrame], list[Any], list[Any]]
-"""The sessions' rows by part, interval production, and the sessions on waveforms."""
+Measured = tuple[dict[str, pd.DataFrame], list[Any]]
+"""The sessions' rows by part, and the sessions on waveforms."""
 
 RESULTS = Path("benchmarks/results/trial_reduction")
-PARTS = (comparison, reading_table, headline, initial, particles, gaussians)
+PARTS = (comparison, reading_table, pf_readings, headline, initial, particles, gaussians)
 VERSIONS = ("isiw", "numpy", "scipy", "torch", "scikit-learn", "statsmodels")
 
 
-def measured(size: Size, seed: int, workers: int) -> Measured:
+def measured(size: Size, seed: int, workers: Workers) -> Measured:
     """Run everything."""
     plans = {part: part.sessions(size, seed) for part in PARTS}
     outcomes = run_sessions((session for plan in plans.values() for session in plan), workers)
     rows = {part.__name__: frame(plan, outcomes) for part, plan in plans.items()}
-    lights = in_parallel(intervals.produce, intervals.runs(size.intervals, seed), workers, "interval production")
     waveforms = in_parallel(online.examine, online.plan(size.online, seed), workers, "online")
-    return rows, lights, waveforms
+    return rows, waveforms
 
 
-def sections(found: Measured) -> list[Section]:
+def report(found: Measured, facts: dict[str, Any], out: Path) -> None:
     """Tell it."""
-    named, lights, waveforms = found
+    named, waveforms = found
     rows = {part: named[part.__name__] for part in PARTS}
-    return [
+    claims = verdicts.all_claims(rows, waveforms)
+    zero = before.table(rows[headline], facts["seed"])
+    sections = [
+        verdicts.section(claims),
+        before.section(zero),
         headline.section(rows[headline]),
         comparison.section(rows[comparison]),
-        orderings.section(compared(rows), reading_table.summary(rows[reading_table], accelerometer=False)),
         reading_table.section(rows[reading_table]),
+        pf_readings.section(rows[pf_readings]),
         conventional.section_sweeps(rows[comparison]),
         conventional.section_burden(rows[comparison]),
         initial.section(rows[initial]),
         particles.section(rows[particles]),
         gaussians.section(rows[gaussians], rows[comparison]),
         online.section(waveforms),
-        intervals.section(lights),
     ]
+    opening = verdicts.opening(claims, rows[comparison], zero)
+    write(sections, facts, out, opening, [claim.record() for claim in claims])
 
 
-def compared(rows: Rows) -> dict[str, pd.DataFrame]:
-    """The comparisons in which orderings are judged, by name."""
-    main, read = rows[comparison], rows[reading_table]
-    best = reading_table.distances(read).loc[0, "reading"]
-    names = dict.fromkeys(("people: constant-CV noise", "observation: mean of ten", best))
-    cohorts = {f"{name}, base": main[main["cohort"] == name] for name in ("kim11", "recruitment")}
-    readings = {str(name): reading_table.rows_of(name, read) for name in names}
-    return {name: comparison.summary(group) for name, group in (cohorts | readings).items()}
-
-
-def facts_of(size: Size, seed: int, workers: int, took_s: float) -> dict[str, object]:
+def facts_of(size: Size, seed: int, processes: int, took: str) -> dict[str, object]:
     """What a run was; telling it again does not change it."""
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in VERSIONS)
     return {
@@ -97,31 +93,40 @@ def facts_of(size: Size, seed: int, workers: int, took_s: float) -> dict[str, ob
         "versions": f"python {platform.python_version()}, {versions}",
         "seed": seed,
         "sessions": ", ".join(f"{name} {count}" for name, count in vars(size).items()),
-        "took": f"{took_s / 60:.1f} minutes with {workers} processes",
+        "took": f"{took} with {processes} process{'' if processes == 1 else 'es'}",
     }
 
 
 def main(
     seed: Annotated[int, typer.Option(help="Seed of the cohorts.")] = 10_000,
-    workers: Annotated[int, typer.Option(help="Processes.")] = 2,
+    processes: Annotated[int, typer.Option(help="Processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = RESULTS,
     *,
     quick: Annotated[bool, typer.Option(help="Few people: under three minutes on two cores.")] = False,
+    go_on: Annotated[bool, typer.Option(help="Go on with a run that was interrupted, with the same code.")] = False,
     again: Annotated[bool, typer.Option(help="Tell once more what the last run measured.")] = False,
 ) -> None:
     """Reproduce the dissertation's reduction of trials."""
     kept = out.with_suffix(".parts")
     if not again:
-        began_s = time.monotonic()
-        size = QUICK if quick else FULL
-        found = measured(size, seed, workers)
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        joblib.dump((found, facts_of(size, seed, workers, time.monotonic() - began_s)), kept)
+        run(QUICK if quick else FULL, seed, processes, kept, go_on=go_on)
     if not kept.exists():
         raise typer.BadParameter(f"{kept} is not there: run without --again first")
     found, facts = joblib.load(kept)
-    write(sections(found), facts, out)
+    report(found, facts, out)
     print(out.with_suffix(".md").read_text())
+
+
+def run(size: Size, seed: int, processes: int, kept: Path, *, go_on: bool) -> None:
+    """Measure, and keep what was measured in a file; results so far are in a folder beside it."""
+    began_s = time.monotonic()
+    folder = kept.with_suffix(".done.parts")
+    if not go_on:
+        shutil.rmtree(folder, ignore_errors=True)
+    found = measured(size, seed, Workers(processes, folder))
+    took = f"{(time.monotonic() - began_s) / 60:.1f} minutes{' after an interruption' if go_on else ''}"
+    joblib.dump((found, facts_of(size, seed, processes, took)), kept)
+    shutil.rmtree(folder)
 
 
 if __name__ == "__main__":

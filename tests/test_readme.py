@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benchmarks.readme_results import table
+from benchmarks.readme_results import reproduction, table
 from typer.main import get_command
 
 import isiw
@@ -61,6 +61,11 @@ def test_the_first_screen_says_what_and_how() -> None:
 def test_the_results_are_those_of_the_files() -> None:
     (shown,) = re.findall(r"<!-- results: begin.*?-->\n(.*?)\n<!-- results: end -->", TEXT, flags=re.DOTALL)
     assert shown == table()
+
+
+def test_the_readme_says_of_the_reproduction_what_its_report_says_first() -> None:
+    (shown,) = re.findall(r"<!-- reproduction: begin.*?-->\n(.*?)\n<!-- reproduction: end -->", TEXT, flags=re.DOTALL)
+    assert shown == reproduction()
 
 
 def test_the_configuration_is_valid(tmp_path: Path) -> None:

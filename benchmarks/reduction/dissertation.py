@@ -48,9 +48,3 @@ TWO_GAUSSIANS: Final = (0.57, 0.09, 0.70)
 
 ONLINE: Final = {"correlation": (0.83, 0.85), "stimuli": (23, 15), "conventional": (264, 408)}
 """Table 5.3, two subjects."""
-
-INTERVALS: Final = {
-    1.0: {"human": (323.1, 70.7, 144, 1343), "BO": (302.0, 30.1, 199, 399)},
-    0.5: {"human": (330.6, 76.0, 119, 825), "BO": (298.1, 30.4, 194, 410)},
-}
-"""Tables 6.3 and 6.4, by the light's largest probability: mean, SD, least and largest produced interval [ms]."""

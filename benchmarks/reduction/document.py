@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import fill
 from typing import Any, Final
 
 import pandas as pd
@@ -43,21 +44,30 @@ class Section:
     conclusions: Sequence[str] = field(default=())
 
 
-def write(sections: Sequence[Section], facts: Mapping[str, Any], out: Path) -> None:
+def write(
+    sections: Sequence[Section], facts: Mapping[str, Any], out: Path, opening: str = "", claims: Sequence[Any] = ()
+) -> None:
     """Write `out`.md, `out`.json and the figures `out`_NAME.png.
 
     Args:
         sections: the parts.
         facts: command, versions and seeds, for the top.
         out: path without suffix.
+        opening: the first paragraph.
+        claims: what the text claims, with verdicts, as records of strings.
     """
     out.parent.mkdir(parents=True, exist_ok=True)
     header = [f"- {key}: {value}" for key, value in facts.items()]
-    lines = ["# The dissertation's reduction of trials, reproduced", "", *header, ""]
+    lines = ["# The dissertation's reduction of trials, reproduced", "", fill(opening, 120), "", *header, ""]
     for section in sections:
         lines += _markdown(section, out)
     out.with_suffix(".md").write_text("\n".join(lines).rstrip() + "\n")
-    record = {"facts": dict(facts), "sections": [_record(section) for section in sections]}
+    record = {
+        "facts": dict(facts),
+        "opening": opening,
+        "claims": list(claims),
+        "sections": [_record(section) for section in sections],
+    }
     out.with_suffix(".json").write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
 
 

@@ -21,16 +21,17 @@ from isiw.plots.style import explain
 from isiw.subjects.cohorts import cohort
 from isiw.types import FloatArray
 
+COHORT: Final = "kim11-measured"
 PEOPLE: Final = (4, 7)
-"""Two of `kim11`, with windows (110 and 145 ms) such as Table 5.3's 264 and 408 trials span (105 and 165 ms)."""
+"""Two of them, with windows (110 and 145 ms) such as Table 5.3's 264 and 408 trials span (105 and 165 ms)."""
 
 SETTINGS: Final[dict[str, dict[str, Any]]] = {"nr": {"initial": 7}, "default": {}, "incremental": {}}
 """The text's regression had seven initial observations."""
 
 PROSE = """\
 The simulated tapping robot in open loop, with waveforms, ISIs from 0 to 320 ms from the impact; two people of
-`kim11`. NR begins with seven ISIs, as online in the text. Conventional: the sweep from the impact, on waveforms as
-well, until the window was passed. Means over sessions; the figure has the first."""
+`kim11-measured`. NR begins with seven ISIs, as online in the text. Conventional: the sweep from the impact, on
+waveforms as well, until the window was passed. Means over sessions; the figure has the first."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ def plan(sessions: int, seed: int) -> list[Online]:
 def examine(online: Online) -> dict[str, Any]:
     """One session on waveforms until the strategy stops: its stimuli, window and profile, and the true ones."""
     torch.set_num_threads(1)
-    subject = cohort("kim11", online.person + 1, online.seed)[online.person]
+    subject = cohort(COHORT, online.person + 1, online.seed)[online.person]
     seed = online.seed + 11 * online.session + online.person
     strategy = isiw.make_strategy(online.method, IMPACT_SPACE, seed, **SETTINGS[online.method])
     # The robot of the waveform loop takes what it needs from a pair of sessions.

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from itertools import groupby
+from pathlib import Path
 from typing import Any, TypeVar
 
 import pandas as pd
-from joblib import Parallel, delayed
+from joblib import Memory, Parallel, delayed
 from rich.console import Console
 from rich.progress import track
 
 from benchmarks.reduction.sessions import Session, run
 
-__all__ = ["Outcomes", "frame", "in_parallel", "run_sessions"]
+__all__ = ["Outcomes", "Workers", "frame", "in_parallel", "run_sessions"]
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
@@ -22,24 +24,38 @@ Outcomes = dict[Session, dict[str, Any]]
 """What sessions came to; see `sessions.run`."""
 
 
+@dataclass(frozen=True)
+class Workers:
+    """Who does the work.
+
+    Args:
+        processes: how many.
+        kept: folder where results are kept, from which a run that was interrupted goes on.
+    """
+
+    processes: int
+    kept: Path
+
+
 def in_parallel(
-    function: Callable[[_Item], _Result], items: Sequence[_Item], workers: int, label: str
+    function: Callable[[_Item], _Result], items: Sequence[_Item], workers: Workers, label: str
 ) -> list[_Result]:
     """Results in the order of the items.
 
     Args:
         function: what to do with each; importable.
         items: the pieces of work.
-        workers: how many processes.
+        workers: who does it.
         label: of the progress bar.
     """
-    done = Parallel(n_jobs=workers, return_as="generator")(delayed(function)(item) for item in items)
+    remembered = Memory(workers.kept, verbose=0).cache(function)
+    done = Parallel(n_jobs=workers.processes, return_as="generator")(delayed(remembered)(item) for item in items)
     return list(track(done, label, len(items), console=Console(stderr=True)))
 
 
-def run_sessions(sessions: Iterable[Session], workers: int) -> Outcomes:
+def run_sessions(sessions: Iterable[Session], workers: Workers) -> Outcomes:
     """Run each different session once; those of one person share the recorded sweep."""
-    unique = sorted(set(sessions), key=_of_person)
+    unique = sorted(dict.fromkeys(sessions), key=_of_person)  # in one order, by which results are kept
     people = [list(group) for _, group in groupby(unique, key=_of_person)]
     results = in_parallel(_run_person, people, workers, "people's sessions")
     return {

@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 from benchmarks.reduction.dissertation import METHODS
+from benchmarks.reduction.recorded import BASELINES
 from isiw.errors import InvalidValueError
 from isiw.models.shared.floor import FloorKind
 
-TRUTHS: Final = ("measured, baseline", "measured, .135", "true")
-"""What a window is judged by: the run of measured means above the baseline (the text's words, 4.2.1), those with at
-least 0.135 of the largest excess, or the true window of `cohorts`."""
+TRUTHS: Final = (*(f"measured, {baseline}" for baseline in BASELINES), "measured, .135", "true")
+"""What a window is judged by: the run of measured means above the MEP of TMS alone at 100 % RMT (the text's words,
+4.2.1) or at the 90 % of the pairs, those with at least 0.135 of the largest excess, or the true window of `cohorts`."""
 
 
 @dataclass(frozen=True)
@@ -28,9 +29,10 @@ class Reading:
         last: of how many values.
         acquisition: what chooses the next ISI of a regression.
         range_end: whether the range with accelerometer ends 500 ms after the "valve" command, or after the "hit".
+        baseline: which TMS alone the measured window is above, one of `BASELINES`.
 
     Raises:
-        InvalidValueError: another word for the observation, the outside or the range's end.
+        InvalidValueError: another word for the observation, the outside, the range's end or the baseline.
     """
 
     observation: Literal["trial", "mean", "live"] = "trial"
@@ -40,18 +42,25 @@ class Reading:
     last: int = 5
     acquisition: str = "variance"
     range_end: Literal["valve", "hit"] = "valve"
+    baseline: str = BASELINES[0]
 
     def __post_init__(self) -> None:
         known = {
             "observation": ("trial", "mean", "live"),
             "outside": ("recorded", "zero"),
             "range_end": ("valve", "hit"),
+            "baseline": BASELINES,
         }
         for name, words in known.items():
             if getattr(self, name) not in words:
                 raise InvalidValueError(f"{name} is unknown", got=getattr(self, name), expected=" or ".join(words))
         if self.observation == "live" and self.outside == "zero":
             raise InvalidValueError("only a recorded sweep has an outside", got="live", expected="trial or mean")
+
+    @property
+    def truth(self) -> str:
+        """The measured window of this reading, one of `TRUTHS`."""
+        return f"measured, {self.baseline}"
 
     def settings(self, method: str) -> dict[str, Any]:
         """The settings of a named strategy under this reading; none for isiw's own strategies."""
@@ -69,33 +78,44 @@ BASE: Final = Reading()
 LIVE: Final = Reading(observation="live")
 """No recorded data set: each trial is a new one of the person."""
 
-READINGS: Final[dict[str, tuple[Reading, str]]] = {
-    "base": (BASE, "kim11"),
-    "observation: mean of ten": (replace(BASE, observation="mean"), "kim11"),
-    "observation: live trial": (LIVE, "kim11"),
-    "outside the window: zero": (replace(BASE, outside="zero"), "kim11"),
-    "floor: zeroed": (replace(BASE, floor="zeroed"), "kim11"),
-    "floor: raw": (replace(BASE, floor="raw"), "kim11"),
-    "edges: either": (replace(BASE, edges="either"), "kim11"),
-    "last: six values": (replace(BASE, last=6), "kim11"),
-    "pseudo-code: either edge, six": (replace(BASE, edges="either", last=6), "kim11"),
-    "acquisition: edge variance": (replace(BASE, acquisition="edge-variance"), "kim11"),
-    "acquisition: straddle": (replace(BASE, acquisition="straddle"), "kim11"),
-    "acquisition: upper bound": (replace(BASE, acquisition="ucb"), "kim11"),
-    "acquisition: expected improvement": (replace(BASE, acquisition="log-ei"), "kim11"),
-    "range end: hit + 500": (replace(BASE, range_end="hit"), "kim11"),
-    "people: constant-CV noise": (BASE, "gaussian"),
-    "mean of ten, zero outside": (replace(BASE, observation="mean", outside="zero"), "kim11"),
-    "mean of ten, six": (replace(BASE, observation="mean", last=6), "kim11"),
-    "mean of ten, constant-CV noise": (replace(BASE, observation="mean"), "gaussian"),
-    "zero outside, edge variance": (replace(BASE, outside="zero", acquisition="edge-variance"), "kim11"),
-    "zero outside, constant-CV noise": (replace(BASE, outside="zero"), "gaussian"),
-    "raw, mean of ten": (replace(BASE, floor="raw", observation="mean"), "kim11"),
-    "raw, constant-CV noise": (replace(BASE, floor="raw"), "gaussian"),
-    "zeroed, constant-CV noise": (replace(BASE, floor="zeroed"), "gaussian"),
-    "six, constant-CV noise": (replace(BASE, last=6), "gaussian"),
-    "either edge, constant-CV noise": (replace(BASE, edges="either"), "gaussian"),
-    "edge variance, constant-CV noise": (replace(BASE, acquisition="edge-variance"), "gaussian"),
+PEOPLE: Final = "kim11-measured"
+"""On whom readings are tried; on constant-CV noise: `gaussian`."""
+
+_ALONE: Final[dict[str, dict[str, Any]]] = {
+    "base": {},
+    "TMS alone at 90 %, zero outside": {"baseline": BASELINES[1], "outside": "zero"},
+    "observation: mean of ten": {"observation": "mean"},
+    "observation: live trial": {"observation": "live"},
+    "outside the window: zero": {"outside": "zero"},
+    "floor: zeroed": {"floor": "zeroed"},
+    "floor: raw": {"floor": "raw"},
+    "edges: either": {"edges": "either"},
+    "last: six values": {"last": 6},
+    "pseudo-code: either edge, six": {"edges": "either", "last": 6},
+    "acquisition: edge variance": {"acquisition": "edge-variance"},
+    "acquisition: straddle": {"acquisition": "straddle"},
+    "acquisition: upper bound": {"acquisition": "ucb"},
+    "acquisition: expected improvement": {"acquisition": "log-ei"},
+    "range end: hit + 500": {"range_end": "hit"},
+    "mean of ten, zero outside": {"observation": "mean", "outside": "zero"},
+    "mean of ten, six": {"observation": "mean", "last": 6},
+    "zero outside, edge variance": {"outside": "zero", "acquisition": "edge-variance"},
+    "raw, mean of ten": {"floor": "raw", "observation": "mean"},
+    "raw, zero outside": {"floor": "raw", "outside": "zero"},
 }
-"""Readings and the cohort they are tried on: one factor at a time around the base, then combinations. The noise of the
-people is no reading of the text, but it is as little known."""
+
+_ON_CONSTANT_CV: Final[dict[str, dict[str, Any]]] = {
+    "constant-CV noise": {},
+    "constant-CV noise, mean of ten": {"observation": "mean"},
+    "constant-CV noise, zero outside": {"outside": "zero"},
+    "constant-CV noise, raw": {"floor": "raw"},
+    "constant-CV noise, six": {"last": 6},
+}
+
+READINGS: Final[dict[str, tuple[Reading, str]]] = {
+    **{name: (replace(BASE, **changes), PEOPLE) for name, changes in _ALONE.items()},
+    **{name: (replace(BASE, **changes), "gaussian") for name, changes in _ON_CONSTANT_CV.items()},
+    "kim11 (input noise of people at large)": (BASE, "kim11"),
+}
+"""Readings and the cohort they are tried on: one factor at a time around the base, combinations, and other people. The
+noise of the people is no reading of the text, but it is as little known."""

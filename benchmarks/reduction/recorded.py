@@ -6,8 +6,10 @@ the 500 ms that the text sweeps, so that a range that ends 500 ms after the impa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
@@ -16,7 +18,8 @@ from isiw.models.dissertation.incremental import SweepModel, SweepPosterior, Swe
 from isiw.models.shared.history import AmplitudeHistory
 from isiw.strategy.settings.dissertation import SweepSettings
 from isiw.strategy.stopping import Progress
-from isiw.subjects.subject import SimulatedSubject
+from isiw.subjects.responses import RecruitmentResponse
+from isiw.subjects.subject import Responder, SimulatedSubject
 from isiw.types import FloatArray
 from isiw.window import Window, WindowEstimate
 
@@ -26,6 +29,12 @@ DISCARDED = 2
 LAST_MS = 690.0
 BASELINE_TRIALS = 100
 """So many that the baseline is known: its error would enlarge every window, or swallow it. The text gives no number."""
+
+BASELINES: Final = ("100 % RMT", "90 % RMT")
+"""TMS alone whose MEP a measured window is above: at the threshold, as in the text (4.2.1), or as in the pairs."""
+
+OTHER_NOISE = 1_000_000
+"""Added to a seed for TMS alone at 100 % RMT, so that it takes nothing from the noise of the sweep."""
 
 SWEPT = DesignSpace(0, 500, STEP_MS, reference="valve")
 """What the conventional sweep covers, and where windows and profiles are compared."""
@@ -39,13 +48,13 @@ class RecordedSweep:
         subject: the person.
         isi_ms: the ISIs [ms], shape (t,).
         trials_mv: all MEPs [mV], in the order of recording, shape (t, 12).
-        baseline_mv: MEPs of TMS alone [mV], recorded first.
+        alone_mv: MEPs of TMS alone [mV] by intensity, one of `BASELINES`.
     """
 
     subject: SimulatedSubject
     isi_ms: FloatArray
     trials_mv: FloatArray
-    baseline_mv: FloatArray
+    alone_mv: Mapping[str, FloatArray]
 
     @property
     def kept_mv(self) -> FloatArray:
@@ -69,34 +78,39 @@ class RecordedSweep:
     @cached_property
     def windows(self) -> dict[str, Window | None]:
         """The windows that a method can be judged by, by name; see `readings.TRUTHS`."""
+        whole = (0, len(SWEPT.grid_ms))
         return {
             "true": self.subject.window(SWEPT),
-            "measured, .135": self._measured(0, len(SWEPT.grid_ms), "share").window,
-            "measured, baseline": self._measured(0, len(SWEPT.grid_ms), "baseline").window,
+            "measured, .135": self._measured(*whole, BASELINES[1], "share").window,
+            **{f"measured, {baseline}": self._measured(*whole, baseline).window for baseline in BASELINES},
         }
 
-    def sweep(self, low_ms: float = 0.0) -> ConventionalSweep:
-        """The conventional sweep from an ISI [ms] on, as the strategy `incremental` judges it."""
+    def sweep(self, low_ms: float = 0.0, baseline: str = BASELINES[0]) -> ConventionalSweep:
+        """The conventional sweep from an ISI on, as the strategy `incremental` judges it.
+
+        Args:
+            low_ms: the ISI [ms].
+            baseline: one of `BASELINES`.
+        """
         first, last = self.index(low_ms), len(SWEPT.grid_ms)
-        passed = (stop for stop in range(first + 1, last + 1) if self._has_passed(first, stop))
+        passed = (stop for stop in range(first + 1, last + 1) if self._has_passed(first, stop, baseline))
         terminated = next(passed, last)
         return ConventionalSweep(
             trials=TRIALS_PER_ISI * (last - first),
             terminated=TRIALS_PER_ISI * (terminated - first),
-            window=self._measured(first, last, "baseline").window,
+            window=self._measured(first, last, baseline).window,
         )
 
-    def _has_passed(self, first: int, last: int) -> bool:
-        estimate = self._measured(first, last, "baseline")
+    def _has_passed(self, first: int, last: int, baseline: str) -> bool:
+        estimate = self._measured(first, last, baseline)
         return SweepSettings().stopping.rule(0)(Progress(0, 0, estimate)).stop
 
-    def _measured(self, first: int, last: int, rule: SweepRule) -> WindowEstimate:
+    def _measured(self, first: int, last: int, baseline: str, rule: SweepRule = "baseline") -> WindowEstimate:
         """What the strategy `incremental` makes of a part of the sweep, TMS alone before it."""
+        alone_mv = self.alone_mv[baseline]
         space = DesignSpace(self.isi_ms[first], self.isi_ms[first] + 500.0, STEP_MS, reference="valve")
-        isi_ms = np.concatenate(
-            (np.full(len(self.baseline_mv), np.nan), self.isi_ms[first:last].repeat(TRIALS_PER_ISI))
-        )
-        mep_mv = np.concatenate((self.baseline_mv, self.trials_mv[first:last].ravel()))
+        isi_ms = np.concatenate((np.full(len(alone_mv), np.nan), self.isi_ms[first:last].repeat(TRIALS_PER_ISI)))
+        mep_mv = np.concatenate((alone_mv, self.trials_mv[first:last].ravel()))
         model = SweepModel(rule=rule)
         return SweepPosterior(model, space, AmplitudeHistory(isi_ms[None], mep_mv[None])).estimate()
 
@@ -129,7 +143,26 @@ def record(subject: SimulatedSubject, seed: int) -> RecordedSweep:
         seed: of the trial noise.
     """
     responder = subject.begin(seed)
-    baseline_mv = np.array([responder.respond(None, "valve").mep_mv for _ in range(BASELINE_TRIALS)])
+    alone_mv = _alone_mv(responder)
     isi_ms = np.arange(0.0, LAST_MS + 0.5 * STEP_MS, STEP_MS)
     trials_mv = [[responder.respond(isi, "valve").mep_mv for _ in range(TRIALS_PER_ISI)] for isi in isi_ms.tolist()]
-    return RecordedSweep(subject, isi_ms, np.array(trials_mv), baseline_mv)
+    at_rmt_mv = alone_at_rmt_mv(subject, seed)
+    alone = {BASELINES[0]: alone_mv if at_rmt_mv is None else at_rmt_mv, BASELINES[1]: alone_mv}
+    return RecordedSweep(subject, isi_ms, np.array(trials_mv), alone)
+
+
+def alone_at_rmt_mv(subject: SimulatedSubject, seed: int) -> FloatArray | None:
+    """MEPs of TMS alone at 100 % RMT [mV]; None of people without a recruitment curve, who know no intensity.
+
+    Args:
+        subject: the person.
+        seed: of the trial noise.
+    """
+    if not isinstance(subject.response, RecruitmentResponse):
+        return None
+    response = replace(subject.response, intensity_pct_rmt=100.0)
+    return _alone_mv(replace(subject, response=response).begin(OTHER_NOISE + seed))
+
+
+def _alone_mv(responder: Responder) -> FloatArray:
+    return np.array([responder.respond(None, "valve").mep_mv for _ in range(BASELINE_TRIALS)])

@@ -31,9 +31,9 @@ def redrawn(results: Path = RESULTS) -> dict[str, Figure]:
         section["title"].partition(" (")[0]: [pd.DataFrame(table["rows"]) for table in section["tables"]]
         for section in sections
     }
-    recruitment, gaussian, equal, _ = tables["The headline: equal trials, equal F1"]
+    *duels, equal, _ = tables["The headline: equal trials, equal F1"]
     return {
-        "headline": headline.figure(equal, {"recruitment": recruitment, "gaussian": gaussian}),
+        "headline": headline.figure(equal, dict(zip(headline.NOISE, duels, strict=True))),
         "methods": comparison.figure(tables["The methods side by side"][0]),
         "initial": initial.figure(tables["How many initial observations"][0]),
         "particles": particles.figure(*tables["How many particles"]),

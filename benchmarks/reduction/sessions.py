@@ -25,10 +25,6 @@ from isiw.window import Window, WindowEstimate
 NEAR_MS = 25.0
 """How far before the true window an experimenter begins who expects it [ms]."""
 
-PF_SD_MS = 25.0
-"""SD of the Gaussian that stands for the particle filter's profile: its stopping rule's, and a third of the ± 75 ms
-of its window (4.6)."""
-
 
 @dataclass(frozen=True)
 class Session:
@@ -116,25 +112,16 @@ def answers(session: Session, swept: RecordedSweep, offset_ms: float) -> Callabl
 
 def known(reading: Reading, swept: RecordedSweep) -> BoolArray:
     """At which ISIs of `SWEPT` a reading has MEPs other than zero, shape (t,)."""
-    window = swept.windows["measured, baseline"]
+    window = swept.windows[reading.truth]
     if reading.outside == "recorded":
         return np.ones(len(SWEPT.grid_ms), dtype=bool)
     return np.zeros(len(SWEPT.grid_ms), dtype=bool) if window is None else window.mask(SWEPT.grid_ms)
 
 
 def profile_mv(estimate: WindowEstimate, where: Range) -> FloatArray | None:
-    """The estimated profile [mV] on `SWEPT`, or on the part of it that was searched; None where there is none.
-
-    The particle filter has no profile: a Gaussian at its estimate stands in.
-    """
-    isi_ms = SWEPT.grid_ms - where.offset_ms
-    band = estimate.profile(isi_ms)
-    if band is not None:
-        return band.median_mv
-    if estimate.spread_ms is None or estimate.window is None:
-        return None
-    centre_ms = 0.5 * (estimate.window.start_ms + estimate.window.end_ms)
-    return np.asarray(np.exp(-0.5 * ((isi_ms - centre_ms) / PF_SD_MS) ** 2))
+    """The estimated profile [mV] on `SWEPT`, or on the part of it that was searched; None where there is none."""
+    band = estimate.profile(SWEPT.grid_ms - where.offset_ms)
+    return None if band is None else band.median_mv
 
 
 def correlation(a: FloatArray | None, b: FloatArray) -> float:
@@ -156,8 +143,9 @@ def play(session: Session, swept: RecordedSweep) -> dict[str, Any]:
         **session.reading.settings(session.method) | dict(session.settings),
     )
     answer = answers(session, swept, where.offset_ms)
-    truth = swept.windows["true"]
-    trials, stopped, f1_by_trial, spread_ms = 0, None, [], []
+    by_trial: dict[str, list[float]] = {f"f1, {session.reading.truth}": [], "f1, true": []}
+    before = f1_by_truth(where.from_valve(strategy.estimate().window), swept)
+    trials, stopped, spread_ms = 0, None, []
     while stopped is None or trials < session.horizon:
         asked_ms = strategy.ask()
         isi_ms, mep_mv = answer(asked_ms)
@@ -168,7 +156,9 @@ def play(session: Session, swept: RecordedSweep) -> dict[str, Any]:
             strategy.count_mistrial()
         estimate = strategy.estimate()
         if trials <= session.horizon:
-            f1_by_trial.append(isiw.metrics.f1(where.from_valve(estimate.window), truth, SWEPT))
+            scores = f1_by_truth(where.from_valve(estimate.window), swept)
+            for name, values in by_trial.items():
+                values.append(scores[name])
         if estimate.spread_ms is not None and not (spread_ms and spread_ms[-1] == estimate.spread_ms):
             spread_ms.append(estimate.spread_ms)
         if stopped is None and strategy.decision().stop:
@@ -176,7 +166,9 @@ def play(session: Session, swept: RecordedSweep) -> dict[str, Any]:
             stopped = {"trials": trials, "converged": left is None or left > 0}
             stopped |= judged(estimate, where, swept, session.reading)
             stopped["amplitudes_mv"] = amplitudes_mv(strategy)
-    return stopped | {"f1_by_trial": f1_by_trial, "spread_ms": spread_ms}
+    measured, true = by_trial.values()
+    before_any = {"f1 before, measured": before[f"f1, {session.reading.truth}"], "f1 before, true": before["f1, true"]}
+    return stopped | before_any | {"f1_by_trial": true, "f1_measured_by_trial": measured, "spread_ms": spread_ms}
 
 
 def judged(estimate: WindowEstimate, where: Range, swept: RecordedSweep, reading: Reading) -> dict[str, Any]:
@@ -185,14 +177,20 @@ def judged(estimate: WindowEstimate, where: Range, swept: RecordedSweep, reading
     A sweep that shows no window cannot judge: every subject of the dissertation had one.
     """
     window, profile = where.from_valve(estimate.window), profile_mv(estimate, where)
-    scores = {
-        f"f1, {name}": math.nan if name != "true" and truth is None else isiw.metrics.f1(window, truth, SWEPT)
-        for name, truth in swept.windows.items()
-    }
+    scores = f1_by_truth(window, swept)
+    scores["f1, measured"] = scores[f"f1, {reading.truth}"]
     inside = SWEPT.grid_ms >= where.offset_ms
     profiles = {"measured": np.where(known(reading, swept), swept.measured_mv, 0.0), "true": swept.true_mv}
     part = None if profile is None else profile[inside]
     return scores | {f"correlation, {name}": correlation(part, mv[inside]) for name, mv in profiles.items()}
+
+
+def f1_by_truth(window: Window | None, swept: RecordedSweep) -> dict[str, float]:
+    """F1 of a window from the valve command by every truth; NaN where a sweep shows no window to judge by."""
+    return {
+        f"f1, {name}": math.nan if name != "true" and truth is None else isiw.metrics.f1(window, truth, SWEPT)
+        for name, truth in swept.windows.items()
+    }
 
 
 def amplitudes_mv(strategy: isiw.Strategy) -> tuple[float, ...]:
@@ -212,8 +210,9 @@ def run(session: Session) -> dict[str, Any]:
 
     Returns:
         Trials to its stopping rule, whether it converged, F1 by every truth and correlations then; F1 by the true
-        window after each trial of the horizon; and what only some methods have: the spread of the particles after
-        each generation, and the amplitudes of the Gaussians. Of the conventional sweep: see `conventional`.
+        window and by the reading's measured one before any trial and after each trial of the horizon; and what only
+        some methods have: the spread of the particles after each generation, and the amplitudes of the Gaussians. Of
+        the conventional sweep: see `conventional`.
     """
     torch.set_num_threads(1)
     swept = recorded_person(session.cohort, session.person, session.seed)
@@ -223,23 +222,31 @@ def run(session: Session) -> dict[str, Any]:
 def conventional(session: Session, swept: RecordedSweep) -> dict[str, Any]:
     """The conventional sweep itself: its trials by where it begins and ends, and its window by the true one."""
     truth, hit_ms = swept.windows["true"], swept.subject.hit_delay_ms
-    done = swept.sweep(hit_ms if session.accelerometer else 0.0)
+    baseline, measured = session.reading.baseline, swept.windows[session.reading.truth]
+    done = swept.sweep(hit_ms if session.accelerometer else 0.0, baseline)
     near_ms = hit_ms if truth is None else truth.start_ms - NEAR_MS
     return {
         "trials": done.terminated,
         "converged": done.terminated < done.trials,
         "whole": done.trials,
-        "near": swept.sweep(near_ms).terminated,
-        "inside measured": TRIALS_PER_ISI * stops_inside(swept.windows["measured, baseline"]),
+        "near": swept.sweep(near_ms, baseline).terminated,
+        "inside measured": TRIALS_PER_ISI * stops_inside(measured),
+        "inside measured, 90 %": TRIALS_PER_ISI * stops_inside(swept.windows["measured, 90 % RMT"]),
         "inside measured, .135": TRIALS_PER_ISI * stops_inside(swept.windows["measured, .135"]),
         "inside true": TRIALS_PER_ISI * stops_inside(truth),
-        "shows a window": swept.windows["measured, baseline"] is not None,
-        "normal": float(shapiro(swept.measured_mv[inside_of(truth)]).pvalue) >= 0.05,
-        "normal throughout": float(shapiro(swept.measured_mv).pvalue) >= 0.05,
+        "shows a window": measured is not None,
+        "shows a window, 90 %": swept.windows["measured, 90 % RMT"] is not None,
+        "normal": normal(swept.measured_mv[inside_of(measured)]),
+        "normal throughout": normal(swept.measured_mv),
         "f1, true": isiw.metrics.f1(done.window, truth, SWEPT),
         "f1, of .135": isiw.metrics.f1(swept.windows["measured, .135"], truth, SWEPT),
         "correlation, true": correlation(swept.measured_mv, swept.true_mv),
     }
+
+
+def normal(values: FloatArray) -> float:
+    """1 where a Shapiro–Wilk test does not reject that values are normal at .05, else 0; NaN of fewer than three."""
+    return float(shapiro(values).pvalue >= 0.05) if len(values) >= 3 else math.nan
 
 
 def inside_of(window: Window | None) -> BoolArray:

@@ -10,18 +10,17 @@ __all__ = ["FULL", "QUICK", "Size"]
 
 @dataclass(frozen=True)
 class Size:
-    """How many sessions each part has; sessions of `kim11` are noise seeds of its eleven people.
+    """How many sessions each part has; sessions of the eleven of `kim11` and `kim11-measured` are noise seeds.
 
     Args:
-        kim: sessions of `kim11` in the main comparison.
-        kim_default: how many of them the default strategy plays too, which takes far longer than all others.
+        kim: sessions of either eleven in the main comparison.
+        kim_default: how many of those of `kim11-measured` the default plays too, which takes longer than all others.
         people: people of `recruitment` in the main comparison.
-        people_default: how many of them the default plays too.
-        headline: people of `recruitment` and of `gaussian` in the headline, with every method.
+        people_default: how many of them, and of `kim11`, the default plays too.
+        headline: people of each cohort of the headline, with every method.
         sweep: sessions for each number of initial observations or particles.
         readings: sessions for each reading.
         horizon: trials of the default's learning curve in the headline.
-        intervals: runs of interval production for each light.
         online: sessions on waveforms with each of two people.
     """
 
@@ -33,31 +32,28 @@ class Size:
     sweep: int
     readings: int
     horizon: int
-    intervals: int
     online: int
 
 
 FULL: Final = Size(
-    kim=44,
+    kim=33,
     kim_default=11,
-    people=200,
-    people_default=22,
-    headline=60,
+    people=66,
+    people_default=11,
+    headline=44,
     sweep=11,
     readings=11,
     horizon=40,
-    intervals=10,
     online=3,
 )
 QUICK: Final = Size(
     kim=11,
-    kim_default=4,
-    people=5,
-    people_default=3,
-    headline=5,
+    kim_default=2,
+    people=4,
+    people_default=1,
+    headline=4,
     sweep=3,
     readings=3,
-    horizon=15,
-    intervals=1,
+    horizon=12,
     online=1,
 )

@@ -1,8 +1,9 @@
 """Simulated people: the cohorts on which strategies are compared, and the truth about each person."""
 
-from isiw.subjects.cohorts import COHORTS, WIDTHS_KIM_MS, cohort
+from isiw.subjects.cohorts import COHORTS, cohort
 from isiw.subjects.days import another_day
 from isiw.subjects.labs import LABS, Lab, lab
+from isiw.subjects.measured import MEASURED_KIM, WIDTHS_KIM_MS, MeasuredPerson
 from isiw.subjects.plasticity import Plasticity
 from isiw.subjects.profiles import OpposedProfile, PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
@@ -12,6 +13,7 @@ from isiw.subjects.thresholds import THRESHOLD_COHORTS, HotSpot, StimulatedPerso
 __all__ = [
     "COHORTS",
     "LABS",
+    "MEASURED_KIM",
     "THRESHOLD_COHORTS",
     "WIDTHS_KIM_MS",
     "Drift",
@@ -19,6 +21,7 @@ __all__ = [
     "GainResponse",
     "HotSpot",
     "Lab",
+    "MeasuredPerson",
     "OpposedProfile",
     "PeakProfile",
     "Plasticity",

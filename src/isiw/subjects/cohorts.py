@@ -14,16 +14,13 @@ import numpy as np
 from isiw.checks import choice, whole
 from isiw.subjects.days import another_day
 from isiw.subjects.labs import LABS, lab
+from isiw.subjects.measured import MEASURED_KIM, WIDTHS_KIM_MS
 from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import Drift, SimulatedSubject
 from isiw.subjects.supra import supra_threshold
 
-__all__ = ["COHORTS", "WIDTHS_KIM_MS", "cohort"]
-
-WIDTHS_KIM_MS: Final = (75, 65, 80, 70, 110, 120, 220, 145, 135, 110, 60)
-"""Window widths of the dissertation's eleven subjects [ms] (Table 4.1)."""
-
+__all__ = ["COHORTS", "cohort"]
 
 _Pair: TypeAlias = tuple[float, float]
 _Shape: TypeAlias = Callable[[np.random.Generator, float, float], Profile]
@@ -177,6 +174,18 @@ def _kim_subject(index: int) -> SimulatedSubject:
     return replace(subject, input_correlation=float(rng.uniform(0, 0.2)))
 
 
+def _measured_kim_subject(index: int) -> SimulatedSubject:
+    rng = np.random.default_rng([zlib.crc32(b"kim11-measured"), 4, index])
+    start_ms, hit_delay_ms, hit_delay_sd_ms = rng.uniform((50, 170, 1), (100, 190, 4)).tolist()
+    return MEASURED_KIM[index].subject(start_ms, hit_delay_ms, hit_delay_sd_ms)
+
+
+_ELEVEN: Final[Mapping[str, Callable[[int], SimulatedSubject]]] = MappingProxyType(
+    {"kim11": _kim_subject, "kim11-measured": _measured_kim_subject}
+)
+"""Cohorts of the dissertation's eleven subjects, drawn once."""
+
+
 def _on_either_day(seed: int, number: int) -> SimulatedSubject:
     """Even numbers are people on the first day, and the next one is the same person on the second."""
     rng = np.random.default_rng([zlib.crc32(b"another-day"), seed, number // 2])
@@ -202,7 +211,7 @@ _DRAW: Final[dict[str, Callable[[np.random.Generator], SimulatedSubject]]] = {
     "supra-threshold": supra_threshold,
 }
 
-COHORTS: Final = (*_DRAW, "nonresponder", "kim11", *LABS, "another-day")
+COHORTS: Final = (*_DRAW, "nonresponder", *_ELEVEN, *LABS, "another-day")
 """The names that `cohort` knows."""
 
 
@@ -211,8 +220,8 @@ def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
 
     Args:
         name: one of `COHORTS`.
-        n: how many people. `kim11` has eleven, and cycles: its sessions differ in trial noise only. Of `another-day`
-            every two, from the first on, are one person on two days.
+        n: how many people. `kim11` and `kim11-measured` have eleven, and cycle: their sessions differ in trial noise
+            only. Of `another-day` every two, from the first on, are one person on two days.
         seed: seed of the people, and of the lab in a cohort of one lab; 0–999 are for development, reported figures use
             10,000 and above.
 
@@ -221,8 +230,8 @@ def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
     """
     choice("the cohort", name, COHORTS)
     n, seed = whole("n", n, least=0), whole("seed", seed, least=0)
-    if name == "kim11":
-        return [_kim_subject(i % len(WIDTHS_KIM_MS)) for i in range(n)]
+    if name in _ELEVEN:
+        return [_ELEVEN[name](i % len(WIDTHS_KIM_MS)) for i in range(n)]
     if name == "another-day":
         return [_on_either_day(seed, i) for i in range(n)]
     generators = [np.random.default_rng([zlib.crc32(name.encode()), seed, i]) for i in range(n)]

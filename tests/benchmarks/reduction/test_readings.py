@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 from benchmarks.reduction.dissertation import METHODS
-from benchmarks.reduction.readings import BASE, READINGS, Reading
+from benchmarks.reduction.pf_readings import SETTINGS
+from benchmarks.reduction.readings import BASE, READINGS, TRUTHS, Reading
 
 import isiw
 from isiw.errors import InvalidValueError
@@ -26,6 +27,17 @@ def test_the_base_has_the_texts_stopping_rule() -> None:
     assert BASE.settings("gpr") == {"stop_edges": "both", "stop_last": 5, "acquisition": "variance"}
 
 
+def test_every_reading_of_the_particle_filter_makes_one() -> None:
+    for settings in SETTINGS.values():
+        isiw.make_strategy("pf", **dict(settings))
+    assert len(set(SETTINGS.values())) == len(SETTINGS)
+
+
+def test_a_reading_is_judged_by_its_own_measured_window() -> None:
+    assert BASE.truth == "measured, 100 % RMT"
+    assert {reading.truth for reading, _ in READINGS.values()} <= set(TRUTHS)
+
+
 def test_the_particle_filter_is_touched_by_the_floor_alone() -> None:
     assert Reading(edges="either", last=6, floor="zeroed").settings("pf") == {"floor": "zeroed"}
 
@@ -34,7 +46,9 @@ def test_the_default_is_never_touched() -> None:
     assert Reading(edges="either", floor="raw").settings("default") == {}
 
 
-@pytest.mark.parametrize("wrong", [{"observation": "median"}, {"outside": "noise"}, {"range_end": "never"}])
+@pytest.mark.parametrize(
+    "wrong", [{"observation": "median"}, {"outside": "noise"}, {"range_end": "never"}, {"baseline": "110 % RMT"}]
+)
 def test_unknown_words_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match="is unknown"):
         Reading(**wrong)

@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.reduction.recorded import SWEPT, record, stops_inside
+from benchmarks.reduction.recorded import BASELINES, SWEPT, alone_at_rmt_mv, record, stops_inside
 
+from isiw.subjects.cohorts import cohort
 from isiw.subjects.profiles import PeakProfile
-from isiw.subjects.responses import EmgFloor, GainResponse
+from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 from isiw.window import Window
+from known import instance, known
 
 CLEAR = SimulatedSubject(
     profile=PeakProfile(50.0, 100.0),
@@ -43,7 +45,8 @@ def test_without_noise_the_measured_window_by_the_share_is_the_true_one() -> Non
 def test_a_non_responder_shows_no_window() -> None:
     nobody = replace(CLEAR, response=GainResponse(EmgFloor(0.01, 0.3), gain_mv=0.0, cv=0.5))
     nonresponder = record(nobody, seed=2)
-    assert nonresponder.windows == {"true": None, "measured, .135": None, "measured, baseline": None}
+    over_either = dict.fromkeys(("measured, 100 % RMT", "measured, 90 % RMT"))
+    assert nonresponder.windows == {"true": None, "measured, .135": None, **over_either}
     assert nonresponder.sweep().terminated == nonresponder.sweep().trials == 1212
 
 
@@ -51,6 +54,22 @@ def test_a_sweep_ends_when_the_window_was_passed_and_sooner_the_later_it_begins(
     whole, near = SWEEP.sweep(), SWEEP.sweep(205.0)
     assert whole.terminated < whole.trials == 1212
     assert near.terminated == whole.terminated - 12 * 41
+
+
+def test_above_tms_alone_at_rmt_the_window_is_narrower_and_its_noise_takes_nothing_from_the_sweep() -> None:
+    person = cohort("kim11-measured", 7, 0)[6]
+    sweep = record(person, 3)
+    at_rmt, at_90 = (known(sweep.windows[f"measured, {baseline}"]) for baseline in BASELINES)
+    assert at_90.start_ms < at_rmt.start_ms < at_rmt.end_ms < at_90.end_ms
+    assert at_rmt.width_ms == pytest.approx(220, abs=22)
+    assert sweep.alone_mv["100 % RMT"].mean() > 2 * sweep.alone_mv["90 % RMT"].mean()
+    silent = replace(person, response=replace(instance(RecruitmentResponse, person.response), boost_pct_rmt=0.0))
+    assert np.array_equal(record(silent, 3).alone_mv["90 % RMT"], sweep.alone_mv["90 % RMT"])
+
+
+def test_people_without_a_recruitment_curve_know_no_intensity() -> None:
+    assert alone_at_rmt_mv(CLEAR, 1) is None
+    assert SWEEP.windows["measured, 100 % RMT"] == SWEEP.windows["measured, 90 % RMT"]
 
 
 def test_stops_inside_count_both_ends() -> None:

@@ -10,7 +10,6 @@ import pytest
 from benchmarks.reduction.readings import LIVE, Reading
 from benchmarks.reduction.recorded import SWEPT
 from benchmarks.reduction.sessions import (
-    PF_SD_MS,
     Range,
     Session,
     answers,
@@ -58,7 +57,7 @@ def test_with_accelerometer_the_same_trials_are_drawn_from_the_impact_on() -> No
 
 
 def test_zero_outside_silences_all_but_the_measured_window() -> None:
-    window = SWEEP.windows["measured, baseline"]
+    window = SWEEP.windows["measured, 100 % RMT"]
     assert window is not None
     answer = answers(replace(BARE, reading=Reading(outside="zero")), SWEEP, 0.0)
     heard = np.array([answer(isi)[1] > 0 for isi in SWEPT.grid_ms.tolist()])
@@ -71,12 +70,14 @@ def test_a_live_trial_is_of_the_person_and_of_no_record() -> None:
     assert answer(250.0)[1] not in SWEEP.trials_mv
 
 
-def test_the_particle_filters_profile_is_a_gaussian_at_its_estimate() -> None:
-    estimate = WindowEstimate(None, Window(175.0, 325.0), spread_ms=20.0)
-    profile = profile_mv(estimate, Range(SWEPT, 0.0))
+def test_a_profile_is_compared_where_the_sweep_was_whatever_its_isis_count_from() -> None:
+    grid_ms = np.arange(0.0, 321.0)
+    hill = np.exp(-0.5 * ((grid_ms - 70.0) / 25.0) ** 2)
+    estimate = WindowEstimate(None, None, grid_ms=grid_ms, profile_quantiles_mv=np.stack((hill, hill, hill)))
+    profile = profile_mv(estimate, Range(SWEPT, 180.0))
     assert profile is not None
     assert SWEPT.grid_ms[profile.argmax()] == 250.0
-    assert profile[SWEPT.grid_ms == 250.0 + PF_SD_MS] == pytest.approx(np.exp(-0.5))
+    assert profile_mv(WindowEstimate(None, None), Range(SWEPT, 0.0)) is None
 
 
 def test_profiles_that_are_missing_or_flat_do_not_break_the_correlation() -> None:
@@ -90,7 +91,8 @@ def test_a_session_can_be_run_again_and_tells_when_it_stopped() -> None:
     session = replace(BARE, horizon=12)
     first = run(session)
     assert first == run(session)
-    assert len(first["f1_by_trial"]) == 12
+    assert len(first["f1_by_trial"]) == len(first["f1_measured_by_trial"]) == 12
+    assert first["f1 before, true"] == 0.0
     assert 6 + 4 <= first["trials"] <= 105
     assert first["converged"]
 

@@ -13,13 +13,14 @@ import pytest
 from isiw.acquisition.fixed import OwnProposal
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.dissertation.bootstrap import BootstrapFilter, BootstrapPosterior, normalised, resampled
+from isiw.models.dissertation.bootstrap import BootstrapFilter, BootstrapPosterior, WindowKind, normalised, resampled
 from isiw.models.shared.floor import FloorTreatment
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
 from isiw.testing import check_model
 from isiw.types import ArrayLike
+from isiw.window import Window
 from known import known
 from models.told_trials import bell_mv, observation, told
 
@@ -121,6 +122,27 @@ def test_the_window_is_the_weighted_mean_of_the_measured_particles_and_75_ms_to_
     )
 
 
+@pytest.mark.parametrize("floor_mv", [0.0, 0.01])
+def test_the_profile_is_a_gaussian_through_the_meps_and_there_is_none_before(floor_mv: float) -> None:
+    first = PF.begin(VALVE_SPACE, 3)
+    assert first.estimate().profile([263.0]) is None
+    posterior = generation(first, lambda isi_ms: floor_mv + bell_mv(isi_ms))
+    profile_mv = known(posterior.estimate().profile(VALVE_SPACE.grid_ms)).median_mv
+    assert VALVE_SPACE.grid_ms[profile_mv.argmax()] == pytest.approx(263.0, abs=4)
+    assert np.corrcoef(profile_mv, bell_mv(VALVE_SPACE.grid_ms))[0, 1] > 0.99
+
+
+def test_the_window_can_be_the_fits_or_reach_from_the_first_to_the_last_particle() -> None:
+    def window(kind: WindowKind) -> Window:
+        return known(generation(BootstrapFilter(window=kind).begin(VALVE_SPACE, 3), bell_mv).estimate().window)
+
+    assert (window("fit").start_ms, window("fit").end_ms) == pytest.approx((213.0, 313.0), abs=2)
+    posterior = generation(STILL.begin(VALVE_SPACE, 3), bell_mv)
+    particles = generation(replace(STILL, window="particles").begin(VALVE_SPACE, 3), bell_mv).estimate().window
+    plan_ms = posterior.proposed_isis_ms()[0].tolist()  # without diffusion, the resampled particles
+    assert particles == Window(min(plan_ms), max(plan_ms))
+
+
 def test_the_spread_is_the_population_sd_of_the_resampled_particles() -> None:
     after = generation(STILL.begin(VALVE_SPACE, 4), lambda isi_ms: 0.01 + bell_mv(isi_ms))
     assert after.estimate().spread_ms == pytest.approx(np.std(after.proposed_isis_ms()[0].double().numpy()))
@@ -193,7 +215,14 @@ def test_the_model_conforms(space: DesignSpace) -> None:
 
 @pytest.mark.parametrize(
     "settings",
-    [{"particles": 1}, {"particles": 2.5}, {"diffusion_ms": -1.0}, {"lattice_ms": 0.0}, {"half_width_ms": math.nan}],
+    [
+        {"particles": 1},
+        {"particles": 2.5},
+        {"diffusion_ms": -1.0},
+        {"lattice_ms": 0.0},
+        {"half_width_ms": math.nan},
+        {"window": "wide"},
+    ],
 )
 def test_an_invalid_setting_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(settings))):

@@ -12,7 +12,7 @@ from scipy.optimize import curve_fit
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.dissertation.curves import FittedCurve
-from isiw.models.dissertation.nonlinear import NonlinearRegression, gaussians_mv, gradient_mv
+from isiw.models.dissertation.nonlinear import NonlinearRegression, Start, gaussians_mv, gradient_mv
 from isiw.models.dissertation.regression import RegressionModel
 from isiw.models.shared.floor import FloorTreatment
 from isiw.testing import check_model
@@ -157,10 +157,11 @@ def test_where_no_amplitude_is_known_beforehand_it_starts_from_the_largest_mep(s
         {"amplitude_mv": -1.0},
         {"max_evaluations": 0},
         {"samples": 1},
+        {"start": "odd"},
     ],
 )
 def test_an_invalid_setting_is_refused(settings: dict[str, Any]) -> None:
-    with pytest.raises(InvalidValueError, match=r"peaks|width_ms|amplitude_mv|evaluations|samples"):
+    with pytest.raises(InvalidValueError, match=r"peaks|width_ms|amplitude_mv|evaluations|samples|start"):
         NonlinearRegression(**settings)
 
 
@@ -169,6 +170,30 @@ def test_a_fit_of_two_gaussians_tells_their_amplitudes_largest_first() -> None:
     mep_mv = gaussians_mv(isi_ms, np.array([0.03, 150.0, 20.0, 0.08, 320.0, 25.0]))
     curve = fit(isi_ms, mep_mv, peaks=2, amplitude_mv=0.0)
     assert curve.amplitudes_mv == pytest.approx((0.08, 0.03), rel=0.01)
+
+
+def test_two_clear_gaussians_are_found_from_even_and_unequal_starts_and_from_some_random_ones() -> None:
+    isi_ms, rng = np.linspace(0.0, 500.0, 51), np.random.default_rng(0)
+    mep_mv = np.asarray(bell_mv(isi_ms, mean_ms=200.0) + bell_mv(isi_ms, 0.05, mean_ms=310.0))
+
+    def found(start: Start) -> bool:
+        curve = NonlinearRegression(peaks=2, start=start).fit(isi_ms, mep_mv, VALVE_SPACE, rng)
+        return curve.amplitudes_mv == pytest.approx((0.1, 0.05), rel=0.01)
+
+    assert found("even")
+    assert found("unequal")
+    assert {found("random") for _ in range(20)} == {True, False}  # the second Gaussian can vanish
+
+
+def test_starts_differ_and_only_a_random_one_differs_from_fit_to_fit() -> None:
+    def starts(start: Start, peaks: int, seed: int) -> list[list[float]]:
+        method = NonlinearRegression(peaks=peaks, start=start)
+        return method.starts(VALVE_SPACE, 0.1, np.random.default_rng(seed))
+
+    assert starts("even", 2, 0) == starts("even", 2, 1) == [[0.1, 223.0, 27.0], [0.1, 277.0, 27.0]]
+    assert starts("unequal", 2, 0) == [[0.1, 250.0, 27.0], [pytest.approx(0.01), 277.0, 27.0]]
+    assert starts("unequal", 1, 0) == starts("even", 1, 0) == [[0.1, 250.0, 27.0]]
+    assert starts("random", 1, 0) != starts("random", 1, 1)
 
 
 def test_one_gaussian_needs_no_second_amplitude() -> None:

@@ -1,26 +1,32 @@
 """The bootstrap particle filter: the dissertation's PF [Kim2020, 4.3.2], after [Gordon1993].
 
 Particles are ISIs that search for the best one. Each generation is diffused, measured with one MEP a particle, weighted
-by these MEPs, and resampled. Nothing is learnt before all particles of a generation have been measured.
+by these MEPs, and resampled. Nothing is learnt before all particles of a generation have been measured. The profile is
+a Gaussian fitted to all MEPs so far, as NR fits it (Fig. 4.13, 4.14).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any, Literal, get_args
 
 import numpy as np
 import torch
 
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.models.dissertation.curves import FittedCurve, curve_masks
+from isiw.models.dissertation.nonlinear import NonlinearRegression
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory
 from isiw.types import BoolArray, FloatArray, IntArray
 from isiw.window import Window, WindowEstimate
 
-__all__ = ["BootstrapFilter", "BootstrapPosterior", "normalised", "resampled"]
+__all__ = ["BootstrapFilter", "BootstrapPosterior", "WindowKind", "normalised", "resampled"]
+
+WindowKind = Literal["expectation", "fit", "particles"]
 
 
 def normalised(weights: FloatArray) -> FloatArray:
@@ -55,17 +61,21 @@ class BootstrapFilter:
         particles: how many particles, and so MEPs a generation (4.4.4).
         diffusion_ms: SD of the noise that is added to each particle before it is measured (4.2); the text gives none.
         lattice_ms: particles lie on multiples of this from the low end of the range (Fig. 4.20) [ms].
-        half_width_ms: the window is the posterior expectation plus and minus this: three SDs of 25 ms in the text
-            (4.3.2), two of them, 50 ms, in the caption of Fig. 4.13.
+        window: what is reported: the posterior `"expectation"` plus and minus a half width (4.3.2), where the `"fit"`
+            of a Gaussian has at least 0.135 of its maximum (Fig. 4.13), or from the first to the last of the
+            `"particles"` (4.4.4, Fig. 4.29).
+        half_width_ms: the half width: three SDs of 25 ms in the text (4.3.2), two of them, 50 ms, in the caption of
+            Fig. 4.13.
         floor: what is subtracted from an MEP before it becomes a weight; the text has the MEPs as they are.
 
     Raises:
-        InvalidValueError: an invalid number.
+        InvalidValueError: an invalid number, or an unknown kind of window.
     """
 
     particles: int = 30
     diffusion_ms: float = 10.0
     lattice_ms: float = 5.0
+    window: WindowKind = "expectation"
     half_width_ms: float = 75.0
     floor: FloorTreatment = field(default_factory=lambda: FloorTreatment("raw"), metadata={"spread": True})
 
@@ -73,6 +83,7 @@ class BootstrapFilter:
         check_wholes(self, "particles", least=2)
         check_numbers(self, "lattice_ms", "half_width_ms", above=0)
         check_numbers(self, "diffusion_ms", least=0)
+        check_choice(self, "window", get_args(WindowKind))
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> BootstrapPosterior:
         """The first generation: uniform over the range, diffused, not measured."""
@@ -91,6 +102,9 @@ class BootstrapFilter:
             expectation_ms=np.full(people, np.nan),
             spread_ms=particles.std(axis=-1),
             weightless=np.zeros(people, dtype=bool),
+            support_ms=np.full((people, 2), np.nan),
+            fits=(None,) * people,
+            floors_mv=np.full(people, np.nan),
         )
 
     def update(self, posterior: BootstrapPosterior, observation: Observation) -> BootstrapPosterior:
@@ -130,7 +144,19 @@ class BootstrapFilter:
             expectation_ms=np.where(complete, (share * particles).sum(axis=-1), posterior.expectation_ms),
             spread_ms=np.where(complete, drawn.std(axis=-1), posterior.spread_ms),
             weightless=np.where(complete, ~(weights > 0).any(axis=-1), posterior.weightless),
+            support_ms=np.where(row, np.stack((drawn.min(axis=-1), drawn.max(axis=-1)), axis=-1), posterior.support_ms),
+            **self._fitted(posterior, complete, rng),
         )
+
+    def _fitted(self, posterior: BootstrapPosterior, complete: BoolArray, rng: np.random.Generator) -> dict[str, Any]:
+        """The Gaussians, with what was subtracted before; those of people without a complete generation stay."""
+        fits, floors_mv, treatment = list(posterior.fits), posterior.floors_mv.copy(), FloorTreatment()
+        for person in np.flatnonzero(complete).tolist():
+            trials = posterior.told.person(person)
+            floors_mv[person] = treatment.level_mv(trials)
+            excess_mv = treatment.excess_mv(trials.mep_mv, floors_mv[person])
+            fits[person] = NonlinearRegression().fit(trials.isi_ms, excess_mv, posterior.space, rng)
+        return {"fits": tuple(fits), "floors_mv": floors_mv}
 
     def on_lattice(self, space: DesignSpace, isi_ms: FloatArray) -> FloatArray:
         """The nearest ISIs [ms] of the lattice, inside the range; same shape.
@@ -162,6 +188,9 @@ class BootstrapPosterior:
         expectation_ms: the posterior expectation after the last generation [ms], NaN before, shape (b,).
         spread_ms: SD of the particles after it [ms], shape (b,).
         weightless: whether no MEP of it had any weight, shape (b,).
+        support_ms: the first and the last particle after it [ms], NaN before, shape (b, 2).
+        fits: the Gaussian of each person after it; None before.
+        floors_mv: what was subtracted from the MEPs for it [mV], NaN before, shape (b,).
     """
 
     model: BootstrapFilter
@@ -175,6 +204,9 @@ class BootstrapPosterior:
     expectation_ms: FloatArray
     spread_ms: FloatArray
     weightless: BoolArray
+    support_ms: FloatArray
+    fits: tuple[FittedCurve | None, ...]
+    floors_mv: FloatArray
 
     @property
     def trials(self) -> int:
@@ -196,8 +228,23 @@ class BootstrapPosterior:
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person: none before the first generation is complete."""
-        expectation_ms, reach_ms = float(self.expectation_ms[person]), self.model.half_width_ms
-        window = None
-        if not math.isnan(expectation_ms):
-            window = Window(self.space.snap(expectation_ms - reach_ms), self.space.snap(expectation_ms + reach_ms))
-        return WindowEstimate(probability=None, window=window, spread_ms=float(self.spread_ms[person]))
+        fit, floor_mv, spread_ms = self.fits[person], float(self.floors_mv[person]), float(self.spread_ms[person])
+        if fit is None:
+            return WindowEstimate(probability=None, window=None, spread_ms=spread_ms)
+        low, high = fit.confidence_mv(0.9)
+        return WindowEstimate(
+            probability=None,
+            window=self._window(person, fit),
+            spread_ms=spread_ms,
+            grid_ms=fit.grid_ms,
+            profile_quantiles_mv=np.stack((low, fit.mean_mv, high)) + floor_mv,
+        )
+
+    def _window(self, person: int, fit: FittedCurve) -> Window | None:
+        if self.model.window == "fit":
+            return Window.from_mask(fit.grid_ms, curve_masks(fit.mean_mv[None], float(self.floors_mv[person]))[0])
+        ends_ms = self.support_ms[person]
+        if self.model.window == "expectation":
+            ends_ms = self.expectation_ms[person] + self.model.half_width_ms * np.array((-1.0, 1.0))
+        start_ms, end_ms = (self.space.snap(end_ms) for end_ms in ends_ms.tolist())
+        return Window(start_ms, end_ms)

@@ -42,8 +42,9 @@ class SweepModel:
         step_ms: from one ISI to the next [ms].
         trials_per_isi: trials at each.
         discarded: the first trials at each ISI, which a startle may have enlarged, are left out.
-        rule: the window is the run of ISIs about the largest mean whose means exceed the `"baseline"` (the text's) or
-            the 0.135 `"share"` of the largest excess (the other methods').
+        rule: the window is the run of ISIs about the largest mean whose means exceed the `"baseline"` or the 0.135
+            `"share"` of the largest excess (the other methods'). The text's baseline is TMS alone at 100 % of the
+            resting motor threshold (4.2.1); here it is the TMS alone that was told, whatever its intensity.
         neighbours: means are averaged over so many ISIs (an odd number) before the rule judges them,
         evidence_se: and a window is reported where the largest exceeds the baseline by so many of its standard errors:
             both stand for the eye of the experimenter, who expected one distribution.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -15,7 +15,9 @@ from isiw.design import DesignSpace
 from isiw.models.dissertation.curves import FittedCurve
 from isiw.types import FloatArray
 
-__all__ = ["NonlinearRegression", "gaussians_mv", "gradient_mv"]
+__all__ = ["NonlinearRegression", "Start", "gaussians_mv", "gradient_mv"]
+
+Start = Literal["even", "unequal", "random"]
 
 LEAST_AMPLITUDE_MV = 1e-3
 """The amplitude to start from where it is not known and all MEPs are at the floor."""
@@ -90,9 +92,12 @@ class NonlinearRegression:
             largest MEP so far, where nothing is known.
         max_evaluations: evaluations after which the search gives up.
         samples: how many curves are drawn from the parameters' asymptotic distribution.
+        start: where the search starts: `"even"` as above; `"unequal"`: the second Gaussian with a tenth of the first's
+            amplitude, which stays at mid-range; `"random"`: anywhere in the range and with any share of the amplitude,
+            drawn anew for each fit.
 
     Raises:
-        InvalidValueError: an invalid number.
+        InvalidValueError: an invalid number, or an unknown start.
     """
 
     peaks: int = 1
@@ -102,6 +107,7 @@ class NonlinearRegression:
     amplitude_mv: float = 0.05
     max_evaluations: int = 100
     samples: int = 64
+    start: Start = "even"
 
     def __post_init__(self) -> None:
         check_choice(self, "peaks", (1, 2))
@@ -111,12 +117,14 @@ class NonlinearRegression:
         check_numbers(self, "amplitude_mv", least=0)
         check_wholes(self, "max_evaluations", least=1)
         check_wholes(self, "samples", least=2)
+        check_choice(self, "start", get_args(Start))
 
     def fit(
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
     ) -> FittedCurve:
         """Fit the Gaussians; see `RegressionMethod`."""
-        beliefs = self._beliefs(space, self.amplitude_mv or max(float(excess_mv.max(initial=0.0)), LEAST_AMPLITUDE_MV))
+        amplitude_mv = self.amplitude_mv or max(float(excess_mv.max(initial=0.0)), LEAST_AMPLITUDE_MV)
+        beliefs = self._beliefs(space, amplitude_mv, rng)
         estimate = self._least_squares(isi_ms, excess_mv, beliefs)
         values, vectors = np.linalg.eigh(estimate.covariance)
         root = vectors * np.sqrt(values.clip(0.0))
@@ -133,17 +141,32 @@ class NonlinearRegression:
             amplitudes_mv=tuple(sorted(estimate.parameters[::3].tolist(), reverse=True)),
         )
 
-    def _beliefs(self, space: DesignSpace, amplitude_mv: float) -> _Beliefs:
+    def _beliefs(self, space: DesignSpace, amplitude_mv: float, rng: np.random.Generator) -> _Beliefs:
         """Start values, SDs and bounds of the parameters."""
-        range_ms, middle_ms = space.high_ms - space.low_ms, 0.5 * (space.low_ms + space.high_ms)
-        sd_ms = self.width_ms / 4.0
-        apart_ms = 0.0 if self.peaks == 1 else self.width_ms / 4.0
-        apart_ms = min(apart_ms, 0.25 * range_ms)  # both inside a range that is narrower than a window
-        start = [[amplitude_mv, middle_ms + side * apart_ms, sd_ms] for side in (-1, 1)[: self.peaks]]
-        sd = [amplitude_mv, range_ms / math.sqrt(12.0), 0.5 * sd_ms]
+        sd = [amplitude_mv, (space.high_ms - space.low_ms) / math.sqrt(12.0), self.width_ms / 8.0]
         low = [0.0, space.low_ms, 0.25 * self.min_width_ms]
         high = [math.inf, space.high_ms, 0.25 * self.max_width_ms]
-        return _Beliefs(np.ravel(start), *(np.tile(values, self.peaks) for values in (sd, low, high)))
+        start = np.ravel(self.starts(space, amplitude_mv, rng))
+        return _Beliefs(start, *(np.tile(values, self.peaks) for values in (sd, low, high)))
+
+    def starts(self, space: DesignSpace, amplitude_mv: float, rng: np.random.Generator) -> list[list[float]]:
+        """Amplitude [mV], mean and SD [ms] from which the search for each Gaussian starts.
+
+        Args:
+            space: the design space.
+            amplitude_mv: what is known of the amplitude [mV].
+            rng: what a random start is drawn from.
+        """
+        middle_ms, sd_ms = 0.5 * (space.low_ms + space.high_ms), self.width_ms / 4.0
+        apart_ms = min(sd_ms, 0.25 * (space.high_ms - space.low_ms))  # inside a range that is narrower than a window
+        if self.start == "random":
+            draws = rng.uniform((0.0, space.low_ms), (amplitude_mv, space.high_ms), (self.peaks, 2)).tolist()
+            return [[share_mv, mean_ms, sd_ms] for share_mv, mean_ms in draws]
+        if self.peaks == 1:
+            return [[amplitude_mv, middle_ms, sd_ms]]
+        if self.start == "unequal":
+            return [[amplitude_mv, middle_ms, sd_ms], [0.1 * amplitude_mv, middle_ms + apart_ms, sd_ms]]
+        return [[amplitude_mv, middle_ms + side * apart_ms, sd_ms] for side in (-1, 1)]
 
     def _least_squares(self, isi_ms: FloatArray, excess_mv: FloatArray, beliefs: _Beliefs) -> _Estimate:
         """The best parameters and their asymptotic covariance; prior knowledge where the trials do not give them."""

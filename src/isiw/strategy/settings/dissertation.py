@@ -65,8 +65,9 @@ class OwnPlan:
         return ()
 
 
-ITERATIONS = 99
-"""After so many stimuli beyond the initial ones a regression gives up (4.3)."""
+ITERATIONS = 98
+"""After so many stimuli beyond the initial ones a regression gives up: the first of its 99 iterations fits the initial
+ones alone (4.3)."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Settling:
         stop_last: how many values,
         stop_edges: and of which edges: "both" (the text), or "either" (the pseudo-code).
         max_trials: stop after this many stimuli, the initial ones among them; mistrials count, control trials do not.
-            By default 99 more than the initial ones (4.3).
+            By default 98 more than the initial ones, which are 99 iterations (4.3).
 
     Raises:
         InvalidValueError: an invalid number, or an unknown value of the edges.

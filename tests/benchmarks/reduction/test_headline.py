@@ -1,4 +1,4 @@
-"""Orderings, distances and duels: on numbers made by hand."""
+"""Distances and duels: on numbers made by hand."""
 
 from __future__ import annotations
 
@@ -8,50 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from benchmarks.reduction.comparison import WORDS
-from benchmarks.reduction.headline import duel, equal_f1, equal_trials
-from benchmarks.reduction.look import NAMES
-from benchmarks.reduction.orderings import claims, outside
+from benchmarks.reduction.headline import duel, equal_f1, equal_trials, judged
 from benchmarks.reduction.reading_table import distance
 
 from benchmarks.reduction import dissertation as text
-
-
-def dissertations_own() -> pd.DataFrame:
-    """A comparison with the dissertation's numbers as ours."""
-    rows: list[dict[str, object]] = []
-    for word in WORDS.values():
-        for method, trials in text.TRIALS[word].items():
-            scores = {"F1: true": text.F1[word][method], "r: measured": text.CORRELATION.get(method, 1.0)}
-            names = {"method": NAMES[method], "accelerometer": word}
-            rows.append({**names, "trials": float(trials), "text: trials": float(trials), **scores})
-    return pd.DataFrame(rows)
-
-
-def test_the_orderings_are_those_of_the_dissertations_own_numbers() -> None:
-    broken = {claim for claim, (holds, _) in claims(dissertations_own()).items() if not holds}
-    # The text says "≫" of 272 against 199.
-    assert broken == {"trials: conventional ≫ PF ≫ SVMR"}
-
-
-def test_an_ordering_that_is_turned_round_fails() -> None:
-    table = dissertations_own()
-    table.loc[(table["method"] == "GPR") & (table["accelerometer"] == "without"), "r: measured"] = 0.5
-    assert not claims(table)["correlation: GPR > SVMR, PF > NR"][0]
-
-
-def test_trials_beyond_thirty_percent_are_named_with_the_readings_that_bring_them_within() -> None:
-    table = dissertations_own()
-    table.loc[table["method"] == "GPR", "trials"] = 30.0
-    readings = pd.DataFrame(
-        {
-            "reading": ["dissertation", "base", "six"],
-            "n NR": [16, 16, 16],
-            "n GPR": [18.0, 30.0, 20.0],
-            "n SVMR": 33,
-            "n PF": 199,
-        }
-    )
-    assert outside(table, readings) == ["GPR: 30.0 trials against 18; within 30 % under: six."]
 
 
 def test_the_dissertations_own_figures_have_no_distance_and_thirty_percent_more_trials_a_part_of_one() -> None:
@@ -73,7 +33,7 @@ def test_a_duel_compares_at_each_sessions_own_trials_and_finds_where_it_stays_ah
         {
             "method": ["gpr", "gpr", "default", "default"],
             "trials": [2, 3, 80, 80],
-            "f1, true": [0.3, 0.5, 0.9, 0.9],
+            "f1": [0.3, 0.5, 0.9, 0.9],
             "f1_by_trial": [[0.0] * 4, [0.0] * 4, *curves],
         }
     )
@@ -92,3 +52,14 @@ def test_curves_are_read_both_ways() -> None:
     # The mean touches .7 at the third trial, and leaves it again.
     assert [reached[level] for level in ("0.5", "0.6", "0.7", "0.9")] == ["3", "3", "5", "5"]
     assert equal_f1(rows.assign(f1_by_trial=pd.Series([[0.1], [0.1]]))).iloc[0]["0.5"] == "–"
+
+
+def test_people_with_the_texts_windows_are_judged_by_the_measured_window_and_others_by_the_true_one() -> None:
+    scores = {"f1, measured": 0.3, "f1_measured_by_trial": [0.3], "f1 before, measured": 0.1}
+    true = {"f1, true": 0.8, "f1_by_trial": [0.8], "f1 before, true": 0.6}
+    sessions = [{"cohort": cohort, **scores, **true} for cohort in ("kim11-measured", "gaussian")]
+    without_a_window = sessions[0] | {"f1, measured": math.nan, "f1_measured_by_trial": [math.nan]}
+    found = judged(pd.DataFrame([*sessions, without_a_window]))
+    assert found["f1"].tolist() == [0.3, 0.8]
+    assert found["f1_by_trial"].tolist() == [[0.3], [0.8]]
+    assert found["f1 before"].tolist() == [0.1, 0.6]

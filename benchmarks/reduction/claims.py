@@ -1,0 +1,124 @@
+"""A claim of the text beside what came out here, with a verdict, under the base and under every reading."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Final, Generic, NamedTuple, TypeVar
+
+__all__ = ["SHARE", "UNIT", "Claim", "Found", "Statement", "about", "number", "share", "told"]
+
+SHARE: Final = 0.3
+"""Numbers of trials are reproduced within 30 %,"""
+
+UNIT: Final = 0.1
+"""and F1, correlation and convergence within 0.1."""
+
+SHOWN: Final = 3
+"""Readings that a verdict names."""
+
+_Context = TypeVar("_Context")
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim with its verdict, in words.
+
+    Args:
+        where: figure, table or section of the text.
+        what: what is claimed, as a sentence.
+        theirs: the text's number.
+        ours: ours, on the first context.
+        difference: between the two.
+        verdict: "reproduced", "under reading …", or "not, because …".
+    """
+
+    where: str
+    what: str
+    theirs: str
+    ours: str
+    difference: str
+    verdict: str
+
+    def record(self) -> dict[str, str]:
+        """As a record of strings."""
+        return asdict(self)
+
+
+class Found(NamedTuple):
+    """What one context shows of a claim: whether it holds, our words, how far off, and the difference in words."""
+
+    holds: bool
+    ours: str
+    off: float = math.nan
+    difference: str = "–"
+
+
+@dataclass(frozen=True)
+class Statement(Generic[_Context]):
+    """A claim that is to be judged.
+
+    Args:
+        where: as in `Claim`.
+        what: as in `Claim`.
+        theirs: as in `Claim`.
+        look: what a context shows of it.
+        reason: what stands behind "not, because"; by default that no reading brings it, and which comes closest.
+    """
+
+    where: str
+    what: str
+    theirs: str
+    look: Callable[[_Context], Found]
+    reason: str = ""
+
+
+def told(statement: Statement[_Context], contexts: Mapping[str, _Context]) -> Claim:
+    """A statement with its verdict.
+
+    Args:
+        statement: the statement.
+        contexts: results by the name of a reading; the first is the base.
+    """
+    found = {name: statement.look(context) for name, context in contexts.items()}
+    base = next(iter(found.values()))
+    verdict = _verdict(statement, found)
+    return Claim(statement.where, statement.what, statement.theirs, base.ours, base.difference, verdict)
+
+
+def _verdict(statement: Statement[_Context], found: Mapping[str, Found]) -> str:
+    names = [name for name, one in found.items() if one.holds]
+    if next(iter(found)) in names:
+        return "reproduced"
+    if names:
+        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        return f"under reading {'; '.join(names[:SHOWN])}{more}"
+    return f"not, because {statement.reason or _closest(found)}"
+
+
+def _closest(found: Mapping[str, Found]) -> str:
+    if len(found) == 1:
+        return "it comes out otherwise, and no reading was tried for it"
+    near = {name: abs(one.off) for name, one in found.items() if not math.isnan(one.off)}
+    if not near:
+        return f"it holds under none of {len(found)} readings"
+    name = min(near, key=near.__getitem__)
+    return f"none of {len(found)} readings comes near enough; the closest, {name}, has {found[name].ours}"
+
+
+def share(ours: float, theirs: float) -> Found:
+    """Whether a number is within 30 % of the text's."""
+    off = ours / theirs - 1.0
+    return Found(abs(off) <= SHARE + 1e-9, f"{ours:.1f}", off, f"{ours - theirs:+.1f} ({100 * off:+.0f} %)")
+
+
+def number(ours: float, theirs: float, within: float = UNIT) -> Found:
+    """Whether a number is as close to the text's as said."""
+    off = ours - theirs
+    return Found(abs(off) <= within + 1e-9, f"{ours:.2f}", off, f"{off:+.2f}")
+
+
+def about(holds: object, ours: str) -> Found:
+    """Whether something holds, with our numbers in words."""
+    return Found(bool(holds), ours)

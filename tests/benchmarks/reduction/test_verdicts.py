@@ -1,0 +1,81 @@
+"""The report's claims as a whole: on made-up sessions, each has one of three verdicts, and the opening counts them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from benchmarks.reduction.claims import Claim
+from benchmarks.reduction.parallel import frame
+from benchmarks.reduction.readings import PEOPLE
+from benchmarks.reduction.sessions import Session
+from benchmarks.reduction.size import QUICK
+
+from benchmarks.reduction import comparison, gaussians, initial, online, particles, pf_readings, reading_table, verdicts
+
+pytestmark = pytest.mark.slow  # forty comparisons are summed up: seconds
+
+SIZE = replace(QUICK, readings=1, sweep=2)
+PARTS = (comparison, reading_table, pf_readings, initial, particles, gaussians)
+SCORES = (
+    *("f1, true", "f1, measured", "f1, measured, .135", "f1, measured, 100 % RMT", "f1, measured, 90 % RMT"),
+    *("correlation, measured", "correlation, true", "f1, of .135"),
+)
+COUNTS = ("trials", "whole", "near", "inside measured", "inside measured, 90 %", "inside measured, .135", "inside true")
+FLAGS = ("converged", "shows a window", "shows a window, 90 %", "normal", "normal throughout")
+
+
+def made_up(_session: Session, rng: np.random.Generator) -> dict[str, Any]:
+    """What a session might have come to."""
+    scores = dict(zip(SCORES, rng.uniform(0.2, 0.9, len(SCORES)).tolist(), strict=True))
+    counts = dict(zip(COUNTS, rng.integers(10, 500, len(COUNTS)).tolist(), strict=True))
+    spread = {"spread_ms": rng.uniform(10, 140, 10).tolist(), "amplitudes_mv": (0.05, 0.01)}
+    return scores | counts | dict.fromkeys(FLAGS, True) | spread
+
+
+def on_waveforms(rng: np.random.Generator) -> list[dict[str, Any]]:
+    grid_ms = np.arange(321.0)
+    usual = {"mistrials": 0, "f1": 0.5, "told": [(1.0, 0.1)], "grid_ms": grid_ms}
+    return [
+        {"person": one.person, "session": 0, "method": one.method, "trials": 300 if one.method == "incremental" else 20}
+        | usual
+        | {"profile_mv": rng.random(321), "true_mv": rng.random(321)}
+        for one in online.plan(1, 3)
+    ]
+
+
+@pytest.fixture(scope="module")
+def rows() -> dict[Any, pd.DataFrame]:
+    rng = np.random.default_rng(1)
+    plans = {part: part.sessions(SIZE, 3) for part in PARTS}
+    return {part: frame(plan, {session: made_up(session, rng) for session in plan}) for part, plan in plans.items()}
+
+
+@pytest.fixture(scope="module")
+def claims(rows: dict[Any, pd.DataFrame]) -> list[Claim]:
+    return verdicts.all_claims(rows, on_waveforms(np.random.default_rng(2)))
+
+
+def test_no_claim_is_without_a_verdict(claims: list[Claim]) -> None:
+    assert {verdicts.kind(claim) for claim in claims} <= {"reproduced", "under …", "not …"}
+    assert all(isinstance(value, str) and value for claim in claims for value in claim.record().values())
+    assert len({(claim.where, claim.what) for claim in claims}) == len(claims)
+
+
+def test_every_figure_and_table_of_the_methods_is_judged(claims: list[Claim]) -> None:
+    figures = {f"Fig. 4.{n}" for n in (14, 15, 16, 17, 23, 24, 25, 26, 28, 30, 31, 32, 33, 34)}
+    assert figures | {"Table 4.1", "Table 5.3", "4.2.1", "4.4.2", "4.4.8"} == {claim.where for claim in claims}
+
+
+def test_the_opening_says_what_comes_out_what_not_and_what_there_is_before_any_trial(
+    rows: dict[Any, pd.DataFrame], claims: list[Claim]
+) -> None:
+    zero = pd.DataFrame([{"cohort": PEOPLE, "default": 0.41, "one fixed window": 0.52}])
+    said = verdicts.opening(claims, rows[comparison], zero)
+    reproduced = sum(claim.verdict == "reproduced" for claim in claims)
+    assert f"{reproduced} of the text's {len(claims)} claims come out as printed" in said
+    assert "the text has PF last, and here it is" in said
+    assert f"0.41 and 0.52 on `{PEOPLE}`" in said
