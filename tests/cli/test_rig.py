@@ -44,7 +44,7 @@ def test_from_nothing_to_a_session_and_on(isiw: Command, tmp_path: Path) -> None
     changed(tmp_path / "lab" / "session.toml", "max_pulses = 100", "max_pulses = 3")
     ran = isiw("run", "lab/session.toml", "--log", "s.mcap")
     assert ran.exit_code == 0, ran.output
-    assert "P(window)" in ran.output
+    assert "P: probability of a window" in ran.output
     assert "This simulated person" not in ran.output
     assert (tmp_path / "s.png").exists()
     without = isiw("resume", "s.mcap")
