@@ -6,30 +6,24 @@ pytest's.
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Page, ViewportSize, sync_playwright
+from playwright.sync_api import Page, ViewportSize
 
+from browsing import IN_CHROMIUM, broken_rules, chromium, screenshots
 from isiw.log.reader import SessionRecord
 from isiw.priors import Difference
 from isiw.report.compared import save_comparison
 from isiw.report.page import save_report
 from report.sessions import HOSTILE, tapped
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 SIZE: ViewportSize = {"width": 1000, "height": 900}
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page in"),
-]
+pytestmark = IN_CHROMIUM
 
 
 @dataclass
@@ -59,17 +53,13 @@ def path(record: SessionRecord) -> Path:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"], timeout=60_000)
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = Path(os.environ.get("ISIW_SCREENSHOTS") or tmp_path_factory.mktemp("screenshots"))
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
+    return screenshots(tmp_path_factory)
 
 
 @pytest.fixture(scope="module")
@@ -265,12 +255,6 @@ def test_without_javascript_everything_but_the_moving_part_is_read(browser: Any,
     assert not page.locator("#explore").is_visible()
     assert "With JavaScript this page also shows" in page.locator("body").inner_text()
     page.context.close()
-
-
-def broken_rules(page: Page) -> list[str]:
-    """The rules of axe-core that a page breaks, and where."""
-    found = Axe().run(page).response["violations"]
-    return [f"{rule['id']}: {[node['target'] for node in rule['nodes']][:3]}" for rule in found]
 
 
 def contrast(one: str, other: str) -> float:

@@ -56,7 +56,7 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
     Raises:
         ConfigError: plotly or jinja2 is not installed.
     """
-    scripts = [library("plotly.offline").get_plotlyjs(), asset("page.js")]
+    scripts = [library("plotly.offline").get_plotlyjs(), asset("draw.js"), asset("page.js")]
     return rendered("page.html", scripts, pictures=_pictures(record, truth), **_contents(record))
 
 

@@ -3,7 +3,6 @@
 (() => {
   const token = location.hash.slice(1);
   const element = (id) => document.getElementById(id);
-  const options = { displayModeBar: false, responsive: true }; // plotly's own buttons would upload what is drawn
   const SILENT_MS = 8000; // the server says something every two seconds
   const AGAIN_MS = 1000;
   let shown = null;
@@ -64,137 +63,6 @@
     element("facts").replaceChildren(...shown.facts.map(row));
   }
 
-  // ---- pictures
-
-  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-  const axis = (title, more = {}) => ({
-    title: { text: title, font: { size: 13 } }, gridcolor: colour("line"), linecolor: colour("line"),
-    zeroline: false, automargin: true, ...more,
-  });
-  const layout = (more) => ({
-    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: colour("ink"), size: 12 },
-    hovermode: "closest", ...more,
-  });
-  const markup = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
-  const line = (x, y, name, style, more = {}) => ({ x, y, name, mode: "lines", line: style, hoverinfo: "skip", ...more });
-
-  function profile(belief) {
-    if (!belief || !belief.isiMs.length) return [];
-    const none = { width: 0, color: colour("blue") };
-    return [
-      line(belief.isiMs, belief.low, "", none, { showlegend: false }),
-      line(belief.isiMs, belief.high, "90 % band of the expectation", none, { fill: "tonexty", fillcolor: "rgba(60,150,220,0.22)" }),
-      line(belief.isiMs, belief.profile, "expected MEP", { width: 2, color: colour("blue") }),
-    ];
-  }
-
-  const symbols = { counts: ["trial", "circle"], excluded: ["excluded", "circle-open"], mistrial: ["mistrial", "x-thin-open"] };
-
-  function points(kind, lowestUv) {
-    const [name, symbol] = symbols[kind];
-    const paint = colour(kind === "mistrial" ? "red" : "ink");
-    const placed = shown.drawn.trials.map((trial) => ({
-      ...trial, x: trial.isiMs ?? (kind === "mistrial" ? trial.askedMs : null),
-      y: kind === "mistrial" ? lowestUv : trial.mepUv === null ? null : Math.max(trial.mepUv, lowestUv),
-    })).filter((trial) => trial.kind === kind && trial.x !== null && trial.y !== null);
-    const last = shown.drawn.trials.at(-1).number;
-    return {
-      x: placed.map((trial) => trial.x), y: placed.map((trial) => trial.y), customdata: placed.map((trial) => trial.number),
-      text: placed.map((trial) => trial.outcome), name, mode: "markers", type: "scatter",
-      marker: { symbol, color: paint, size: placed.map((trial) => (trial.number === last ? 14 : 8)), line: { width: 2, color: paint } },
-      hovertemplate: "trial %{customdata}<br>%{x:.1f} ms, %{text}<extra></extra>",
-    };
-  }
-
-  function marks(belief) {
-    if (!belief) return [];
-    const edge = (value) => ({ low: shown.drawn.range[0], high: shown.drawn.range[1] })[value] ?? value;
-    const window = belief.window.map(([x0, x1]) => ({
-      type: "rect", x0, x1, yref: "paper", y0: 0, y1: 1, fillcolor: colour("blue"), opacity: 0.12, line: { width: 0 },
-    }));
-    const edges = [belief.start, belief.end].filter((pair) => belief.window.length && !pair.includes(null)).map((pair) => ({
-      type: "line", x0: edge(pair[0]), x1: edge(pair[1]), yref: "paper", y0: 1, y1: 1, line: { width: 7, color: colour("blue") },
-    }));
-    const next = belief.nextMs === null ? [] : [{
-      type: "line", x0: belief.nextMs, x1: belief.nextMs, yref: "paper", y0: 0, y1: 1,
-      line: { width: 1.5, dash: "dash", color: colour("orange") },
-    }];
-    return [...window, ...edges, ...next];
-  }
-
-  function legend(belief) {
-    const key = (name, style) => line([null], [null], name, style);
-    return [
-      ...(belief && belief.window.length ? [
-        key("window", { width: 10, color: "rgba(60,150,220,0.3)" }),
-        key("90 % interval of its edges", { width: 6, color: colour("blue") }),
-      ] : []),
-      ...(belief && belief.nextMs !== null ? [key("asked next", { width: 1.5, dash: "dash", color: colour("orange") })] : []),
-    ];
-  }
-
-  function drawBelief(belief) {
-    const { trials, range, reference } = shown.drawn;
-    if (!trials.length && !belief) return;
-    const sizesUv = [...trials.map((trial) => trial.mepUv), ...(belief ? [...belief.low, ...belief.high] : [])]
-      .filter((size) => size !== null && size >= 1);
-    const lowestUv = sizesUv.reduce((least, size) => Math.min(least, size), 10) * 0.8;
-    const largestUv = sizesUv.reduce((most, size) => Math.max(most, size), 100) * 1.3;
-    const after = { impact: "after the impact", valve: "after the valve command" }[reference];
-    const traces = trials.length ? Object.keys(symbols).map((kind) => points(kind, lowestUv)) : [];
-    Plotly.react("belief", [...profile(belief), ...traces, ...legend(belief)], layout({
-      xaxis: axis(`ISI ${after} [ms]`, { range }),
-      yaxis: axis("MEP [µV]", {
-        type: "log", range: [Math.log10(lowestUv * 0.9), Math.log10(largestUv)],
-        tickvals: [1, 10, 100, 1000, 10000].flatMap((ten) => [ten, 2 * ten, 5 * ten]),
-      }),
-      shapes: marks(belief), uirevision: "belief", margin: { l: 60, r: 12, t: 40, b: 44 },
-      legend: { orientation: "h", y: 1.04, yanchor: "bottom", traceorder: "normal" },
-    }), options);
-  }
-
-  function sweepMarks(trial, k) {
-    const place = { xref: `x${k || ""}`, yref: `y${k || ""} domain`, y0: 0, y1: 1 };
-    const at = { tms: trial.tmsMs, hit: trial.hitMs, valve: trial.valveMs };
-    const lines = Object.entries(at).filter(([, x]) => x !== null).map(([name, x]) => ({
-      type: "line", x0: x, x1: x, ...place,
-      line: { width: 1.5, dash: name === "tms" ? "solid" : "dot", color: colour(name === "tms" ? "faint" : "orange") },
-    }));
-    if (trial.tmsMs === null) return lines;
-    const [x0, x1] = shown.drawn.mepWindow.map((edge) => trial.tmsMs + edge);
-    return [...lines, { type: "rect", x0, x1, ...place, fillcolor: colour("green"), opacity: 0.18, line: { width: 0 }, layer: "below" }];
-  }
-
-  function drawSweep(trial) {
-    const figure = element("sweep");
-    said("sweep-title", trial ? `Sweep of trial ${trial.number}` : "Last sweep");
-    const waves = trial ? trial.sweep : [];
-    if (!waves.length) {
-      Plotly.purge(figure);
-      figure.style.height = "auto";
-      figure.textContent = trial ? "There are no waveforms of this trial." : "There was no trial yet.";
-      return;
-    }
-    if (!figure.classList.contains("js-plotly-plot")) figure.textContent = "";
-    figure.style.height = `${60 + 120 * (waves.length + 1)}px`;
-    const share = 1 / (waves.length + 1); // the first, the EMG near the pulse, is twice as high
-    const axes = {};
-    const traces = waves.map((wave, k) => {
-      const index = k ? k + 1 : "";
-      const x = wave.values.map((_, n) => wave.t0 + n * wave.step);
-      const top = k ? 1 - (k + 1) * share : 1;
-      axes[`xaxis${index}`] = axis(k === waves.length - 1 ? "time of the sweep [ms]" : "", { range: [x[0], x[x.length - 1]], anchor: `y${index}` });
-      axes[`yaxis${index}`] = axis(`${markup(wave.name)}<br>[${markup(wave.unit)}]`,
-        { domain: [top - (k ? 0.7 : 1.7) * share, top], anchor: `x${index}` });
-      return {
-        x, y: wave.values, xaxis: `x${index}`, yaxis: `y${index}`, mode: "lines", showlegend: false,
-        line: { width: 1, color: colour("ink") }, hovertemplate: "%{x:.1f} ms: %{y:.3g}<extra></extra>",
-      };
-    });
-    const shapes = waves.flatMap((_, k) => sweepMarks(trial, k ? k + 1 : ""));
-    Plotly.react(figure, traces, layout({ ...axes, shapes, margin: { l: 90, r: 12, t: 8, b: 44 } }), options);
-  }
-
   // ---- all of it
 
   function showButtons(last) {
@@ -224,7 +92,7 @@
     tellTables();
     showButtons(last);
     element("now").hidden = false;
-    later(draw);
+    later(picture);
   }
 
   // Words are painted first. Where news come faster than pictures, only the latest are drawn.
@@ -234,12 +102,14 @@
     waiting = setTimeout(task);
   }
 
-  function draw() {
-    drawBelief(Object.values(shown.drawn.beliefs)[0]);
+  function picture() {
     const last = shown.drawn.trials.at(-1);
+    const [belief] = Object.values(shown.drawn.beliefs);
+    if (last || belief) draw.belief("belief", shown.drawn, belief, last ? last.number : -1);
     if (swept !== (last ? last.number : -1)) later(() => {
       swept = last ? last.number : -1;
-      drawSweep(last);
+      said("sweep-title", last ? `Sweep of trial ${last.number}` : "Last sweep");
+      draw.sweep("sweep", shown.drawn, last, last ? "There are no waveforms of this trial." : "There was no trial yet.");
     });
   }
 

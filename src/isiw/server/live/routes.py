@@ -32,6 +32,7 @@ FILES: Final = {
     "/": ("text/html", lambda: _asset("isiw.server", "live.html")),
     "/page.css": ("text/css", lambda: _asset("isiw.report", "page.css")),
     "/live.css": ("text/css", lambda: _asset("isiw.server", "live.css")),
+    "/draw.js": ("text/javascript", lambda: _asset("isiw.report", "draw.js")),
     "/live.js": ("text/javascript", lambda: _asset("isiw.server", "live.js")),
     "/plotly.js": ("text/javascript", get_plotlyjs),
 }

@@ -1,0 +1,179 @@
+"use strict";
+// What the pages of a session draw with plotly: a belief with the trials, and a sweep. Sessions are as `isiw.report.drawn` gives them.
+const draw = (() => {
+  const names = { counts: "trial", excluded: "excluded", mistrial: "mistrial" };
+  const after = { impact: "after the impact", valve: "after the valve command" };
+  const options = { displayModeBar: false, responsive: true }; // plotly's own buttons would upload what is drawn
+  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  const axis = (title, more = {}) => ({
+    title: { text: title, font: { size: 13 } }, gridcolor: colour("line"), linecolor: colour("line"),
+    zeroline: false, automargin: true, ...more,
+  });
+  const layout = (more) => ({
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: colour("ink"), size: 12 },
+    margin: { l: 60, r: 12, t: 12, b: 44 }, hovermode: "closest", ...more,
+  });
+  const markup = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
+
+  // ---- the belief after a trial
+
+  const ticksUv = [1, 10, 100, 1000, 10000].flatMap((ten) => [ten, 2 * ten, 5 * ten]);
+
+  // The lowest and the highest amplitude that pictures of a session have room for.
+  function limitsUv(session) {
+    const sizes = [...session.trials.map((trial) => trial.mepUv), ...Object.values(session.beliefs)
+      .flatMap((belief) => [...belief.low, ...belief.high, ...belief.predictedLow, ...belief.predictedHigh])];
+    const positive = sizes.filter((size) => size !== null && size >= 1);
+    const lowest = positive.reduce((least, size) => Math.min(least, size), 10) * 0.8;
+    return [lowest, positive.reduce((most, size) => Math.max(most, size), 100) * 1.3];
+  }
+
+  const line = (x, y, name, style, more = {}) => ({ x, y, name, mode: "lines", line: style, hoverinfo: "skip", ...more });
+
+  function profileTraces(belief) {
+    if (!belief || !belief.isiMs.length) return [];
+    const none = { width: 0, color: colour("blue") };
+    const band = (low, high, name, fillcolor) => (low.length ? [
+      line(belief.isiMs, low, "", none, { showlegend: false }),
+      line(belief.isiMs, high, name, none, { fill: "tonexty", fillcolor }),
+    ] : []);
+    return [
+      ...band(belief.predictedLow, belief.predictedHigh, "prediction: 90 % of trials lie here", "rgba(130,135,140,0.2)"),
+      ...band(belief.low, belief.high, "90 % band of the expected MEP", "rgba(60,150,220,0.3)"),
+      line(belief.isiMs, belief.profile, "expected MEP", { width: 2, color: colour("blue") }),
+    ];
+  }
+
+  // A mistrial is drawn where it happened: at the lower edge where no MEP was measured, at what was asked where nothing came.
+  const placeMs = (trial) => (trial.kind === "mistrial" ? trial.isiMs ?? trial.askedMs : trial.isiMs);
+  const measuredUv = (trial, lowestUv) => (trial.mepUv === null ? null : Math.max(trial.mepUv, lowestUv));
+  const heightUv = (trial, lowestUv) => measuredUv(trial, lowestUv) ?? (trial.kind === "mistrial" ? lowestUv : null);
+
+  function trialTrace(trials, kind, number, lowestUv) {
+    const symbol = { counts: "circle", excluded: "circle-open", mistrial: "x-thin-open" }[kind];
+    const shown = trials.filter((trial) => trial.kind === kind && placeMs(trial) !== null && heightUv(trial, lowestUv) !== null);
+    return {
+      x: shown.map(placeMs), y: shown.map((trial) => heightUv(trial, lowestUv)), text: shown.map((trial) => trial.outcome),
+      customdata: shown.map((trial) => trial.number), name: names[kind], mode: "markers", type: "scatter",
+      marker: {
+        symbol, size: shown.map((trial) => (trial.number === number ? 14 : 8)),
+        color: colour(kind === "mistrial" ? "red" : "ink"),
+        opacity: shown.map((trial) => (trial.number > number ? 0.18 : 1)),
+        line: { width: kind === "mistrial" ? 2 : 1, color: colour(kind === "mistrial" ? "red" : "ink") },
+      },
+      hovertemplate: "trial %{customdata}<br>%{x:.1f} ms, %{text}<extra></extra>",
+    };
+  }
+
+  // What the acquisition function said of every ISI, as a strip below the belief.
+  const isScored = (belief) => Boolean(belief && belief.scores.length);
+  function scoreTraces(belief) {
+    if (!isScored(belief)) return [];
+    return [line(belief.scoredMs, belief.scores, "score of the acquisition function", { width: 1.5, color: colour("ink") },
+      { yaxis: "y2", hoverinfo: "x+y" })];
+  }
+
+  // The 90 % intervals of the edges that are known, each with its colour.
+  const edgeHeights = { start: 1.02, end: 1 };
+  const intervals = (belief) => [["start", "green", belief.start], ["end", "orange", belief.end]]
+    .filter(([, , pair]) => belief.window.length && !pair.includes(null));
+
+  function beliefShapes(belief, range) {
+    if (!belief) return [];
+    const edge = (value) => (value === "low" ? range[0] : value === "high" ? range[1] : value);
+    const window = belief.window.map(([x0, x1]) => ({
+      type: "rect", x0, x1, yref: "paper", y0: 0, y1: 1, fillcolor: colour("blue"), opacity: 0.12, line: { width: 0 },
+    }));
+    const bars = intervals(belief).map(([name, hue, [low, high]]) => ({
+      type: "line", x0: edge(low), x1: edge(high), yref: "paper", y0: edgeHeights[name], y1: edgeHeights[name],
+      line: { width: 6, color: colour(hue) },
+    }));
+    const next = belief.nextMs === null ? [] : [{
+      type: "line", x0: belief.nextMs, x1: belief.nextMs, yref: "paper", y0: 0, y1: 1,
+      line: { width: 1.5, dash: "dash", color: colour("ink") },
+    }];
+    return [...window, ...bars, ...next];
+  }
+
+  function legend(belief) {
+    const key = (name, style) => line([null], [null], name, style);
+    const found = belief && belief.window.length ? [
+      key("window", { width: 10, color: "rgba(60,150,220,0.3)" }),
+      ...intervals(belief).map(([name, hue]) => key(`90 % interval of its ${name}`, { width: 6, color: colour(hue) })),
+    ] : [];
+    const next = belief && belief.nextMs !== null
+      ? [key("asked next", { width: 1.5, dash: "dash", color: colour("ink") })] : [];
+    return [...found, ...next];
+  }
+
+  // Draws a belief with the trials, in an element with this id; the trial with this number stands out, later ones are pale.
+  function belief(id, session, believed, number) {
+    const [lowestUv, largestUv] = limitsUv(session);
+    const points = session.trials.length
+      ? Object.keys(names).map((kind) => trialTrace(session.trials, kind, number, lowestUv)) : [];
+    const traces = [...profileTraces(believed), ...points, ...scoreTraces(believed), ...legend(believed)];
+    Plotly.react(id, traces, layout({
+      xaxis: axis(`ISI ${after[session.reference]} [ms]`, { range: session.range, anchor: isScored(believed) ? "y2" : "y" }),
+      yaxis2: axis("score", { domain: [0, 0.2], visible: isScored(believed), showticklabels: false }),
+      yaxis: axis("MEP [µV]", {
+        domain: isScored(believed) ? [0.26, 1] : [0, 1], type: "log", tickvals: ticksUv,
+        range: [Math.log10(lowestUv * 0.9), Math.log10(largestUv)],
+      }),
+      shapes: beliefShapes(believed, session.range), uirevision: id, margin: { l: 60, r: 12, t: 60, b: 44 },
+      legend: { orientation: "h", y: 1.04, yanchor: "bottom", traceorder: "normal" },
+    }), options);
+  }
+
+  // ---- the sweep of a trial
+
+  const mark = (x, index, name) => ({
+    type: "line", x0: x, x1: x, xref: `x${index || ""}`, yref: `y${index || ""} domain`, y0: 0, y1: 1,
+    line: { width: 1.5, dash: name === "tms" ? "solid" : "dot", color: colour(name === "tms" ? "faint" : "orange") },
+  });
+
+  function sweepMarks(trial, index, mepWindow) {
+    const at = { tms: trial.tmsMs, hit: trial.hitMs, valve: trial.valveMs };
+    const lines = Object.entries(at).filter(([, x]) => x !== null).map(([name, x]) => mark(x, index, name));
+    if (trial.tmsMs === null) return lines;
+    const [low, high] = mepWindow.map((edge) => trial.tmsMs + edge);
+    return [...lines, {
+      type: "rect", x0: low, x1: high, xref: `x${index || ""}`, yref: `y${index || ""} domain`, y0: 0, y1: 1,
+      fillcolor: colour("green"), opacity: 0.18, line: { width: 0 }, layer: "below",
+    }];
+  }
+
+  // Draws the sweep of a trial in an element with this id, or says there that there is none.
+  function sweep(id, session, trial, nothing) {
+    const waves = trial ? trial.sweep : [];
+    const figure = document.getElementById(id);
+    if (!waves.length) {
+      Plotly.purge(figure);
+      figure.style.height = "auto";
+      figure.textContent = nothing;
+      return;
+    }
+    if (!figure.classList.contains("js-plotly-plot")) figure.textContent = "";
+    figure.style.height = `${60 + 120 * (waves.length + 1)}px`;
+    const traces = [];
+    const axes = {};
+    const shapes = [];
+    const share = 1 / (waves.length + 1); // the first, the EMG near the pulse, is twice as high
+    waves.forEach((wave, k) => {
+      const index = k ? k + 1 : "";
+      const x = wave.values.map((_, n) => wave.t0 + n * wave.step);
+      const [top, height] = k ? [1 - (k + 1) * share, share] : [1, 2 * share];
+      traces.push({
+        x, y: wave.values, xaxis: `x${index}`, yaxis: `y${index}`, mode: "lines", showlegend: false,
+        line: { width: 1, color: colour("ink") }, hovertemplate: "%{x:.1f} ms: %{y:.3g}<extra></extra>",
+      });
+      axes[`xaxis${index}`] = axis(k === waves.length - 1 ? "time of the sweep [ms]" : "",
+        { range: [x[0], x[x.length - 1]], anchor: `y${index}` });
+      axes[`yaxis${index}`] = axis(`${markup(wave.name)}<br>[${markup(wave.unit)}]`,
+        { domain: [top - height + 0.3 * share, top], anchor: `x${index}` });
+      shapes.push(...sweepMarks(trial, index, session.mepWindow));
+    });
+    Plotly.react(figure, traces, layout({ ...axes, shapes, margin: { l: 90, r: 12, t: 8, b: 44 } }), options);
+  }
+
+  return { belief, sweep };
+})();

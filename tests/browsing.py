@@ -1,0 +1,46 @@
+"""Pages in headless Chromium, for tests of what they look like and do."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Page, sync_playwright
+
+__all__ = ["IN_CHROMIUM", "broken_rules", "chromium", "screenshots"]
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+IN_CHROMIUM = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page in"),
+]
+"""Marks of a module of such tests."""
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """The browser."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"], timeout=60_000)
+        yield browser
+        browser.close()
+
+
+def screenshots(paths: pytest.TempPathFactory) -> Path:
+    """Where pictures of pages are kept: `$ISIW_SCREENSHOTS`, or a folder of the test run."""
+    folder = Path(os.environ.get("ISIW_SCREENSHOTS") or paths.mktemp("screenshots"))
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def broken_rules(page: Page) -> list[str]:
+    """The rules of axe-core that a page breaks, and where."""
+    found = Axe().run(page).response["violations"]
+    return [f"{rule['id']}: {[node['target'] for node in rule['nodes']][:3]}" for rule in found]
