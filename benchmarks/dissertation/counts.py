@@ -18,13 +18,13 @@ from benchmarks.waveform_loop import REST_UV_PER_FLOOR_MV
 from isiw.devices.robot.mechanism import Geometry
 from isiw.devices.robot.presets import preset
 from isiw.response_counts import EFFECTIVE_SHARE, STIMULATION, CountStudy, study_counts
-from isiw.subjects import WIDTHS_KIM_MS, SimulatedSubject, cohort
+from isiw.subjects import MEASURED_KIM, WIDTHS_KIM_MS, SimulatedSubject, cohort
 from isiw.types import FloatArray
 
 __all__ = ["tell"]
 
-COHORT: Final = "kim11"
-THRESHOLDS_MV: Final = (0.026, 0.020, 0.030, 0.033, 0.015, 0.020, 0.030, 0.020, 0.030, 0.025, 0.030)
+COHORT: Final = "kim11-measured"
+THRESHOLDS_MV: Final = tuple(person.threshold_mv for person in MEASURED_KIM)
 """Of the eleven people (4.1.1)."""
 
 TRIALS: Final = 12
@@ -44,7 +44,7 @@ TOLERANCE_MS: Final = 5.0
 
 NOTE: Final = (
     "Simulated people. Fig. 3.12 has one person with both kinds of stimulation, Fig. 4.2 the eleven of the cohort "
-    f"`{COHORT}`, whose TMS alone is not silent. A person's own threshold is the amplitude that at most 5 % of their "
+    f"`{COHORT}`. A person's own threshold is the amplitude that at most 5 % of their "
     f"{ALONE} trials of TMS alone exceed; the window is the run of effective ISIs about the largest share."
 )
 
@@ -149,7 +149,7 @@ def _alone(fixed: list[CountStudy], own: list[CountStudy]) -> Claim:
         f"{shares.mean():.0%} on average",
         verdict(
             holds=shares.max() <= 0.02,
-            otherwise=f"not, because the people of `{COHORT}` respond to TMS alone as recorded people do at 90 % RMT",
+            otherwise=f"not, because the people of `{COHORT}` respond to TMS alone more often",
         ),
     )
 

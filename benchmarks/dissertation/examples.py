@@ -21,7 +21,7 @@ from isiw.window import Window
 
 __all__ = ["tell"]
 
-COHORT: Final = "kim11"
+COHORT: Final = "kim11-measured"
 EXAMPLES: Final = {"nr": ("Fig. 4.10", 10), "svmr": ("Fig. 4.11", 15), "gpr": ("Fig. 4.12", 6)}
 """Figure and number of iterations of each regression's example; the first iteration is the fit to seven ISIs."""
 
