@@ -181,7 +181,7 @@ def _curves(curves: pd.DataFrame, people: int) -> Claim:
         f"{one['Suprathreshold']:.0%} at 120 % RMT, where {most} is best most often "
         f"({share['Suprathreshold'].max():.0%})",
         "ours are sums on a baseline; the figure's fall to 0",
-        f"under reading: by AICc one Gaussian is best less often above the threshold than below it "
+        "under reading: by AICc one Gaussian is best less often above the threshold than below it "
         f"{by_chance(one, people)}"
         if one["Suprathreshold"] < one["Subthreshold"]
         else "not, because one Gaussian is best as often above the threshold as below it",
