@@ -26,6 +26,7 @@ import joblib
 import pandas as pd
 import typer
 
+from benchmarks.dissertation.claims import claims_as_json
 from benchmarks.reduction import (
     before,
     comparison,
@@ -82,7 +83,7 @@ def report(found: Measured, facts: dict[str, Any], out: Path) -> None:
         online.section(waveforms),
     ]
     opening = verdicts.opening(claims, rows[comparison], zero)
-    write(sections, facts, out, opening, [claim.record() for claim in claims])
+    write(sections, facts, out, opening, claims_as_json(claims))
 
 
 def facts_of(size: Size, seed: int, processes: int, took: str) -> dict[str, object]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import pandas as pd
 
+from benchmarks.dissertation.claims import Claim, claims_as_json
 from isiw import Rotor, Vane
 from isiw.types import BoolArray, FloatArray
 
@@ -14,13 +15,14 @@ FULL = 0.9999
 """A range that counts as full, as a share of 180°."""
 
 _AIR = Vane().supply
-READING = (
-    f"under reading C_0 = {_AIR.valve_l_s_bar:g}, C_f = {_AIR.fitting_l_s_bar:g} l/(s bar), "
+CHOSEN = (
+    f"C_0 = {_AIR.valve_l_s_bar:g}, C_f = {_AIR.fitting_l_s_bar:g} l/(s bar), "
     f"C_r = {_AIR.critical_ratio:g}, a bore of {_AIR.bore_mm:g} mm, and a wave of 1 s there and back"
 )
+READING = f"under reading {CHOSEN}"
+FITTED = f"under reading fitted: {CHOSEN}"
+TAKEN_OVER = "under reading taken over, not a result"
 RECOMMENDED_MM = (10.0, 12.5, 15.0, 17.5)
-
-Claim = dict[str, str]
 
 
 def claims_of(
@@ -29,7 +31,7 @@ def claims_of(
     shares: FloatArray,
     delays: FloatArray,
     tables: Mapping[str, pd.DataFrame],
-) -> list[Claim]:
+) -> list[dict[str, str]]:
     """Every table and figure of the chapter, and what its text concludes.
 
     Args:
@@ -39,24 +41,14 @@ def claims_of(
         delays: break-away delay by height and depth [ms], NaN without motion.
         tables: `row`, `courses`, `influences` and `strokes`, as the benchmark makes them.
     """
-    return [
+    claims = (
         *_of_the_model(),
         *_of_the_plane(heights_mm, depths_mm, shares, delays),
         *_of_the_row(tables["row"]),
         *_of_the_courses(tables["courses"]),
         *_of_the_text(tables["influences"], tables["strokes"]),
-    ]
-
-
-def _claim(where: str, what: str, theirs: str, ours: str, difference: str, verdict: str) -> Claim:
-    return {
-        "where": where,
-        "what": what,
-        "theirs": theirs,
-        "ours": ours,
-        "difference": difference,
-        "verdict": verdict,
-    }
+    )
+    return claims_as_json(claims)
 
 
 def _verdict(holds: object, otherwise: str, reading: str = READING) -> str:
@@ -73,25 +65,25 @@ def _of_the_model() -> Iterator[Claim]:
         ("Fig. 7.4", "first prototype from the side"),
         ("Fig. 7.5", "first prototype with the tapping device"),
     ):
-        yield _claim(where, f"The figure shows the {shown}.", "a picture", "none", "none", drawn)
-    yield _claim(
+        yield Claim(where, f"The figure shows the {shown}.", "a picture", "none", "none", drawn)
+    yield Claim(
         "Fig. 7.6",
         "Compressed air in one chamber turns the shaft while the other chamber is open to the room.",
         "principle",
         "the same",
         "none",
-        "reproduced",
+        TAKEN_OVER,
     )
-    yield _claim(
+    yield Claim(
         "Fig. 7.7",
         "A reservoir, a line with a delay of L/c, and a chamber are joined by a valve and a fitting.",
         "L/c not evaluated",
         f"{Vane().supply.delay_ms:.1f} ms; one line for each chamber",
         "(7.2) has its inequality turned round, (7.7) gets R T",
-        "reproduced",
+        TAKEN_OVER,
     )
     found_bar = Rotor(20, 150).break_away_bar
-    yield _claim(
+    yield Claim(
         "Fig. 7.8, (7.8)",
         "The air turns the shaft by its pressure difference times A (h/2 + r).",
         "prints d/2 for h/2",
@@ -99,13 +91,13 @@ def _of_the_model() -> Iterator[Claim]:
         "0.4 bar is what the text derives 2.7 N m from",
         "under reading h/2 for d/2",
     )
-    yield _claim(
+    yield Claim(
         "Table 7.1",
         "Friction, damping, inertia, weights and lengths of rotor and load.",
         "15 values",
         "the same; the load is 5 N where no other is said",
         "C_0, C_f, C_r, the bore and the dead volume are not in the table",
-        "reproduced",
+        TAKEN_OVER,
     )
 
 
@@ -113,7 +105,7 @@ def _of_the_plane(
     heights_mm: FloatArray, depths_mm: FloatArray, shares: FloatArray, delays: FloatArray
 ) -> Iterator[Claim]:
     full = shares >= FULL
-    yield _claim(
+    yield Claim(
         "Fig. 7.9a",
         "The full range within 1 s is reached on part of the plane, and size does not help throughout.",
         "part of the plane; not monotone",
@@ -121,7 +113,7 @@ def _of_the_plane(
         "the contours of the text cannot be read",
         _verdict(0 < full.mean() < 1 and (np.diff(shares, axis=0) < 0).any(), "it is monotone here"),
     )
-    yield _claim(
+    yield Claim(
         "Fig. 7.9b",
         "The break-away delay falls almost monotonically with the size.",
         "almost monotone but for very small rotors",
@@ -132,7 +124,7 @@ def _of_the_plane(
     swept_ml = np.array([[np.pi * 1e6 * Rotor(h, d).lever_m3 for d in depths_mm] for h in heights_mm])
     low, high = swept_ml[full].min(), swept_ml[full].max()
     within = full[(swept_ml >= low) & (swept_ml <= high)].mean()
-    yield _claim(
+    yield Claim(
         "7.5, Fig. 7.9",
         "The best sizes are those of one range of actuator volume, whatever the shape.",
         "a unique range of volume, not given",
@@ -157,27 +149,27 @@ def _of_the_row(row: pd.DataFrame) -> Iterator[Claim]:
     heights = row["h [mm]"]
     full = heights[row["range, period 1 s"] >= FULL]
     at_ends = row["range, period 1 s"].iloc[[0, -1]]
-    yield _claim(
+    yield Claim(
         "Fig. 7.10a",
         "At a depth of 150 mm the full range is reached at heights of 10–17.5 mm.",
         "10–17.5 mm; the axis ends at 0.4",
         f"{full.min():g}–{full.max():g} mm; {at_ends.iloc[0]:.2f} at 7.5 mm and {at_ends.iloc[1]:.2f} at 37.5 mm",
         "none",
-        _verdict(tuple(full) == RECOMMENDED_MM, "the heights differ"),
+        _verdict(tuple(full) == RECOMMENDED_MM, "the heights differ", FITTED),
     )
     delays = row["delay [ms]"][heights.isin(RECOMMENDED_MM)]
     low, high = delays.min(), delays.max()
-    yield _claim(
+    yield Claim(
         "Fig. 7.10b",
         "The break-away delay there is 80–100 ms, and falls with the height.",
         "80–100 ms",
         f"{low:.0f}–{high:.0f} ms; from {row['delay [ms]'].max():.0f} ms at 7.5 mm to {row['delay [ms]'].min():.0f} ms",
         f"{low - 80:+.1f} ms and {high - 100:+.1f} ms at the two ends",
-        _verdict(low >= 79.5 and high <= 100.5, "C_0 and C_f, which are not stated, decide the delay"),
+        _verdict(low >= 79.5 and high <= 100.5, "C_0 and C_f, which are not stated, decide the delay", FITTED),
     )
     loaded = [np.abs(row[f"range, {one}"] - row["range, period 1 s"]).max() for one in ("1 N", "10 N")]
     delayed = [np.abs(row[f"delay, {one}"] - row["delay [ms]"]).max() for one in ("1 N", "10 N")]
-    yield _claim(
+    yield Claim(
         "7.5",
         "A payload of 0.1–1 kg does not change what the actuator does.",
         "not sensitive",
@@ -190,7 +182,7 @@ def _of_the_row(row: pd.DataFrame) -> Iterator[Claim]:
 def _of_the_courses(courses: pd.DataFrame) -> Iterator[Claim]:
     small, large = (courses[courses["h [mm]"] == 35.0].iloc[index] for index in (0, 1))
     ours = [2 * float(one["range"]) for one in (small, large)]
-    yield _claim(
+    yield Claim(
         "Fig. 7.11a",
         "With one height, a depth of 40 mm turns faster than one of 125 mm.",
         "2 and 1.2 ranges a second",
@@ -199,10 +191,10 @@ def _of_the_courses(courses: pd.DataFrame) -> Iterator[Claim]:
         _verdict(
             abs(ours[0] - 2) < 0.1 and abs(ours[1] - 1.2) < 0.12,
             "the height is not stated",
-            f"{READING}, at h = 35 mm, the speed being the range over half a period",
+            f"{FITTED}, at h = 35 mm, the speed being the range over half a period",
         ),
     )
-    yield _claim(
+    yield Claim(
         "Fig. 7.11b",
         "The smaller chamber builds up its pressure difference faster.",
         "axis from -250 to 200 kPa",
@@ -216,7 +208,7 @@ def _of_the_courses(courses: pd.DataFrame) -> Iterator[Claim]:
 def _of_the_text(influences: pd.DataFrame, strokes: pd.DataFrame) -> Iterator[Claim]:
     of = {(line["parameter"], line["value"]): line for _, line in influences.iterrows()}
     leak, friction = ([of[name, value] for value in values] for name, values in _LOOSE.items())
-    yield _claim(
+    yield Claim(
         "7.5",
         "Leakage changes the initial delay rather than the range.",
         "delay, not range",
@@ -225,7 +217,7 @@ def _of_the_text(influences: pd.DataFrame, strokes: pd.DataFrame) -> Iterator[Cl
         "neither changes",
         "not, because a leak of this size changes neither",
     )
-    yield _claim(
+    yield Claim(
         "7.5",
         "The break-away pressure changes the initial delay rather than the range.",
         "delay, not range",
@@ -234,7 +226,7 @@ def _of_the_text(influences: pd.DataFrame, strokes: pd.DataFrame) -> Iterator[Cl
         "large vanes lose little of their range, small ones much",
         "not, because the friction also decides which small sizes reach the full range",
     )
-    yield _claim(
+    yield Claim(
         "7.4",
         "The duty cycle is adjusted, since the valve's two outlets differ.",
         "adjusted, by how much is not said",
@@ -243,7 +235,7 @@ def _of_the_text(influences: pd.DataFrame, strokes: pd.DataFrame) -> Iterator[Cl
         "not, because the outlets' conductances are not stated",
     )
     motion, end = (strokes.set_index("event").loc[name] for name in ("motion", "end"))
-    yield _claim(
+    yield Claim(
         "7.1, 7.5",
         "A rotation has to begin with a precision of 40–60 ms.",
         "left to an experiment",
@@ -252,7 +244,7 @@ def _of_the_text(influences: pd.DataFrame, strokes: pd.DataFrame) -> Iterator[Cl
         "far below 40 ms",
         "under reading a friction that varies by 10 % and a pressure that varies by 2 %, which nobody has measured",
     )
-    yield _claim(
+    yield Claim(
         "8.1.2",
         "The actuator can be combined with the tapping device.",
         "future work",

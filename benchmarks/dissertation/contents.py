@@ -78,7 +78,7 @@ CHAPTERS: Final = (
             Item("Fig. 4.10", "Iterations of NR"),
             Item("Fig. 4.11", "Iterations of SVMR"),
             Item("Fig. 4.12", "Iterations of GPR"),
-            Item("Fig. 4.13", "The window of a Gaussian"),
+            Item("Fig. 4.13", "The window of a Gaussian", f"{DESCRIBED} (docs/definitions.md)"),
             Item("Fig. 4.14", "PF: estimated profiles and trials"),
             Item("Fig. 4.15", "NR: estimated profiles and trials"),
             Item("Fig. 4.16", "SVMR: estimated profiles and trials"),

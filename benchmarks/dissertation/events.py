@@ -282,7 +282,7 @@ def _later_people(later: dict[int, TimingStudy]) -> list[Claim]:
         ),
         Claim(
             "Fig. 4.9",
-            "The mean hits differ between the people (p < .001; the damaged text shows *** ten times, for ten pairs).",
+            "The mean hits differ between the people (p < .001; the copy used shows *** ten times, for ten pairs).",
             "10 of 10 pairs",
             f"{differ} of 10 pairs, {len(next(iter(hits.values())))} taps a person",
             f"{differ - 10:+d}",

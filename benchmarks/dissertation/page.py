@@ -30,7 +30,9 @@ _PICTURES: Final[Mapping[str, str]] = {
     "Fig. 4.28": "trial_reduction_particles.png",
     "Fig. 4.31": "trial_reduction_initial.png",
     "Fig. 5.12": "trial_reduction_online.png",
-    "Fig. 6.9": "trial_reduction_intervals.png",
+    "Fig. 6.5": "interval.png",
+    "Fig. 7.9": "vane.png",
+    "Fig. 8.1": "inhibition.png",
 }
 """Of a benchmark whose JSON file names no pictures; each shows the neighbouring figures as well."""
 

@@ -76,5 +76,10 @@ def section(found: pd.DataFrame) -> Section:
 def in_words(found: pd.DataFrame) -> str:
     """The table as a sentence."""
     rows: list[Mapping[str, float]] = found.to_dict("records")
-    parts = [f"{r['default']:.2f} and {r[FIXED]:.2f} on `{r['cohort']}`" for r in rows]
-    return f"Before any trial the default has an F1 of, and one fixed window for everybody, {', '.join(parts)}."
+
+    def listed(column: str) -> str:
+        return ", ".join(f"{r[column]:.2f} on `{r['cohort']}`" for r in rows)
+
+    return (
+        f"Before any trial the default's F1 is {listed('default')}; one fixed window for everybody has {listed(FIXED)}."
+    )

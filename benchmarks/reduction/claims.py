@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Final, Generic, NamedTuple, TypeVar
 
-__all__ = ["SHARE", "UNIT", "Claim", "Found", "Statement", "about", "number", "share", "told"]
+from benchmarks.dissertation.claims import Claim
+
+__all__ = ["SHARE", "UNIT", "Found", "Statement", "about", "number", "share", "told"]
 
 SHARE: Final = 0.3
 """Numbers of trials are reproduced within 30 %,"""
@@ -19,31 +21,6 @@ SHOWN: Final = 3
 """Readings that a verdict names."""
 
 _Context = TypeVar("_Context")
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One claim with its verdict, in words.
-
-    Args:
-        where: figure, table or section of the text.
-        what: what is claimed, as a sentence.
-        theirs: the text's number.
-        ours: ours, on the first context.
-        difference: between the two.
-        verdict: "reproduced", "under reading …", or "not, because …".
-    """
-
-    where: str
-    what: str
-    theirs: str
-    ours: str
-    difference: str
-    verdict: str
-
-    def record(self) -> dict[str, str]:
-        """As a record of strings."""
-        return asdict(self)
 
 
 class Found(NamedTuple):

@@ -1,6 +1,7 @@
 """The dissertation's own numbers, by figure and table, to be held beside ours.
 
-Bars of Fig. 4.24 and 4.25 are read from damaged text: likely, not certain. Correlations are confirmed by the text.
+Which method a bar of Fig. 4.24 and 4.25 belongs to was inferred from a copy in which the figures' text is out of order:
+likely, not certain. Correlations are confirmed by the text.
 """
 
 from __future__ import annotations

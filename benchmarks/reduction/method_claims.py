@@ -8,8 +8,9 @@ from typing import Final
 
 import pandas as pd
 
+from benchmarks.dissertation.claims import Claim
 from benchmarks.reduction import dissertation as text
-from benchmarks.reduction.claims import Claim, Found, Statement, about, number, share, told
+from benchmarks.reduction.claims import Found, Statement, about, number, share, told
 from benchmarks.reduction.comparison import METHODS, WORDS, by_person
 from benchmarks.reduction.look import NAMES
 from benchmarks.reduction.significance import paired_tests
@@ -144,7 +145,7 @@ def sweep_claims(rows: pd.DataFrame) -> list[Claim]:
         "stops inside the measured window alone": inside,
     }
     statements: list[Statement[float]] = [
-        Statement("Fig. 4.24", "The conventional sweep needs 272 trials.", "272", lambda n: share(n, 272)),
+        Statement("Fig. 4.24, 4.18", "The conventional sweep needs 272 trials.", "272", lambda n: share(n, 272)),
         Statement(
             "Fig. 4.24",
             "The conventional sweep needs 1.37 times as many trials as PF.",
@@ -200,7 +201,7 @@ def _unreadable(where: str, values: pd.DataFrame) -> Claim:
     """The other marks, of which the text's words do not say to which pair they belong."""
     tests = paired_tests(values[[m for m in METHODS[:-1] if m in values]])
     ours = ", ".join(f"{NAMES[t.first]}–{NAMES[t.second]} {t.stars or 'n.s.'}" for t in tests.itertuples())
-    reason = "the marks' pairs cannot be read in the text's version that we have; ours stand for themselves"
+    reason = "the marks' pairs cannot be read in the copy that was used; ours stand for themselves"
     look: Statement[None] = Statement(
         where, "Marks of significance between the methods.", "* to ***", lambda _: Found(holds=False, ours=ours), reason
     )

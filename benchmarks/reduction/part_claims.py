@@ -7,8 +7,9 @@ from typing import Final
 
 import pandas as pd
 
+from benchmarks.dissertation.claims import Claim
 from benchmarks.reduction import dissertation as text
-from benchmarks.reduction.claims import Claim, Found, Statement, about, number, share, told
+from benchmarks.reduction.claims import Found, Statement, about, number, share, told
 from benchmarks.reduction.comparison import PEOPLE_OF_KIM
 from benchmarks.reduction.look import NAMES
 from benchmarks.reduction.particles import RANGES
@@ -177,7 +178,7 @@ def step_claims(table: Table) -> list[Claim]:
             f"{r['accelerometer']}, to {r['initial']}: F1 {r['F1 *'] or 'n.s.'}, trials {r['trials *'] or 'n.s.'}"
             for _, r in marks.iterrows()
         )
-        reason = "the marks' places cannot be read in the text's version that we have; ours stand for themselves"
+        reason = "the marks' places cannot be read in the copy that was used; ours stand for themselves"
         found = Found(holds=False, ours=ours or "none significant")
         what = f"{NAMES[method]}: marks of significance between neighbouring numbers."
         claims.append(told(Statement(where, what, "* to ***", lambda _, f=found: f, reason), {"base": None}))
@@ -217,7 +218,12 @@ def gaussian_claims(components: Table) -> list[Claim]:
     statements: list[Statement[pd.Series]] = [
         Statement("Fig. 4.34", "The higher Gaussian's share is 0.57.", str(high), lambda r: number(r["high"], high)),
         Statement("Fig. 4.34", "The lower Gaussian's share is 0.09.", str(low), lambda r: number(r["low"], low, 0.05)),
-        Statement("4.4.8", "The higher is 6.3 times the lower.", "6.3", lambda r: share(r["ratio"], high / low)),
+        Statement(
+            "4.4.8",
+            "The larger Gaussian is 6.3 times as high as the smaller.",
+            "6.3",
+            lambda r: share(r["ratio"], high / low),
+        ),
         Statement("4.4.8", "The lower vanishes in 70 % of runs.", "0.70", lambda r: number(r["lower is zero"], zero)),
     ]
     return [told(one, contexts) for one in statements]
@@ -262,10 +268,10 @@ def online_claims(table: Table) -> list[Claim]:
         rows = table[(table["person"] == person + 1) & (table["method"] == NAMES["nr"])]
         context: Mapping[str, pd.Series] = {"base": rows.iloc[0]}
         n, swept = text.ONLINE["stimuli"][person], text.ONLINE["conventional"][person]
-        who = f"subject {person + 1}"
+        who, figure = f"subject {person + 1}", ("Fig. 5.12", "Fig. 5.13")[person]
         statements: list[Statement[pd.Series]] = [
             Statement(
-                "Table 5.3",
+                f"Table 5.3, {figure}",
                 f"Online, NR's profile of {who} correlates with the measured one by {r}.",
                 str(r),
                 lambda s, r=r: number(s["r: measured"], r),

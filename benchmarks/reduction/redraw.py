@@ -2,8 +2,8 @@
 
     python -m benchmarks.reduction.redraw
 
-Those of the online experiment and of interval production need what the tables leave out, single trials; they are drawn
-when the whole reproduction is run.
+That of the online experiment needs what the tables leave out, single trials; it is drawn when the whole reproduction
+is run.
 """
 
 from __future__ import annotations

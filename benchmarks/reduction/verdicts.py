@@ -9,9 +9,10 @@ from typing import Any
 
 import pandas as pd
 
+from benchmarks.dissertation.claims import Claim, claims_as_json
 from benchmarks.reduction import before, comparison, gaussians, initial, online, particles, pf_readings, reading_table
 from benchmarks.reduction import dissertation as text
-from benchmarks.reduction.claims import SHARE, UNIT, Claim
+from benchmarks.reduction.claims import SHARE, UNIT
 from benchmarks.reduction.document import Section, Table
 from benchmarks.reduction.method_claims import cell, in_words, method_claims, row, star_claims, sweep_claims
 from benchmarks.reduction.part_claims import (
@@ -29,7 +30,9 @@ PROSE = f"""\
 Each claim of chapters 4 and 5 about the methods, ours on `{PEOPLE}` beside it. Numbers of trials count as reproduced
 within {100 * SHARE:.0f} %, F1, correlation and convergence within {UNIT:g}; an order where it is the same throughout.
 Where the base fails, the verdict names readings, or other people, for whom the claim holds: with so many, some do by
-chance. Of claims that two things do not differ, few people can refute few. Base and readings are below."""
+chance. A direction counts however small the difference: from so few sessions, many are chance. That two things do not
+differ can hardly be refuted with so few people. Which method a bar of Fig. 4.24 and 4.25 belongs to was inferred from a
+copy in which the figures' text is out of order: likely, not certain. Base and readings are below."""
 
 
 def contexts(rows: Mapping[ModuleType, pd.DataFrame]) -> dict[str, pd.DataFrame]:
@@ -75,7 +78,7 @@ def section(claims: Sequence[Claim]) -> Section:
     """This part of the report."""
     counts = Counter(kind(claim) for claim in claims)
     said = ", ".join(f"{count} {name}" for name, count in counts.items())
-    table = pd.DataFrame([claim.record() for claim in claims])
+    table = pd.DataFrame(claims_as_json(claims))
     return Section("Every claim, with a verdict", PROSE, [Table(f"{len(claims)} claims: {said}.", table)])
 
 
@@ -107,7 +110,8 @@ def opening(claims: Sequence[Claim], main: pd.DataFrame, zero: pd.DataFrame) -> 
         f"the text has PF last, and here it is {place}.",
         f"Trials: {in_words(trials, 0)} (text: {in_words(theirs['trials'], 0)}).",
         f"Runs that converge: {in_words(converged, 0)} % (text: {in_words(shares, 0)} %).",
-        before.in_words(zero),
+        "Which method a bar of Fig. 4.24 (trials) and 4.25 (F1) belongs to was inferred: likely, not certain.",
+        before.in_words(zero[zero["cohort"] == PEOPLE]),
     )
     return " ".join(sentences)
 

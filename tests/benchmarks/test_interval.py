@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.interval import TABLE_62, Measured, figure_66, measured, sd, table_62, within
+from benchmarks.interval import TABLE_62, Measured, figure_66, light_claim, measured, sd, table_62, within
 
 RESULTS = Path(__file__).parents[2] / "benchmarks" / "results" / "interval.json"
 
@@ -38,6 +38,31 @@ def test_people_beyond_what_is_allowed_do_not(
     assert [claim.what[:12] for claim in off] == ["SD of mode 2"]
 
 
+def test_a_law_without_bias_does_not_reproduce_the_means_that_have_one(
+    exact: dict[tuple[float, int], np.ndarray],
+) -> None:
+    unbiased = {key: people_of(key[0], sd_ms) for key, (_, sd_ms) in TABLE_62.items()}
+    verdict = {claim.what[:31]: claim.verdict for claim in table_62(exact | unbiased)}
+    failed = {what for what, said in verdict.items() if said != "reproduced"}
+    at_300, at_500 = ([f"Mean of mode {mode} at target {ms} ms" for mode in (1, 2, 3, 4)] for ms in (300, 500))
+    assert failed == {at_300[0], at_300[1], at_300[3], at_500[3]}
+    assert verdict[at_500[3]].startswith("under reading within 15%, but the law's error against the target is +0.0 ms")
+
+
+@pytest.mark.parametrize(("share", "good"), [(0.13, True), (0.10, True), (0.06, False), (0.18, False)])
+def test_a_light_that_is_on_too_seldom_is_no_reproduction_either(share: float, *, good: bool) -> None:
+    assert (light_claim(share).verdict == "reproduced") is good
+
+
+def test_an_sd_that_exceeds_another_by_half_as_much_as_in_the_text_is_no_reproduction(
+    exact: dict[tuple[float, int], np.ndarray],
+) -> None:
+    claims = figure_66(exact | {(500.0, 1): people_of(499.0, 75.0)})
+    assert [claim.what for claim in claims if claim.verdict != "reproduced"] == [
+        "The SD of mode 1 exceeds that of mode 4"
+    ]
+
+
 def test_a_statement_of_fig_6_6_that_fails_is_said_to_fail(exact: dict[tuple[float, int], np.ndarray]) -> None:
     assert {claim.verdict for claim in figure_66(exact)} == {"reproduced"}
     steady = exact | {(500.0, 1): people_of(500.0, 10.0)}
@@ -58,13 +83,11 @@ def test_the_error_is_the_sd_over_groups() -> None:
     assert sd(times_ms) == pytest.approx(np.arange(8).std())
 
 
-def test_the_results_speak_of_every_table_and_figure_of_the_chapter() -> None:
+def test_the_results_speak_of_every_table_and_figure_of_the_chapter_that_has_a_result() -> None:
     claims = json.loads(RESULTS.read_text("utf-8"))["claims"]
     said = {claim["where"] for claim in claims}
-    tables = {f"Table 6.{number}" for number in (1, 2, 3, 4)}
-    figures = {"Fig. 6.1 to 6.3", *(f"Fig. 6.{number}" for number in range(4, 11))}
+    tables = {f"Table 6.{number}" for number in (2, 3, 4)}
+    figures = {f"Fig. 6.{number}" for number in range(4, 11)}
     assert tables | figures <= said
-    keys = {"where", "what", "theirs", "ours", "difference", "verdict"}
-    assert all(set(claim) == keys for claim in claims)
-    verdicts = ("reproduced", "under reading", "not, because")
-    assert all(claim["verdict"].startswith(verdicts) for claim in claims)
+    chosen = {claim["verdict"] for claim in claims if claim["where"] in {"Fig. 6.9", "Fig. 6.10"}}
+    assert chosen == {"under reading range and trials chosen for Table 6.3's SD"}

@@ -5,8 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
-from benchmarks.inhibition_claims import PRINTED, SUB_ISIS_MS, SUPRA_ISIS_MS, number_of_values, royston_p
+from benchmarks.inhibition_claims import (
+    PRINTED,
+    SUB_ISIS_MS,
+    SUPRA_ISIS_MS,
+    by_chance,
+    number_of_values,
+    of_two_days,
+    royston_p,
+)
 from benchmarks.opposed_oracle import OpposedOracle
 from scipy.stats import shapiro
 
@@ -48,3 +57,19 @@ def test_the_printed_tests_of_normality_are_of_as_many_values_as_there_are_isis(
 def test_the_p_value_from_w_is_that_of_scipy(n: int) -> None:
     found = shapiro(np.random.default_rng(n).exponential(size=n) ** 0.5)
     assert royston_p(float(found.statistic), n) == pytest.approx(float(found.pvalue), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("same", "verdict"),
+    [(0.9, "not, because half of the simulated people keep their window"), (0.5, "under reading: the cohort")],
+)
+def test_people_who_keep_their_window_do_not_show_another_one_on_another_day(same: float, verdict: str) -> None:
+    assert of_two_days([0.3, same, 0.95]).verdict.startswith(verdict)
+
+
+@pytest.mark.parametrize(
+    ("above", "said"),
+    [(5, "(10 and 5 of 30 people; chance gives as much)"), (0, "(10 and 0 of 30 people; p = 0.0008)")],
+)
+def test_a_difference_between_shares_says_whether_chance_gives_as_much(above: int, said: str) -> None:
+    assert by_chance(pd.Series({"Subthreshold": 10 / 30, "Suprathreshold": above / 30}), 30) == said

@@ -1,15 +1,21 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+from benchmarks.dissertation.claims import read_claims
 from benchmarks.dissertation.contents import CHAPTERS
 from benchmarks.dissertation.page import OTHERS, read_sources, write_page
 
 FIGURES = {"3": 12, "4": 35, "5": 13, "6": 10, "7": 11, "8": 2, "B": 1}
 TABLES = {"3": 2, "4": 1, "5": 3, "6": 4, "7": 1, "8": 1, "B": 0}
+
+
+RESULTS = Path(__file__).parents[3] / "benchmarks" / "results"
+PAGES = {name: (RESULTS / "dissertation" / name).read_text("utf-8") for name in ("README.md", "index.html")}
 
 
 def claim(where: str, verdict: str = "reproduced", **others: str) -> dict[str, str]:
@@ -115,3 +121,22 @@ def test_text_cannot_break_the_page(folder: Path) -> None:
     write_page(folder, *read_sources(folder, ["events"]))
     assert "a \\| b <c>" in (folder / "README.md").read_text()
     assert "a | b &lt;c&gt;" in (folder / "index.html").read_text()
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_the_claims_that_the_other_benchmarks_have_left_can_be_read(name: str) -> None:
+    assert read_claims(RESULTS / f"{name}.json")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_picture_of_the_page_exists(page: str) -> None:
+    linked = re.findall(r"!\[[^]]*]\(([^)]+)\)|<img[^>]* src=\"([^\"]+)\"", PAGES[page])
+    missing = {name for names in linked for name in names if name and not (RESULTS / "dissertation" / name).exists()}
+    assert linked
+    assert not missing
+
+
+def test_the_page_says_that_claims_on_the_robot_are_true_by_construction(folder: Path) -> None:
+    write_page(folder, *read_sources(folder, ["events"]))
+    for name in PAGES:
+        assert "most are true by construction" in (folder / name).read_text()
