@@ -73,7 +73,7 @@ def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: 
 
 def _of_subject(log: Path, subject: str) -> list[float]:
     salvaged = salvage(log)
-    if of_production(salvaged):  # nobody is stimulated in such a task
+    if of_production(salvaged) and not pulses_s(salvaged):  # nobody is stimulated in such a task
         return []
     header = read_any(salvaged).header
     if header.subject != subject or header.device.simulated:
