@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from isiw.devices.protocol import DeviceInfo
-from isiw.errors import ConfigError, InvalidValueError
+from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
 from isiw.log.pulses import pulses_s
 from isiw.log.salvage import salvage
 from isiw.session import (
@@ -129,6 +129,17 @@ def test_the_answer_that_ended_the_search_can_be_taken_back_at_once_and_later(
         assert resumed.decision().stop
         typed(resumed, "u", "q")
         assert not resumed.decision().stop
+
+
+def test_the_last_answer_before_a_limit_can_be_taken_back_too(tmp_path: Path) -> None:
+    search = make_threshold_search("bayes", IntensityRange(20, 80))
+    nobody = DeviceInfo("nobody", "impact", simulated=True)
+    with open_threshold(search, tmp_path / "t.mcap", device=nobody, max_pulses=2) as recorder:
+        with pytest.raises(LimitExceededError):
+            typed(recorder, "n", "y", "u")
+        assert [bool(outcome.reason) for outcome in recorder.outcomes] == [False, True]
+        with pytest.raises(LimitExceededError):
+            typed(recorder)
 
 
 def test_where_the_operator_ends_the_search_the_pulse_that_was_asked_was_not_given(

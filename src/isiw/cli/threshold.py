@@ -52,7 +52,14 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
     show_only: Annotated[bool, typer.Option("--show", help="Only say what the log holds.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Find the resting motor threshold of a simulated person, or of a person whose stimulator you set by hand."""
-    settings = {"method": method, "high": high, "low": low, "step": step, "cohort": cohort, "seed": seed}
+    settings: dict[str, Any] = {
+        "method": method,
+        "high": high,
+        "low": low,
+        "step": step,
+        "cohort": cohort,
+        "seed": seed,
+    }
     settings |= {"max_pulses": max_pulses, "min_iti_s": min_iti_s, "subject": subject}
     with errors_reported(f"Interrupted. The log is safe; go on with: isiw threshold {log} --resume"):
         if resume or show_only:

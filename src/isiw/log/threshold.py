@@ -63,4 +63,4 @@ def pulses_given(record: SessionRecord) -> int:
     Args:
         record: the log.
     """
-    return len({each.trial for each in (*record.unknown, *outcomes(record))})
+    return len({intent.trial for intent in record.unknown} | {outcome.trial for outcome in outcomes(record)})

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
 from isiw.checks import text
 from isiw.devices.protocol import DeviceInfo
-from isiw.errors import ConfigError, InvalidValueError
+from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
 from isiw.log.schema import Header
 from isiw.session.threshold import ThresholdRecorder, open_threshold
 from isiw.strategy.stopping import StopDecision
@@ -26,6 +27,8 @@ ANSWERS: Final = (
     "above 50 uV, x where the pulse was lost, u to take the last answer back. Instead of giving a pulse "
     "type q to end here and go on later: it then counts as not given."
 )
+
+_LAST_WORD: Final = "Enter ends, u takes the last answer back: "
 
 SURELY_MV: Final = 2.0
 """More than this [mV] needs its unit: it is more likely an amplitude in µV."""
@@ -115,7 +118,7 @@ def run_by_hand(recorder: ThresholdRecorder, read: Callable[[str], str], say: Ca
     going_on = True
     while going_on:
         try:
-            going_on = _take(recorder, read(_question(recorder)).strip().lower(), say)
+            going_on = _take(recorder, _answer(recorder, read, say), say)
         except EOFError:
             break
         except InvalidValueError as error:
@@ -123,11 +126,23 @@ def run_by_hand(recorder: ThresholdRecorder, read: Callable[[str], str], say: Ca
     return recorder.decision()
 
 
-def _question(recorder: ThresholdRecorder) -> str:
+def _answer(recorder: ThresholdRecorder, read: Callable[[str], str], say: Callable[[str], None]) -> str:
+    """What the operator types about the next pulse, or about the last one where none is asked any more."""
     decision = recorder.decision()
     if decision.stop:
-        return f"The search is over. {decision.reason} Enter ends, u takes the last answer back: "
-    return f"Pulse {recorder.given + 1}: set {recorder.ask():g} % MSO, give one pulse. MEP: "
+        return _typed(read, f"The search is over. {decision.reason} {_LAST_WORD}")
+    try:
+        intensity = recorder.ask()
+    except LimitExceededError as limit:
+        with suppress(EOFError):
+            if _typed(read, f"{limit} {_LAST_WORD}") == "u":
+                _take_back(recorder, say)
+        raise
+    return _typed(read, f"Pulse {recorder.given + 1}: set {intensity:g} % MSO, give one pulse. MEP: ")
+
+
+def _typed(read: Callable[[str], str], question: str) -> str:
+    return read(question).strip().lower()
 
 
 def _take(recorder: ThresholdRecorder, typed: str, say: Callable[[str], None]) -> bool:
@@ -164,8 +179,8 @@ def _take_back(recorder: ThresholdRecorder, say: Callable[[str], None]) -> None:
             "there is no last answer to take back", got=last.reason if last else None, expected="a pulse that counts"
         )
     recorder.exclude(last.trial, "taken back by the operator")
-    seen = {True: "y", False: "n", None: f"{last.mep_mv} mV"}[last.response]
-    say(f"Pulse {last.trial + 1} ({last.intensity_pct_mso} % MSO, {seen}) no longer counts.")
+    seen = f"{last.mep_mv:g} mV" if last.response is None else "y" if last.response else "n"
+    say(f"Pulse {last.trial + 1} ({last.intensity_pct_mso:g} % MSO, {seen}) no longer counts.")
 
 
 def amplitude_of(typed: str) -> float:
