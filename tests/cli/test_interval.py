@@ -45,6 +45,7 @@ def test_without_a_terminal_it_is_a_message(tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (["--session", 4], "session is unknown"),
+        (["--session", 0], "session is unknown"),
         (["--session", 3, "--mode", 4], "a mode of session 3 is unknown"),
         (["--trials", 0], "Block.trials"),
     ],

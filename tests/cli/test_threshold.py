@@ -25,7 +25,7 @@ def test_a_simulated_persons_threshold_is_found_and_told_beside_the_true_one(fin
     assert result.exit_code == 0
     assert "Resting motor threshold: " in result.output
     assert "true threshold is" in result.output
-    assert "17 pulses, 17 of them count" in result.output
+    assert "17 pulses, learnt from 17." in result.output
 
 
 def test_resuming_what_is_over_changes_nothing(finished: Path) -> None:
@@ -53,6 +53,32 @@ def test_by_hand_what_is_typed_is_logged_and_nothing_beyond_the_limit_is_asked(t
     again = run(log, *options)
     assert again.exit_code == 1
     assert "--resume" in again.output
+
+
+@pytest.mark.parametrize("how", ["--resume", "--show"])
+@pytest.mark.parametrize(
+    "option",
+    ["--high", "--low", "--step", "--max-pulses", "--min-iti-s", "--method", "--subject", "--cohort", "--seed"],
+)
+def test_a_limit_that_a_log_would_not_keep_is_refused_and_not_ignored(finished: Path, how: str, option: str) -> None:
+    result = run(finished, how, option, 50)
+    assert result.exit_code == 1
+    assert f"got '{option}'" in result.output
+
+
+@pytest.mark.parametrize("option", ["--cohort", "--seed"])
+def test_nobody_is_simulated_by_hand(tmp_path: Path, option: str) -> None:
+    result = run(tmp_path / "t.mcap", "--by-hand", "--high", 60, option, 1)
+    assert result.exit_code == 1
+    assert f"got '{option}'" in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_single_pulse_is_counted_in_the_singular_and_one_that_was_not_given_not_at_all(tmp_path: Path) -> None:
+    log = tmp_path / "t.mcap"
+    result = run(log, "--by-hand", "--high", 60, "--min-iti-s", 0, typed="n\nq\n")
+    assert result.exit_code == 0, result.output
+    assert "\n1 pulse, learnt from 1." in result.output
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def test_who_leaves_goes_on_later_where_it_was_left(log: Path, monkeypatch: pyte
         person.press("q")
 
     def goes_on(person: Person) -> None:
-        person.sees("light on or off; find")
+        person.sees("Block 1 of 1: 1 trial left, feedback: light on or off; find")
         person.produces(0.05)
         person.sees("2  light")
 
@@ -65,13 +65,13 @@ def test_between_blocks_there_is_a_rest_in_which_no_key_counts(log: Path, monkey
     seen = []
 
     def both_blocks(person: Person) -> None:
-        seen.append(person.sees("Block 1 of 2: 1 trials, feedback: score bar; find the hidden target.\n"))
+        seen.append(person.sees("Block 1 of 2: 1 trial, feedback: score bar; find the hidden target.\n"))
         person.produces(0.05)
         person.sees("score")
         person.sees("Rest: 0:01 left")
         began_s = time.monotonic()
         person.produces(0.05)
-        seen.append(person.sees("Block 2 of 2: 1 trials, feedback: target and absolute error; target 300 ms.\n"))
+        seen.append(person.sees("Block 2 of 2: 1 trial, feedback: target and absolute error; target 300 ms.\n"))
         assert time.monotonic() - began_s > 0.2
         person.produces(0.05)
         person.sees("off by")

@@ -71,6 +71,16 @@ def test_a_torn_log_keeps_what_was_synced_and_goes_on(tmp_path: Path) -> None:
     assert record.left[0] == (4, 1)
 
 
+def test_a_second_record_of_a_trial_is_left_out_of_the_table_and_told(tmp_path: Path) -> None:
+    record, log = begin_log(tmp_path / "a.mcap", BLOCKS, "P07", 5)
+    with log:
+        for produced_ms in (300.0, 400.0):
+            log.append(answer(BLOCKS[0], 0, 0, produced_ms, record.header.seed))
+    again = read_productions(tmp_path / "a.mcap")
+    assert [production.produced_ms for production in again.productions] == [300.0]
+    assert again.losses == ("A second record of trial 0 is left out.",)
+
+
 def test_a_complete_task_is_not_resumed(tmp_path: Path) -> None:
     written(tmp_path / "a.mcap", 8)
     with pytest.raises(InvalidValueError, match=r"complete.*--show"):

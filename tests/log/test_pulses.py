@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.log.production import Block, Production, ProductionHeader
 from isiw.log.pulses import earlier_pulses_s, pulses_s
 from isiw.log.salvage import Message, salvage
 from isiw.log.schema import Event, Header, Intent
@@ -76,6 +77,21 @@ def test_the_subjects_logs_of_a_folder_count_and_no_others(tmp_path: Path, heade
     assert len(ages_s) == 5
     assert ages_s == sorted(ages_s, reverse=True)
     assert len(earlier(tmp_path, "P08")) == 3
+
+
+def test_an_interval_production_log_holds_no_stimuli_and_blocks_nobody(tmp_path: Path, header: Header) -> None:
+    make_log(tmp_path / "a.mcap", header)
+    task = ProductionHeader(isiw_version="0", created="", subject="P07", seed=0, blocks=(Block(3, 300.0),))
+    LogWriter.create(tmp_path / "task.mcap", task).close()
+    assert len(earlier(tmp_path)) == 3
+
+
+def test_a_log_that_holds_stimuli_is_never_passed_over_as_one_of_a_task(tmp_path: Path, header: Header) -> None:
+    with LogWriter.create(tmp_path / "a.mcap", header) as log:
+        log.append(Intent(trial=0, isi_ms=50.0))
+        log.append(Production(trial=0, block=0, produced_ms=300.0, score_pct=100.0))
+    with pytest.raises(LogError, match="interval production task"):
+        earlier(tmp_path)
 
 
 def test_a_session_that_never_closed_its_log_counts(tmp_path: Path, header: Header) -> None:

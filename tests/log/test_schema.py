@@ -2,13 +2,17 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
+from isiw.log.production import Production
+from isiw.log.salvage import salvage
 from isiw.log.schema import Estimate, Event, Header, Intent, PulseOutcome, Record, ThresholdBelief, Waveform
 from isiw.log.topics import CHANNEL_IDS, decode, encode, json_schema, topic_of
+from isiw.log.writer import LogWriter
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold import ThresholdEstimate
 from isiw.trials import Channel, MistrialReason, Status, Trial
@@ -71,6 +75,23 @@ def test_every_schema_is_an_object_without_references_to_elsewhere(topic: str) -
 def test_the_channel_numbers_are_frozen() -> None:
     topics = ("header", "intent", "trial", "estimate", "event", "emg", "acceleration", "pressure", "force", "valve")
     assert dict(CHANNEL_IDS) == {f"/{topic}": number for number, topic in enumerate(topics, start=1)}
+
+
+@pytest.mark.parametrize(
+    ("record", "topic"),
+    [
+        (PulseOutcome(trial=0, intensity_pct_mso=50.0, mep_mv=0.1), "/threshold/pulse"),
+        (Production(trial=0, block=0, produced_ms=300.0, score_pct=100.0), "/production"),
+    ],
+)
+def test_a_topic_without_a_frozen_number_is_announced_and_survives_being_written_and_read(
+    tmp_path: Path, header: Header, record: Record, topic: str
+) -> None:
+    with LogWriter.create(tmp_path / "a.mcap", header) as log:
+        log.append(record)
+    assert b"channel 11" in (tmp_path / "a.mcap").read_bytes()
+    assert topic not in CHANNEL_IDS
+    assert decode(topic, salvage(tmp_path / "a.mcap").messages[-1].data) == record
 
 
 @pytest.mark.parametrize("name", ["trial", "header", "", None])

@@ -8,8 +8,19 @@ from pathlib import Path
 import pytest
 
 from isiw.devices.protocol import DeviceInfo
-from isiw.errors import ConfigError, InvalidValueError
-from isiw.session import ThresholdRecorder, open_simulated, open_threshold, resume_threshold, run_by_hand, run_simulated
+from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
+from isiw.log.pulses import pulses_s
+from isiw.log.salvage import salvage
+from isiw.session import (
+    ThresholdRecorder,
+    open_simulated,
+    open_threshold,
+    pulses_given,
+    read_threshold,
+    resume_threshold,
+    run_by_hand,
+    run_simulated,
+)
 from isiw.session.threshold_loops import amplitude_of
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
 
@@ -38,7 +49,18 @@ def typed(recorder: ThresholdRecorder, *answers: str) -> tuple[list[str], list[s
 
 @pytest.mark.parametrize(
     ("text", "mep_mv"),
-    [("0.08", 0.08), ("80 uV", 0.08), ("80µV", 0.08), (" .5 mV ", 0.5), ("0,12", 0.12), ("5 mv", 5.0), ("0", 0.0)],
+    [
+        ("0.08", 0.08),
+        ("80 uV", 0.08),
+        ("80µV", 0.08),
+        (" .5 mV ", 0.5),
+        ("0,12", 0.12),
+        ("5 mv", 5.0),
+        ("0", 0.0),
+        ("1,200 mV", 1.2),
+        ("1.2 uV", 0.0012),
+        ("1200 uV", 1.2),
+    ],
 )
 def test_amplitudes_are_taken_with_their_unit(text: str, mep_mv: float) -> None:
     assert amplitude_of(text) == pytest.approx(mep_mv)
@@ -52,6 +74,8 @@ def test_amplitudes_are_taken_with_their_unit(text: str, mep_mv: float) -> None:
         ("-1", "no answer"),
         ("nan", "no answer"),
         ("0.1 V", "no answer"),
+        ("1,200 uV", "without a separator"),
+        ("1.200 µV", "without a separator"),
     ],
 )
 def test_what_is_no_amplitude_is_refused(text: str, complaint: str) -> None:
@@ -65,6 +89,7 @@ def test_the_operator_answers_until_the_search_is_over(recorder: ThresholdRecord
     assert [outcome.response for outcome in recorder.outcomes] == [False, True, None, None]
     assert recorder.decision().stop
     assert questions[0] == "Pulse 1: set 45 % MSO, give one pulse. MEP: "
+    assert questions[-1].startswith("The search is over.")
     assert "Resting motor threshold" in said[-1]
 
 
@@ -82,6 +107,52 @@ def test_an_answer_can_be_taken_back_and_a_pulse_can_be_lost(recorder: Threshold
         "lost, said the operator",
     ]
     assert recorder.search.pulses == ()
+
+
+def test_what_is_taken_back_is_the_last_pulse_and_no_earlier_one_where_that_was_lost(
+    recorder: ThresholdRecorder,
+) -> None:
+    _, said = typed(recorder, "0.2", "0.08", "u", "n", "x", "u")
+    assert [bool(outcome.reason) for outcome in recorder.outcomes] == [False, True, False, True]
+    assert any(text.startswith("Pulse 2 (") and "MSO, 0.08 mV) no longer counts." in text for text in said)
+    assert "no last answer to take back" in said[-1]
+
+
+def test_the_answer_that_ended_the_search_can_be_taken_back_at_once_and_later(
+    recorder: ThresholdRecorder, tmp_path: Path
+) -> None:
+    questions, _ = typed(recorder, "n", "y", "n", "y", "u", "y", "0.1", "")
+    assert [bool(outcome.reason) for outcome in recorder.outcomes] == [False, False, False, True, False]
+    assert "Enter ends, u takes the last answer back" in questions[-1]
+    recorder.close()
+    with resume_threshold(tmp_path / "t.mcap") as resumed:
+        assert resumed.decision().stop
+        typed(resumed, "u", "q")
+        assert not resumed.decision().stop
+
+
+def test_the_last_answer_before_a_limit_can_be_taken_back_too(tmp_path: Path) -> None:
+    search = make_threshold_search("bayes", IntensityRange(20, 80))
+    nobody = DeviceInfo("nobody", "impact", simulated=True)
+    with open_threshold(search, tmp_path / "t.mcap", device=nobody, max_pulses=2) as recorder:
+        with pytest.raises(LimitExceededError):
+            typed(recorder, "n", "y", "u")
+        assert [bool(outcome.reason) for outcome in recorder.outcomes] == [False, True]
+        with pytest.raises(LimitExceededError):
+            typed(recorder)
+
+
+def test_where_the_operator_ends_the_search_the_pulse_that_was_asked_was_not_given(
+    recorder: ThresholdRecorder, tmp_path: Path
+) -> None:
+    typed(recorder, "n", "q")
+    recorder.close()
+    log = tmp_path / "t.mcap"
+    assert len(pulses_s(salvage(log))) == pulses_given(read_threshold(log)) == 1
+    with resume_threshold(log) as resumed:
+        assert [outcome.reason for outcome in resumed.outcomes] == [""]
+        typed(resumed, "y")
+    assert pulses_given(read_threshold(log)) == 3
 
 
 def test_without_anybody_at_the_keyboard_it_ends_and_goes_on_later(recorder: ThresholdRecorder, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from rich.text import Text
 import isiw
 from isiw.text import plain
 
-__all__ = ["DAMAGED", "INTERRUPTED", "NO_DEFAULT", "errors_reported", "show", "show_entry"]
+__all__ = ["DAMAGED", "INTERRUPTED", "NO_DEFAULT", "errors_reported", "refuse_ignored", "show", "show_entry"]
 
 DAMAGED = 3
 INTERRUPTED = 130  # what shells report for Ctrl-C
@@ -62,3 +62,18 @@ def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
     except KeyboardInterrupt as error:
         show(interrupted, style="red", stderr=True)
         raise typer.Exit(INTERRUPTED) from error
+
+
+def refuse_ignored(why: str, **options: object) -> None:
+    """Refuse options that would be ignored.
+
+    Args:
+        why: they would be.
+        **options: what was given for each, by its name; None or an empty list where nothing was.
+
+    Raises:
+        ConfigError: one was given.
+    """
+    given = [f"--{name.replace('_', '-')}" for name, value in options.items() if value not in (None, [])]
+    if given:
+        raise isiw.errors.ConfigError(why, got=", ".join(given), remedy="Leave these options out.")

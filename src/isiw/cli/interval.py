@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import isiw
-from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show
+from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, refuse_ignored, show
 
 if TYPE_CHECKING:
     from isiw.interval import ProductionRecord
@@ -39,19 +39,19 @@ def interval(  # noqa: PLR0913, PLR0917 - an option each
     look: Annotated[bool, typer.Option("--show", help="Print what is in this log.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Produce time intervals by two key presses, with feedback after each, at a terminal; see docs/interval.md."""
-    given = {"session": session, "mode": mode, "trials": trials, "subject": subject, "seed": seed}
-    settings = {name: value for name, value in given.items() if value not in (None, [])}
     with errors_reported(f"Interrupted. Every trial whose feedback was shown is kept; go on with: {_way_on(log)}"):
-        if settings and (resume or look):
-            raise isiw.errors.ConfigError(
-                "a task keeps what its log says", got=", ".join(settings), remedy="Leave these options out."
+        if resume or look:
+            refuse_ignored(
+                "a task keeps what its log says", session=session, mode=mode, trials=trials, subject=subject, seed=seed
             )
         if look:
             _say(isiw.interval.read_productions(log))
         elif resume:
             _end(isiw.interval.resume_task(log, rest_s=rest_s))
         else:
-            blocks = isiw.interval.session_blocks(session or 1, mode or (), 200 if trials is None else trials)
+            blocks = isiw.interval.session_blocks(
+                1 if session is None else session, mode or (), 200 if trials is None else trials
+            )
             _end(isiw.interval.run_task(log, blocks, subject=subject or "", seed=seed or 0, rest_s=rest_s))
 
 

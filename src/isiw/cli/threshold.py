@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,7 +9,7 @@ import typer
 from rich.console import Console
 
 import isiw
-from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show
+from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, refuse_ignored, show
 
 if TYPE_CHECKING:
     from isiw.session import ThresholdRecorder
@@ -30,43 +29,74 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
         float | None,
         typer.Option(help="The highest intensity [% MSO]; --by-hand needs it, else it is 100.", **NO_DEFAULT),
     ] = None,
-    low: Annotated[float, typer.Option(help="The lowest intensity [% MSO].")] = 20.0,
-    step: Annotated[float, typer.Option(help="The step between intensities [% MSO].")] = 1.0,
-    method: Annotated[str, typer.Option(help="bayes, maximum-likelihood or five-of-ten.")] = "bayes",
-    max_pulses: Annotated[int, typer.Option(help="Most pulses, lost ones included.")] = 100,
-    min_iti_s: Annotated[float, typer.Option(help="Shortest time between two pulses [s].")] = 5.0,
-    subject: Annotated[str, typer.Option(help="The person's code, for the log.", **NO_DEFAULT)] = "",
-    cohort: Annotated[str, typer.Option(help="Of a simulated person: whose recruitment curve.")] = "recruitment",
-    seed: Annotated[int, typer.Option(help="Of a simulated person.")] = 0,
+    low: Annotated[float | None, typer.Option(help="The lowest intensity [% MSO]; default 20.", **NO_DEFAULT)] = None,
+    step: Annotated[
+        float | None, typer.Option(help="The step between intensities [% MSO]; default 1.", **NO_DEFAULT)
+    ] = None,
+    method: Annotated[
+        str | None, typer.Option(help="bayes, maximum-likelihood or five-of-ten; default bayes.", **NO_DEFAULT)
+    ] = None,
+    max_pulses: Annotated[
+        int | None, typer.Option(help="Most pulses, lost ones included; default 100.", **NO_DEFAULT)
+    ] = None,
+    min_iti_s: Annotated[
+        float | None, typer.Option(help="Shortest time between two pulses [s]; default 5.", **NO_DEFAULT)
+    ] = None,
+    subject: Annotated[str | None, typer.Option(help="The person's code, for the log.", **NO_DEFAULT)] = None,
+    cohort: Annotated[
+        str | None,
+        typer.Option(help="Of a simulated person: whose recruitment curve; default recruitment.", **NO_DEFAULT),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of a simulated person; default 0.", **NO_DEFAULT)] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the log, as it was begun.")] = False,  # noqa: FBT002 - a flag
     show_only: Annotated[bool, typer.Option("--show", help="Only say what the log holds.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Find the resting motor threshold of a simulated person, or of a person whose stimulator you set by hand."""
+    settings: dict[str, Any] = {
+        "method": method,
+        "high": high,
+        "low": low,
+        "step": step,
+        "cohort": cohort,
+        "seed": seed,
+    }
+    settings |= {"max_pulses": max_pulses, "min_iti_s": min_iti_s, "subject": subject}
     with errors_reported(f"Interrupted. The log is safe; go on with: isiw threshold {log} --resume"):
-        if show_only:
-            _say_what_is_there(log)
-            return
-        if by_hand and high is None and not resume:
-            raise isiw.errors.ConfigError(
-                "the highest intensity is missing", remedy="Say with --high how far you may go with this person."
-            )
-
-        def opened() -> ThresholdRecorder:
-            if resume:
-                return isiw.session.resume_threshold(log)
-            space = isiw.strategy.threshold.IntensityRange(low, 100.0 if high is None else high, step)
-            search = isiw.strategy.threshold.make_threshold_search(method, space)
-            options: dict[str, Any] = {"min_iti_s": min_iti_s, "max_pulses": max_pulses, "subject": subject}
-            if by_hand:
-                return isiw.session.open_threshold(search, log, **options)
-            return isiw.session.open_simulated(search, log, cohort=cohort, seed=seed, **options)
-
-        _run(opened)
+        if resume or show_only:
+            refuse_ignored("a search keeps what its log says", **settings)
+        if by_hand:
+            refuse_ignored("nobody is simulated where a stimulator is set by hand", cohort=cohort, seed=seed)
+        if not show_only:
+            given = {name: value for name, value in settings.items() if value is not None}
+            _run(isiw.session.resume_threshold(log) if resume else _begun(log, by_hand=by_hand, **given))
         _say_what_is_there(log)
 
 
-def _run(opened: Callable[[], ThresholdRecorder]) -> None:
-    with opened() as recorder:
+def _begun(
+    log: Path,
+    *,
+    by_hand: bool,
+    method: str = "bayes",
+    high: float | None = None,
+    low: float = 20.0,
+    step: float = 1.0,
+    cohort: str = "recruitment",
+    seed: int = 0,
+    **options: Any,
+) -> ThresholdRecorder:
+    if by_hand and high is None:
+        raise isiw.errors.ConfigError(
+            "the highest intensity is missing", remedy="Say with --high how far you may go with this person."
+        )
+    space = isiw.strategy.threshold.IntensityRange(low, 100.0 if high is None else high, step)
+    search = isiw.strategy.threshold.make_threshold_search(method, space)
+    if by_hand:
+        return isiw.session.open_threshold(search, log, **options)
+    return isiw.session.open_simulated(search, log, cohort=cohort, seed=seed, **options)
+
+
+def _run(recorder: ThresholdRecorder) -> None:
+    with recorder:
         if recorder.header.device.simulated:
             isiw.session.run_simulated(recorder, show)
         else:
@@ -82,7 +112,9 @@ def _say_what_is_there(log: Path) -> None:
     person = isiw.session.simulated_person(record.header)
     if person is not None:
         show(f"The simulated person's true threshold is {person.rmt_pct_mso:.1f} % MSO.")
-    show(f"{len(record.intents)} pulses, {len(search.pulses)} of them count. Log: {record.path}")
+    pulses = isiw.session.pulses_given(record)
+    given = "1 pulse" if pulses == 1 else f"{pulses} pulses"
+    show(f"{given}, learnt from {len(search.pulses)}. Log: {record.path}")
     for loss in record.losses:
         show(loss, style="red")
     if record.losses:

@@ -115,7 +115,9 @@ def _open_block(record: ProductionRecord, index: int, screen: Screen, presses: P
     block = record.header.blocks[index]
     target = f"target {block.target_ms:.0f} ms" if block.mode in {3, 4} else "find the hidden target"
     place = f"Block {index + 1} of {len(record.header.blocks)}"
-    screen.say(f"{place}: {block.trials} trials, feedback: {MODES[block.mode]}; {target}.")
+    left = sum(of == index for _, of in record.left)
+    trials = f"{left} {'trial' if left == 1 else 'trials'}" + (" left" if left < block.trials else "")
+    screen.say(f"{place}: {trials}, feedback: {MODES[block.mode]}; {target}.")
 
 
 @contextmanager

@@ -13,13 +13,12 @@ import pandas as pd
 
 import isiw
 from isiw.checks import text, whole
-from isiw.errors import DamagedLogError, InvalidValueError, LogError
+from isiw.errors import InvalidValueError, LogError
 from isiw.log.production import PRODUCTION_VERSION, Block, Production, ProductionHeader
-from isiw.log.salvage import Message, Salvage, salvage
+from isiw.log.reader import Records
+from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import Event
-from isiw.log.topics import decode
-from isiw.log.writer import CONFIGURATION, LogWriter
-from isiw.text.toml_files import parsed
+from isiw.log.writer import LogWriter
 
 __all__ = ["NEAR_MS", "ProductionRecord", "begin_log", "continue_log", "read_productions"]
 
@@ -151,46 +150,11 @@ def _record_of(found: Salvage) -> ProductionRecord:
             got=str(found.path),
             remedy="Look at it with: isiw show LOG",
         )
-    header: ProductionHeader | None = None
-    productions, events, losses = list[Production](), list[Event](), list(found.losses)
-    for message in found.messages:
-        match _decoded(message):
-            case ProductionHeader() as header:
-                pass
-            case Production() as production:
-                productions.append(production)
-            case Event() as event:
-                events.append(event)
-            case _:
-                losses.append(f"A record on {message.topic} makes no sense and is left out.")
-    header = _checked(header or _header_from_attachment(found), found.path)
-    return ProductionRecord(found.path, header, tuple(productions), tuple(events), tuple(losses))
-
-
-def _decoded(message: Message) -> object:
-    try:
-        return decode(message.topic, message.data)
-    except ValueError:
-        return None
-
-
-def _header_from_attachment(found: Salvage) -> ProductionHeader:
-    try:
-        return ProductionHeader.model_validate(parsed(found.attachments.get(CONFIGURATION, b"").decode()))
-    except (ValueError, RecursionError) as error:
-        raise DamagedLogError(
-            "the log's header is lost, or it is no log of an interval production task",
-            got=str(found.path),
-            remedy="Its records may still be readable with any MCAP tool.",
-        ) from error
-
-
-def _checked(header: ProductionHeader, path: Path) -> ProductionHeader:
-    if header.schema_version > PRODUCTION_VERSION:
-        raise LogError(
-            "the log was written by a newer isiw",
-            got=f"version {header.schema_version} in {path}",
-            expected=f"{PRODUCTION_VERSION} or older",
-            remedy="Upgrade isiw.",
-        )
-    return header
+    records = Records.of(found)
+    return ProductionRecord(
+        found.path,
+        records.header_of(ProductionHeader, PRODUCTION_VERSION),
+        tuple(record for record in records.history if isinstance(record, Production)),
+        tuple(record for record in records.history if isinstance(record, Event)),
+        records.told_losses,
+    )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.durable import log_of
-from isiw.log.reader import read_any
+from isiw.log.reader import of_production, read_any
 from isiw.log.salvage import Message, Salvage, salvage
 from isiw.log.schema import Event, Intent, Record
 from isiw.log.topics import decode
@@ -73,6 +73,8 @@ def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: 
 
 def _of_subject(log: Path, subject: str) -> list[float]:
     salvaged = salvage(log)
+    if of_production(salvaged) and not pulses_s(salvaged):  # nobody is stimulated in such a task
+        return []
     header = read_any(salvaged).header
     if header.subject != subject or header.device.simulated:
         return []

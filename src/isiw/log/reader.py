@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import pandas as pd
 from pydantic import ValidationError
@@ -15,8 +15,20 @@ from pydantic import ValidationError
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.frames import trial_frame
 from isiw.log.onsets import Onset, Onsets
+from isiw.log.production import Production, ProductionHeader
 from isiw.log.salvage import Message, Salvage, salvage
-from isiw.log.schema import MOST_TRIALS, SCHEMA_VERSION, Estimate, Event, Header, Intent, Record, Waveform
+from isiw.log.schema import (
+    MOST_TRIALS,
+    SCHEMA_VERSION,
+    AnyHeader,
+    Estimate,
+    Event,
+    Header,
+    Intent,
+    PulseOutcome,
+    Record,
+    Waveform,
+)
 from isiw.log.topics import decode
 from isiw.log.verdicts import under_all
 from isiw.log.writer import CONFIGURATION
@@ -25,7 +37,9 @@ from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial, TrialTable
 from isiw.window import ENOUGH_PAIRS
 
-__all__ = ["SessionRecord", "read_any", "read_salvaged", "read_session"]
+__all__ = ["Records", "SessionRecord", "of_production", "read_any", "read_salvaged", "read_session"]
+
+HeaderKind = TypeVar("HeaderKind", Header, ProductionHeader)
 
 MOST_CONFIGURATION: Final = 2**20
 """Of a configuration as TOML [bytes]; the default's is 2 kB."""
@@ -174,30 +188,33 @@ def read_any(salvaged: Salvage) -> SessionRecord:
         LogError: the log of an interval production task, or one from a newer version.
         DamagedLogError: not even the header can be read.
     """
-    if any(message.topic in {"/production_header", "/production"} for message in salvaged.messages):
+    if of_production(salvaged):
         raise LogError(
             "the log is of an interval production task, not of a search for a window",
             got=str(salvaged.path),
             remedy=f"isiw interval {salvaged.path} --show says what was produced.",
         )
-    records = _Records()
-    for message in salvaged.messages:
-        records.take(message)
-    header, losses = records.header, (*salvaged.losses, *records.losses)
-    if header is None or (losses and CONFIGURATION in salvaged.attachments):
-        header = _header_from_attachment(salvaged)  # what is lost may have been the last header
-    header = _checked_version(header, salvaged.path)
+    records = Records.of(salvaged)
     return SessionRecord(
         salvaged.path,
-        header,
+        records.header_of(Header, SCHEMA_VERSION),
         tuple(records.history),
         records.waveforms,
-        _shortened(losses),
+        records.told_losses,
         salvaged.finished,
         salvaged.end_lost,
         _delivered(salvaged, records.history),
         records.onsets.by_trial,
     )
+
+
+def of_production(salvaged: Salvage) -> bool:
+    """Whether a log is of an interval production task.
+
+    Args:
+        salvaged: what was read.
+    """
+    return any(message.topic in {"/production_header", "/production"} for message in salvaged.messages)
 
 
 def _delivered(salvaged: Salvage, history: Sequence[Record]) -> int:
@@ -207,15 +224,60 @@ def _delivered(salvaged: Salvage, history: Sequence[Record]) -> int:
 
 
 @dataclass
-class _Records:
-    """The records of a log by their kind, and what makes no sense."""
+class Records:
+    """The records of a log by their kind, and what makes no sense.
 
-    header: Header | None = None
+    Args:
+        salvaged: what was read from the log.
+        header: the last header.
+        history: all other records but waveforms, in order; of a trial that is told of twice, the first.
+        waveforms: the recorded channels, by trial and name.
+        losses: what was left out, a sentence each.
+        onsets: when each stimulus was about to be delivered.
+    """
+
+    salvaged: Salvage
+    header: AnyHeader | None = None
     history: list[Record] = field(default_factory=list)
     waveforms: dict[tuple[int, str], Channel] = field(default_factory=dict)
     losses: list[str] = field(default_factory=list)
     onsets: Onsets = field(default_factory=Onsets)
     _trials: set[int] = field(default_factory=set)
+
+    @classmethod
+    def of(cls, salvaged: Salvage) -> Records:
+        """The records of a log.
+
+        Args:
+            salvaged: what was read from it.
+        """
+        records = cls(salvaged, losses=list(salvaged.losses))
+        for message in salvaged.messages:
+            records.take(message)
+        return records
+
+    @property
+    def told_losses(self) -> tuple[str, ...]:
+        """The losses, as many as somebody will read."""
+        left = len(self.losses) - MOST_LOSSES
+        listed = tuple(self.losses[:MOST_LOSSES])
+        return listed if left <= 0 else (*listed, f"{left} more losses are not listed.")
+
+    def header_of(self, kind: type[HeaderKind], newest: int) -> HeaderKind:
+        """The log's header, from its records or else from the configuration that is attached.
+
+        Args:
+            kind: of header.
+            newest: version that this isiw reads.
+
+        Raises:
+            LogError: the log is from a newer version.
+            DamagedLogError: the header cannot be read.
+        """
+        header = self.header if isinstance(self.header, kind) else None
+        if header is None or (self.losses and CONFIGURATION in self.salvaged.attachments):
+            header = _header_from_attachment(self.salvaged, kind)  # what is lost may have been the last header
+        return _checked_version(header, newest, self.salvaged.path)
 
     def take(self, message: Message) -> None:
         """Take one more record."""
@@ -226,21 +288,28 @@ class _Records:
         except ValueError as error:
             self.losses.append(f"A record on {message.topic} makes no sense and is left out: {_first_line(error)}")
             return
-        if isinstance(record, Header):
+        if isinstance(record, Header | ProductionHeader):
             self.header = record
-        elif isinstance(record, Trial) and record.index in self._trials:
-            self.losses.append(f"A second record of trial {record.index} is left out.")
+        elif (trial := _concluded(record)) is not None and trial in self._trials:
+            self.losses.append(f"A second record of trial {trial} is left out.")
         elif not isinstance(record, Waveform):
             self.history.append(record)
             self._note(record, message.log_time_ns)
 
     def _note(self, record: Record, at_ns: int) -> None:
-        if isinstance(record, Trial):
-            self._trials.add(record.index)
+        if (trial := _concluded(record)) is not None:
+            self._trials.add(trial)
         elif isinstance(record, Intent):
             self.onsets.take(record, at_ns)
         elif isinstance(record, Event) and record.kind == "resume":
             self.onsets.resumed()
+
+
+def _concluded(record: Record) -> int | None:
+    """The number of the trial whose outcome a record is; None for any other record."""
+    if isinstance(record, Trial):
+        return record.index
+    return record.trial if isinstance(record, PulseOutcome | Production) else None
 
 
 def _first_line(error: ValueError) -> str:
@@ -251,16 +320,10 @@ def _first_line(error: ValueError) -> str:
     return str(error)
 
 
-def _shortened(losses: Sequence[str]) -> tuple[str, ...]:
-    """The losses, as many as somebody will read."""
-    left = len(losses) - MOST_LOSSES
-    return tuple(losses) if left <= 0 else (*losses[:MOST_LOSSES], f"{left} more losses are not listed.")
-
-
-def _header_from_attachment(salvaged: Salvage) -> Header:
+def _header_from_attachment(salvaged: Salvage, kind: type[HeaderKind]) -> HeaderKind:
     text = salvaged.attachments.get(CONFIGURATION, b"")[:MOST_CONFIGURATION]
     try:
-        return Header.model_validate(parsed(text.decode()))
+        return kind.model_validate(parsed(text.decode()))
     except (ValueError, RecursionError) as error:
         raise DamagedLogError(
             "the log's header is lost",
@@ -269,12 +332,12 @@ def _header_from_attachment(salvaged: Salvage) -> Header:
         ) from error
 
 
-def _checked_version(header: Header, path: Path) -> Header:
-    if header.schema_version > SCHEMA_VERSION:
+def _checked_version(header: HeaderKind, newest: int, path: Path) -> HeaderKind:
+    if header.schema_version > newest:
         raise LogError(
             "the log was written by a newer isiw",
             got=f"schema version {header.schema_version} in {path}",
-            expected=f"{SCHEMA_VERSION} or older",
+            expected=f"{newest} or older",
             remedy="Upgrade isiw.",
         )
     return header

@@ -83,7 +83,7 @@ def current_file(path: str | Path) -> Path:
     for candidate in (part_of(log), log):
         if candidate.is_file():
             return candidate
-    raise LogError("there is no such log", got=str(path), remedy="Check the path; isiw run prints it at its end.")
+    raise LogError("there is no such log", got=str(path), remedy="Check the path; what wrote it printed it at its end.")
 
 
 def salvage(path: str | Path) -> Salvage:

@@ -9,7 +9,7 @@ from isiw.log.reader import SessionRecord, read_any
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import PulseOutcome
 
-__all__ = ["outcomes", "read_threshold", "read_threshold_salvaged"]
+__all__ = ["outcomes", "pulses_given", "read_threshold", "read_threshold_salvaged"]
 
 
 def read_threshold(path: str | Path) -> SessionRecord:
@@ -55,3 +55,12 @@ def outcomes(record: SessionRecord) -> tuple[PulseOutcome, ...]:
     return tuple(
         each.model_copy(update={"reason": excluded[each.trial]}) if each.trial in excluded else each for each in found
     )
+
+
+def pulses_given(record: SessionRecord) -> int:
+    """How many pulses were given, or may have been; those that an operator left without giving them do not count.
+
+    Args:
+        record: the log.
+    """
+    return len({intent.trial for intent in record.unknown} | {outcome.trial for outcome in outcomes(record)})

@@ -7,6 +7,7 @@ import shutil
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self, cast
@@ -26,8 +27,8 @@ from isiw.log.durable import (
 )
 from isiw.log.locks import claimed, refuse_if_locked
 from isiw.log.salvage import Message, Salvage, holds, salvage_file
-from isiw.log.schema import AnyHeader, Record
-from isiw.log.topics import CHANNEL_IDS, announcement, encode, json_schema, topic_of
+from isiw.log.schema import AnyHeader, Header, Record
+from isiw.log.topics import CHANNEL_IDS, announcement, decode, encode, json_schema, topic_of
 
 __all__ = ["CONFIGURATION", "LogWriter"]
 
@@ -286,14 +287,23 @@ def _way_on(existing: Path) -> str:
     topics = {message.topic for message in found.messages}
     if "/production_header" in topics:
         return f"Choose another path, or go on with it: isiw interval {log_of(existing)} --resume"
-    if "/header" not in topics:
+    header = _header_of(found)
+    if header is None:
         return "Choose another path; nothing of this log can be continued."
-    if any(message.topic.startswith("/threshold/") for message in found.messages):
+    if header.intensities is not None:
         return f"Choose another path, or go on with it: isiw threshold {log_of(existing)} --resume"
     return (
         f"Choose another path, or go on with it: isiw resume {log_of(existing)}, if isiw run has made it; otherwise "
         "isiw.resume(path, device).run() in your own software."
     )
+
+
+def _header_of(found: Salvage) -> Header | None:
+    for message in reversed(found.messages):
+        if message.topic == "/header":
+            with suppress(ValueError):
+                return cast("Header", decode(message.topic, message.data))
+    return None
 
 
 def _require_unchanged(source: IO[bytes], salvage: Salvage) -> None:

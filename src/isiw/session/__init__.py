@@ -1,6 +1,6 @@
 """A session: the closed loop from the first ask to the decision, and going on with one from its log."""
 
-from isiw.log.threshold import read_threshold
+from isiw.log.threshold import pulses_given, read_threshold
 from isiw.session.loop import Session
 from isiw.session.progress import PROGRESS_HEADINGS, aligned, progress_row
 from isiw.session.recorder import Recorder, open_session
@@ -23,6 +23,7 @@ __all__ = [
     "open_simulated",
     "open_threshold",
     "progress_row",
+    "pulses_given",
     "read_threshold",
     "resume",
     "resume_threshold",

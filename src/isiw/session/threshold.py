@@ -246,6 +246,18 @@ class ThresholdRecorder:
         self._require_asked()
         self._conclude(self._outcome(reason=_a_reason(reason)))
 
+    def withdraw(self) -> None:
+        """Say that the pulse that was asked is not given: it does not count, and can be asked again.
+
+        Raises:
+            InvalidValueError: nothing was asked.
+            LogError: the log cannot be written.
+        """
+        self._require_asked()
+        self._log.append(Event(kind="refused", trial=self.given, text="not given, said the operator"))
+        self._log.sync()
+        self._asked = None
+
     def exclude(self, trial: int, reason: str) -> None:
         """Let a pulse not count from here on: an event is appended, nothing is erased.
 

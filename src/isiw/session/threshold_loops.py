@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
 from isiw.checks import text
 from isiw.devices.protocol import DeviceInfo
-from isiw.errors import ConfigError, InvalidValueError
+from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
 from isiw.log.schema import Header
 from isiw.session.threshold import ThresholdRecorder, open_threshold
 from isiw.strategy.stopping import StopDecision
@@ -23,13 +24,17 @@ _SIMULATED = "isiw_threshold"
 
 ANSWERS: Final = (
     "After each pulse type the MEP's amplitude in mV (0.08, or 80 uV), y or n where you only saw whether there was one "
-    "above 50 uV, x where the pulse was lost, u to take the last answer back, q to end here and go on later."
+    "above 50 uV, x where the pulse was lost, u to take the last answer back. Instead of giving a pulse "
+    "type q to end here and go on later: it then counts as not given."
 )
+
+_LAST_WORD: Final = "Enter ends, u takes the last answer back: "
 
 SURELY_MV: Final = 2.0
 """More than this [mV] needs its unit: it is more likely an amplitude in µV."""
 
 _AMPLITUDE: Final = re.compile(r"(\d+(?:[.,]\d*)?|[.,]\d+)\s*(mv|uv|µv|μv)?", re.IGNORECASE)
+_THOUSANDS: Final = re.compile(r"[.,]\d{3}$")
 
 
 def open_simulated(
@@ -110,35 +115,72 @@ def run_by_hand(recorder: ThresholdRecorder, read: Callable[[str], str], say: Ca
         LimitExceededError: a limit is reached before the search is over.
     """
     say(ANSWERS)
-    while not (decision := recorder.decision()).stop:
-        question = f"Pulse {recorder.given + 1}: set {recorder.ask():g} % MSO, give one pulse. MEP: "
+    going_on = True
+    while going_on:
         try:
-            going_on = _take(recorder, read(question).strip())
+            going_on = _take(recorder, _answer(recorder, read, say), say)
         except EOFError:
-            return decision
+            break
         except InvalidValueError as error:
             say(f"{error}\nNothing was logged; type it again.")
-            continue
-        if not going_on:
-            return decision
-        say(str(recorder.estimate()))
-    return decision
+    return recorder.decision()
 
 
-def _take(recorder: ThresholdRecorder, typed: str) -> bool:
+def _answer(recorder: ThresholdRecorder, read: Callable[[str], str], say: Callable[[str], None]) -> str:
+    """What the operator types about the next pulse, or about the last one where none is asked any more."""
+    decision = recorder.decision()
+    if decision.stop:
+        return _typed(read, f"The search is over. {decision.reason} {_LAST_WORD}")
+    try:
+        intensity = recorder.ask()
+    except LimitExceededError as limit:
+        with suppress(EOFError):
+            if _typed(read, f"{limit} {_LAST_WORD}") == "u":
+                _take_back(recorder, say)
+        raise
+    return _typed(read, f"Pulse {recorder.given + 1}: set {intensity:g} % MSO, give one pulse. MEP: ")
+
+
+def _typed(read: Callable[[str], str], question: str) -> str:
+    return read(question).strip().lower()
+
+
+def _take(recorder: ThresholdRecorder, typed: str, say: Callable[[str], None]) -> bool:
     """Log what was typed; False where the operator ends the search here."""
-    if typed.lower() in {"q", "quit"}:
+    over = recorder.decision().stop
+    if typed == "u":
+        _take_back(recorder, say)
+    elif over and typed in {"", "q", "quit"}:
         return False
-    if typed.lower() in {"y", "n"}:
-        recorder.tell(response=typed.lower() == "y")
-    elif typed.lower() == "x":
+    elif over:
+        raise InvalidValueError("the search is over, and no pulse was asked", got=typed, expected="Enter or u")
+    elif typed in {"q", "quit"}:
+        recorder.withdraw()
+        return False
+    else:
+        _tell(recorder, typed)
+    say(str(recorder.estimate()))
+    return True
+
+
+def _tell(recorder: ThresholdRecorder, typed: str) -> None:
+    if typed in {"y", "n"}:
+        recorder.tell(response=typed == "y")
+    elif typed == "x":
         recorder.lost("lost, said the operator")
-    elif typed.lower() == "u":
-        counting = [outcome.trial for outcome in recorder.outcomes if not outcome.reason]
-        recorder.exclude(counting[-1] if counting else -1, "taken back by the operator")
     else:
         recorder.tell(amplitude_of(typed))
-    return True
+
+
+def _take_back(recorder: ThresholdRecorder, say: Callable[[str], None]) -> None:
+    last = recorder.outcomes[-1] if recorder.outcomes else None
+    if last is None or last.reason:
+        raise InvalidValueError(
+            "there is no last answer to take back", got=last.reason if last else None, expected="a pulse that counts"
+        )
+    recorder.exclude(last.trial, "taken back by the operator")
+    seen = f"{last.mep_mv:g} mV" if last.response is None else "y" if last.response else "n"
+    say(f"Pulse {last.trial + 1} ({last.intensity_pct_mso:g} % MSO, {seen}) no longer counts.")
 
 
 def amplitude_of(typed: str) -> float:
@@ -148,11 +190,16 @@ def amplitude_of(typed: str) -> float:
         typed: a number in mV, or with its unit, mV or µV.
 
     Raises:
-        InvalidValueError: no such number, or a large one without its unit.
+        InvalidValueError: no such number, a large one without its unit, or one in µV whose separator may be that of
+            thousands.
     """
     found = _AMPLITUDE.fullmatch(text("an amplitude", typed).strip())
     if found is None:
         raise InvalidValueError("this is no answer", got=typed, expected="an amplitude in mV, or y, n, x, u or q")
+    if _THOUSANDS.search(found[1]) and (found[2] or "mv").lower() != "mv":
+        raise InvalidValueError(
+            "the separator may be that of thousands", got=typed, remedy="Type it without a separator, as in 1200 uV."
+        )
     value, unit = float(found[1].replace(",", ".")), (found[2] or "").lower()
     if unit == "" and value > SURELY_MV:
         raise InvalidValueError(

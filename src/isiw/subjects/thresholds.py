@@ -177,7 +177,9 @@ class StimulatedResponder:
 
 
 def threshold_cohort(name: str, n: int, seed: int) -> list[StimulatedPerson]:
-    """The first n people with the recruitment curves of a cohort, and thresholds of 30–80 % MSO.
+    """The first n people with thresholds of 30–80 % MSO and the recruitment curves of a cohort.
+
+    The curves are those of the cohorts, with a largest MEP of at least 80 µV.
 
     Args:
         name: one of `THRESHOLD_COHORTS`.
