@@ -189,7 +189,7 @@ class SupraPrior:
         latents = self.draw(people, particles, generator, space)
         for _ in range(REDRAWS):
             again = self.draw(people, particles, generator, space).values
-            latents = latents._replace(values=torch.where(_apart(latents.values), latents.values, again))
+            latents = latents._replace(values=torch.where(_apart(latents.values).unsqueeze(-1), latents.values, again))
         return latents
 
     def draw(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> SupraLatents:
@@ -216,7 +216,7 @@ class SupraPrior:
         """
         starts = self.start.log_density(values[..., :2], space).sum(-1)
         density = starts + self._joint.log_density(values[..., 2:])
-        return torch.where(_apart(values).squeeze(-1), density, -torch.inf)
+        return torch.where(_apart(values), density, -torch.inf)
 
     def person(self, latents: SupraLatents) -> Person:
         """What particles mean."""
@@ -228,10 +228,10 @@ class SupraPrior:
 
 
 def _apart(values: Tensor) -> Tensor:
-    """Whether one segment ends before the other starts, of latents (b, p, d), shape (b, p, 1)."""
-    z = dict(zip(LATENTS, values.split(1, dim=-1), strict=True))
+    """Whether one segment ends before the other starts, of latents (b, p, d), shape (b, p)."""
+    z = dict(zip(LATENTS, values.unbind(-1), strict=True))
     enhanced_ms, depressed_ms = z["start_ms"], z["depressed_start_ms"]
-    before = enhanced_ms + z["log_width_ms"].exp() <= depressed_ms
+    before: Tensor = enhanced_ms + z["log_width_ms"].exp() <= depressed_ms
     return before | (depressed_ms + z["depressed_log_width_ms"].exp() <= enhanced_ms)
 
 
