@@ -3,7 +3,7 @@
     python -m benchmarks.inhibition --out benchmarks/results/inhibition
 
 writes tables (Markdown), figures with versions, command and seeds and the claims of the dissertation beside ours
-(JSON), and a picture. A session has 60 stimuli, a sixth of them TMS alone; the oracle, which knows the MEP without a
+(JSON), and a picture. A session has 60 stimuli, a tenth of them TMS alone; the oracle, which knows the MEP without a
 tap, has 60 pairs. Sessions are kept beside the tables as they finish: the same command goes on where it was
 interrupted, and after `--minutes` the tables are of the sessions that are there, and say how many. Reported people come
 from seed 10,000 on; seeds below 1,000 are for work.
@@ -33,15 +33,30 @@ from benchmarks.opposed_oracle import OpposedOracle
 from isiw import DesignSpace, VisitProtocol, make_strategy
 from isiw.metrics import f1
 from isiw.subjects import RecruitmentResponse, SimulatedSubject, cohort
+from isiw.subjects.profiles import OpposedProfile
 
 SPACE: Final = DesignSpace(0, 120, reference="impact")
 MARKS: Final = (20, 40, 60)
-PROTOCOL: Final = VisitProtocol(tms_alone=1 / 6)
+PROTOCOL: Final = VisitProtocol(tms_alone=1 / 10)
 SWEPT: Final = 30
 """People who are swept over all ISIs, for the claims of the dissertation."""
 
-GROUPS: Final = ("supra-threshold", "recruitment", "gaussian")
-"""Cohorts: people above the motor threshold, and two kinds of people below it."""
+ALONE: Final = "enhanced alone"
+GROUPS: Final = ("supra-threshold", "recruitment", "gaussian", ALONE)
+"""Cohorts: people above the motor threshold, two kinds of people below it, and the first ones without a depression."""
+
+
+def people_of(group: str, number: int, seed: int) -> list[SimulatedSubject]:
+    """The people of a group."""
+    if group != ALONE:
+        return cohort(group, number, seed)
+    return [replace(subject, profile=_opposed(subject).facilitated) for subject in cohort(GROUPS[0], number, seed)]
+
+
+def _opposed(subject: SimulatedSubject) -> OpposedProfile:
+    if not isinstance(subject.profile, OpposedProfile):
+        raise TypeError(subject.profile)
+    return subject.profile
 
 
 def by_strategy(subject: SimulatedSubject, name: str, seed: int) -> Iterator[dict[str, Any]]:
@@ -95,7 +110,7 @@ def sessions(people: int, seed: int, kept: Path, minutes: float, groups: tuple[s
     with kept.open("a") as file:
         for group in groups:
             methods = ("supra-threshold", "oracle") if group == GROUPS[0] else ("supra-threshold",)
-            for number, subject in enumerate(cohort(group, people, seed)):
+            for number, subject in enumerate(people_of(group, people, seed)):
                 for method in methods:
                     if (group, method, number) in known:
                         continue

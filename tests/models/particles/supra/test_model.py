@@ -103,6 +103,16 @@ def test_moves_leave_the_prior_as_it_is() -> None:
         assert ours.double().mean().item() == pytest.approx(segment.probability, abs=0.03)
 
 
+def test_segments_lie_apart_before_the_first_trial_and_after_the_last() -> None:
+    fresh = SupraPrior().sample(1, 1000, torch.Generator().manual_seed(3), SPACE)
+    for latents in (fresh, posterior_after(0.1).latents):
+        z = dict(zip(LATENTS, latents.values.unbind(-1), strict=True))
+        first, second = (
+            (z[f"{kind}start_ms"], z[f"{kind}start_ms"] + z[f"{kind}log_width_ms"].exp()) for kind in ("", "depressed_")
+        )
+        assert bool(((first[1] <= second[0]) | (second[1] <= first[0])).all())
+
+
 def test_a_segment_needs_a_probability_and_a_positive_shift() -> None:
     widths = SupraPrior().enhanced.widths
     with pytest.raises(InvalidValueError, match="probability"):

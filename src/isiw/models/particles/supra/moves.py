@@ -116,8 +116,9 @@ class SupraMover:
         proposal = _chosen(jumps, self._jump(mine.latents), self._shift(mine.latents, theirs))
         log_likelihood = total_log_likelihood(self.prior.person(proposal), self.history)
         log_prior = self.prior.log_density(proposal.values, self.space)
-        # A jump draws from the prior, so that its density cancels.
-        prior_ratio = torch.where(jumps, 0.0, log_prior - mine.log_prior)
+        # A jump draws from the prior, so that its density cancels, but for segments that then overlap.
+        possible = torch.where(log_prior.isneginf(), -torch.inf, 0.0)
+        prior_ratio = torch.where(jumps, possible, log_prior - mine.log_prior)
         accept = torch.log(self._uniform(like)) < log_likelihood - mine.log_likelihood + prior_ratio
         counts += torch.stack([who.sum(-1) for who in (~jumps, accept & ~jumps, jumps, accept & jumps)])
         return _Weighed(
@@ -141,7 +142,7 @@ class SupraMover:
     def _jump(self, mine: SupraLatents) -> SupraLatents:
         """Draw some latents, and whether their segment is there, anew from the prior."""
         people, size = mine.enhanced.shape
-        fresh = self.prior.sample(people, size, self.generator, self.space)
+        fresh = self.prior.draw(people, size, self.generator, self.space)
         jump = drawn(tuple(JUMPS.values()), self._uniform(mine.enhanced))
         redraw = torch.stack([_latents(*names, device=mine.values.device) for names in REDRAWN.values()])[jump]
         return SupraLatents(

@@ -2,6 +2,7 @@
 
 Both segments shift the input of one recruitment curve: the enhanced one up, the depressed one down. A tap can be seen
 to depress an MEP only where that is well above the EMG floor without a tap, so that all noise is that of the curve.
+One segment ends before the other starts, also where only one is there or none, so that each is as probable as stated.
 """
 
 from __future__ import annotations
@@ -52,6 +53,10 @@ BLOCKS: Final = {
     "curve": ("log_ceiling", "log_slope", "log_input_sd", "log_sigma_y", "rest"),
 }
 """The latents by what they are about."""
+
+
+REDRAWS: Final = 20
+"""How often segments that overlap are drawn again; next to none do then."""
 
 
 class SupraLatents(NamedTuple):
@@ -138,10 +143,10 @@ class SupraPrior:
 
     start: StartPrior = _START
     enhanced: Segment = field(default_factory=lambda: Segment(0.9, _WIDTHS, Scale(11.3, 0.36)))
-    depressed: Segment = field(default_factory=lambda: Segment(0.85, _WIDTHS, Scale(8.3, 0.35)))
+    depressed: Segment = field(default_factory=lambda: Segment(0.9, _WIDTHS, Scale(8.3, 0.35)))
     curves: tuple[Curve, ...] = (
-        Curve(0.75, Scale(100.0, 0.5), Scale(0.23, 0.1), Scale(1.6, 0.2), Scale(0.39, 0.19), Scale(3.0, 3.5)),
-        Curve(0.25, Scale(30.0, 1.2), Scale(0.27, 0.3), Scale(1.9, 0.35), Scale(0.39, 0.3), Scale(-8.0, 10.0)),
+        Curve(0.85, Scale(100.0, 0.5), Scale(0.23, 0.1), Scale(1.6, 0.2), Scale(0.39, 0.19), Scale(3.0, 3.5)),
+        Curve(0.15, Scale(30.0, 1.2), Scale(0.27, 0.3), Scale(1.9, 0.35), Scale(0.39, 0.3), Scale(-8.0, 10.0)),
     )
     floors: tuple[Floor, ...] = (
         Floor(0.85, Scale(0.009, 0.38), Scale(0.22, 0.4)),
@@ -181,6 +186,21 @@ class SupraPrior:
             generator: source of randomness.
             space: the design space that the segments are in.
         """
+        latents = self.draw(people, particles, generator, space)
+        for _ in range(REDRAWS):
+            again = self.draw(people, particles, generator, space).values
+            latents = latents._replace(values=torch.where(_apart(latents.values).unsqueeze(-1), latents.values, again))
+        return latents
+
+    def draw(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> SupraLatents:
+        """Particles of the prior, but for segments that overlap.
+
+        Args:
+            people: how many people.
+            particles: how many particles of each.
+            generator: source of randomness.
+            space: the design space that the segments are in.
+        """
         size = (people, particles)
         uniform = torch.rand((4, *size), generator=generator, device=generator.device)
         starts_ms = self.start.start_ms(uniform[:2], space).movedim(0, -1)
@@ -188,14 +208,15 @@ class SupraPrior:
         return SupraLatents(values, uniform[2] < self.enhanced.probability, uniform[3] < self.depressed.probability)
 
     def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
-        """Log density of latents but for a constant, shape (b, p).
+        """Log density of latents but for a constant, -inf where the segments overlap, shape (b, p).
 
         Args:
             values: latents, shape (b, p, d).
             space: the design space that the segments are in.
         """
         starts = self.start.log_density(values[..., :2], space).sum(-1)
-        return starts + self._joint.log_density(values[..., 2:])
+        density = starts + self._joint.log_density(values[..., 2:])
+        return torch.where(_apart(values), density, -torch.inf)
 
     def person(self, latents: SupraLatents) -> Person:
         """What particles mean."""
@@ -204,6 +225,14 @@ class SupraPrior:
         depressed = _bell(z["depressed_start_ms"], z["depressed_log_width_ms"])
         depth = (z["depressed_log_shift"] - z["log_shift"]).exp()
         return Person(enhanced, _response(z), latents.enhanced, Depression(depressed, depth, latents.depressed))
+
+
+def _apart(values: Tensor) -> Tensor:
+    """Whether one segment ends before the other starts, of latents (b, p, d), shape (b, p)."""
+    z = dict(zip(LATENTS, values.unbind(-1), strict=True))
+    enhanced_ms, depressed_ms = z["start_ms"], z["depressed_start_ms"]
+    before: Tensor = enhanced_ms + z["log_width_ms"].exp() <= depressed_ms
+    return before | (depressed_ms + z["depressed_log_width_ms"].exp() <= enhanced_ms)
 
 
 def _of_segment(segment: Segment) -> tuple[Mixture, Mixture]:
