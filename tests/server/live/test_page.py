@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,15 @@ def test_the_pages_files_need_no_token_as_they_say_nothing_of_the_session(watche
         assert answer.status_code == 200
         assert "P07" not in answer.text
         assert "script-src 'self';" in answer.headers["Content-Security-Policy"]
+
+
+def test_who_shows_no_token_cannot_ask_without_a_pause(watched: Watched) -> None:
+    with httpx.Client(base_url=watched.client.base_url) as stranger:
+        for path in ("updates", "live.css", "nothing"):
+            begun_s = time.monotonic()
+            for _ in range(3):
+                stranger.get(path)
+            assert time.monotonic() - begun_s > 3 * 0.05
 
 
 def test_a_browser_that_has_a_file_is_not_sent_it_again(watched: Watched) -> None:
