@@ -55,7 +55,12 @@ def test_a_browser_that_has_a_file_is_not_sent_it_again(watched: Watched) -> Non
 
 def test_a_file_is_made_once_however_often_it_is_asked_for(monkeypatch: pytest.MonkeyPatch, watched: Watched) -> None:
     made: list[str] = []
-    monkeypatch.setitem(FILES, "/live.css", ("text/css", lambda: made.append("made") or "body {}"))
+
+    def text() -> str:
+        made.append("made")
+        return "body {}"
+
+    monkeypatch.setitem(FILES, "/live.css", ("text/css", text))
     file_of.cache_clear()
     for _ in range(3):
         assert httpx.get(watched.client.base_url.join("/live.css")).text == "body {}"
