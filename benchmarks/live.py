@@ -175,7 +175,8 @@ def main() -> None:
     parser.add_argument("--drawn", type=int, default=60, help="trials that Chromium draws")
     parser.add_argument("--seed", type=int, default=10_000)
     options = parser.parse_args()
-    _say_how()
+    load = os.getloadavg()[1]
+    _say_how(load)
     print("## What two viewers cost the loop\n")
     print("Wall time and CPU time of the session's process, page and all its threads included; the same seed with and")
     print("without, each first as often as the other. Medians, and in brackets the range of the ratios.\n")
@@ -183,6 +184,8 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|", flush=True)
     _compare(options.seed, options.paced_trials, options.iti, options.paced)
     _compare(options.seed, options.trials, 0.0, options.pairs)
+    if load > (os.cpu_count() or 1):
+        print("\nOn a machine so busy the wall times say nothing.")
     print("\nWithout waits is faster than any rig: there updates are made as often as one per cent of the time allows,")
     print("and what is seen late is the last of several trials.\n")
     print("## When Chromium has drawn it\n")
@@ -212,12 +215,12 @@ def _ratio(ratios: list[float]) -> str:
     return f"{statistics.median(ratios):.3f}{spread}"
 
 
-def _say_how() -> None:
+def _say_how(load: float) -> None:
     print("# The live page\n")
     print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.live', *sys.argv[1:]])}`")
     libraries = f"fastapi {fastapi.__version__}, uvicorn {uvicorn.__version__}"
     print(f"- isiw {isiw.__version__}, python {platform.python_version()}, {libraries}, one thread")
-    print(f"- {os.cpu_count()} cores that other programs shared; load average {os.getloadavg()[1]:.0f} before\n")
+    print(f"- {os.cpu_count()} cores that other programs shared; load average {load:.0f} before\n")
 
 
 if __name__ == "__main__":

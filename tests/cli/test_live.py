@@ -8,8 +8,23 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+import isiw
 from isiw.cli import app
+from isiw.errors import ConfigError
 from isiw.log.reader import read_session
+
+
+def test_where_the_page_cannot_be_opened_nothing_else_is_said_than_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def watch(_: object) -> None:
+        raise ConfigError("the libraries are not installed")
+
+    monkeypatch.setattr(isiw, "watch", watch, raising=False)
+    result = CliRunner().invoke(app, ["run", "--log", str(tmp_path / "s.mcap"), "--live"])
+    assert result.exit_code != 0
+    assert "the libraries are not installed" in result.output
+    assert "log:" not in result.output
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session
 from isiw.log.schema import Intent, Record
 from isiw.session.asking import Asking
+from isiw.session.following import Followers
+from isiw.session.interrupts import Interrupts
 from isiw.session.loop import Session
 from isiw.session.pace import Pace
 from isiw.session.safeguards import Safeguards
@@ -111,6 +114,81 @@ def test_an_answer_that_came_too_late_is_none_to_the_next_question() -> None:
     with pytest.raises(InvalidValueError):
         asking.answer(goes_on=True)
     assert asking.wait(lambda: True) is False
+
+
+@pytest.mark.parametrize("answers_first", [False, True])
+def test_a_question_is_answered_with_no_once_the_session_is_to_end(*, answers_first: bool) -> None:
+    asking = Asking()
+
+    def nobody() -> bool:
+        if answers_first:
+            asking.answer(goes_on=True)
+        asking.end()
+        return False
+
+    assert asking.wait(nobody) is False
+    assert asking.wait(lambda: pytest.fail("asked though it ends")) is False
+
+
+def test_only_the_question_that_is_asked_is_answered() -> None:
+    asking = Asking()
+    first, second = asking.next(), asking.next()
+
+    def nobody() -> bool:
+        with pytest.raises(InvalidValueError, match="paused again since"):
+            asking.answer(goes_on=True, number=first)
+        asking.answer(goes_on=True, number=second)
+        return False
+
+    assert asking.wait(nobody) is True
+
+
+def test_no_is_not_taken_back() -> None:
+    asking = Asking()
+
+    def nobody() -> bool:
+        asking.answer(goes_on=False)
+        with pytest.raises(InvalidValueError):
+            asking.answer(goes_on=True)
+        return False
+
+    assert asking.wait(nobody) is False
+
+
+def test_a_session_that_is_ended_just_when_a_pause_was_decided_ends_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = Session(
+        ScriptedDevice(), scripted_strategy(3), log=tmp_path / "s.mcap", safeguards=Safeguards(on_pause=bool),
+        on_trial=lambda update: session.pause("A break.") if update.trial.index == 0 else None,
+    )  # fmt: skip
+    settle = Interrupts.settle
+
+    def ended_meanwhile(interrupts: Interrupts) -> None:
+        session.end("Enough.")
+        settle(interrupts)
+
+    monkeypatch.setattr(Interrupts, "settle", ended_meanwhile)
+    result = session.run()
+    assert len(result.trials) == 1
+    assert [event.text for event in read_session(result.log).events] == ["A break.", "The operator goes on.", "Enough."]
+
+
+def test_who_fails_in_two_threads_at_once_is_let_go_of_once() -> None:
+    faults: deque[str] = deque()
+    followers = Followers(faults)
+
+    class Twice(Remembering):
+        def ended(self) -> None:
+            super().ended()
+            if self.ends == 1:
+                followers.ended()  # as another thread would, which is the first to see it fail
+            raise OSError("no more room")
+
+    followers.add(Twice())
+    followers.ended()
+    assert len(faults) == 1
+    assert not followers
 
 
 def test_the_pace_is_the_usual_one_whatever_rests_were_between() -> None:

@@ -312,10 +312,10 @@ def _run_to_the_end(session: Session, *, live: bool) -> None:
         raise isiw.errors.ConfigError(
             "the log would be overwritten by its picture", got=str(session.log_path), expected=".mcap"
         )
-    show(f"log: {session.log_path}")
     before = len(session.trials)
     try:
         with errors_reported(_INTERRUPTED), _shown_live(session) if live else nullcontext():
+            show(f"log: {session.log_path}")
             result = session.run(progress=True)
     except BaseException:
         if len(session.trials) > before:

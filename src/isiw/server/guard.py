@@ -34,9 +34,11 @@ class Rules:
         most_bytes: the longest body [bytes].
         body_s: how long a body may take to arrive [s].
         open_paths: what is answered without the token, as it says nothing of any session.
+        stranger_s: how long whoever shows no token waits for each answer [s]; so a foreign page that asks without a
+            pause, over the few connections that a browser allows it, takes little of the processor.
 
     Raises:
-        InvalidValueError: a token that is too short, or a limit that is not positive.
+        InvalidValueError: a token that is too short, a limit that is not positive, or a negative wait.
     """
 
     token: str
@@ -44,11 +46,13 @@ class Rules:
     most_bytes: int = 2**20
     body_s: float = 10.0
     open_paths: frozenset[str] = frozenset()
+    stranger_s: float = 0.05
 
     def __post_init__(self) -> None:
         check_texts(self, "token")
         check_wholes(self, "most_bytes", least=1)
         check_numbers(self, "body_s", above=0)
+        check_numbers(self, "stranger_s", least=0)
         if len(self.token) < SHORTEST_TOKEN or not self.token.isascii() or not self.token.isprintable():
             raise InvalidValueError(
                 "the token cannot be used",
@@ -82,9 +86,12 @@ class Guard:
             return
         try:
             self._require_host(headers)
-            if scope["path"] not in self._rules.open_paths:
+            if scope["path"] in self._rules.open_paths:
+                await asyncio.sleep(self._rules.stranger_s)
+            else:
                 self._require_token(headers)
         except Refusal as refusal:
+            await asyncio.sleep(self._rules.stranger_s)
             await answered(refusal, as_200=as_200)(scope, receive, send)
             return
         first: Message = {"type": "http.request", "body": body, "more_body": False}

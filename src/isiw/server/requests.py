@@ -139,7 +139,7 @@ class IncludeRequest(_Request):
 class GoOnRequest(_Request):
     """That a paused session goes on."""
 
-    reason: Text = Field(description="Why it has paused, as it was shown; a later pause is not answered by this.")
+    pause: int = Field(ge=1, description="The number of the pause that was shown; no other one is answered by this.")
 
 
 def body_of(kind: type[_Kind]) -> Callable[[Request], Awaitable[_Kind]]:

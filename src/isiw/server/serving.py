@@ -104,19 +104,22 @@ def serve(settings: ServerSettings, ready: Callable[[str], None]) -> None:
         uvicorn.Server(config).run(sockets=[listener])
 
 
-def settings_of(app: FastAPI, certificate: Path | None = None, key: Path | None = None) -> uvicorn.Config:
+def settings_of(
+    app: FastAPI, certificate: Path | None = None, key: Path | None = None, *, log_level: str = "error"
+) -> uvicorn.Config:
     """How uvicorn serves an application of isiw.
 
     Args:
         app: the application.
         certificate: the file of a TLS certificate.
         key: the file of its key.
+        log_level: from which level on uvicorn's own messages are printed.
     """
     return uvicorn.Config(
         app,
         http="h11",
         ws="none",
-        log_level="error",
+        log_level=log_level,
         access_log=False,
         server_header=False,
         proxy_headers=False,

@@ -146,9 +146,9 @@ class Desk:
         }
 
     def _decide(self, key: str) -> None:
-        if self._asking.asked:
+        try:
             self._asking.answer(goes_on=key == "r")
-        else:
+        except InvalidValueError:
             self.screen.say("The session is not paused; p pauses it.")
 
     def _judge(self, say: Callable[[int], None], outcome: str) -> None:

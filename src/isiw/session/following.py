@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Protocol
 
 from isiw.errors import told
@@ -14,7 +15,7 @@ __all__ = ["Follower", "Followers"]
 
 
 class Follower(Protocol):
-    """Somebody who looks on. Each call is made by the loop itself, and has to return at once."""
+    """Somebody who looks on. Each call has to return at once; `logged` comes from several threads."""
 
     def logged(self, record: Record, channel_name: str | None) -> None:
         """A record was appended to the log.
@@ -79,5 +80,6 @@ class Followers:
             try:
                 tell(follower)
             except Exception as error:  # noqa: BLE001 - who looks on must not stop a session
-                self._followers.remove(follower)
-                self._faults.append(f"Who looked on failed and is told nothing more: {told(error)}")
+                with suppress(ValueError):  # another thread, in which it failed as well, was first
+                    self._followers.remove(follower)
+                    self._faults.append(f"Who looked on failed and is told nothing more: {told(error)}")

@@ -26,7 +26,7 @@ from isiw.session.following import Follower, Followers
 from isiw.session.header import header_of, require_parts
 from isiw.session.journal import Journal
 from isiw.session.judging import Judging
-from isiw.session.pausing import Pausing
+from isiw.session.pausing import Pause, Pausing
 from isiw.session.progress import fitted, progress_row, show_legend, show_progress, standing
 from isiw.session.rig import Rig, require_matching
 from isiw.session.safeguards import Safeguards
@@ -147,6 +147,12 @@ class Session(Judging):
     @property
     def paused(self) -> str | None:
         """Why the session waits for somebody to say whether it goes on; None where it does not."""
+        pause = self.pause_waiting
+        return None if pause is None else pause.reason
+
+    @property
+    def pause_waiting(self) -> Pause | None:
+        """The pause that `paused` tells the reason of, with its number."""
         return self._pausing.waiting
 
     def follow(self, follower: Follower) -> None:
@@ -269,16 +275,22 @@ class Session(Judging):
         """
         self._pausing.now(reason)
 
-    def go_on(self) -> None:
+    def go_on(self, number: int | None = None) -> None:
         """Let a paused session go on, as the key r does; from any thread.
 
+        Args:
+            number: the pause that is meant, as `pause_waiting` has it; by default whichever there is.
+
         Raises:
-            InvalidValueError: it is not paused, or `Safeguards.on_pause` decides.
+            InvalidValueError: it is not paused, or pauses anew, or is to end, or `Safeguards.on_pause` decides.
         """
-        self._pausing.asking.answer(goes_on=True)
+        self._pausing.asking.answer(goes_on=True, number=number)
 
     def end(self, reason: str) -> None:
         """Disarm now, and end before the next stimulus; from any thread. The session can be resumed later.
+
+        Where a pause is being decided by `Safeguards.on_pause` or in the terminal, it ends as soon as they have
+        answered, whatever they answer.
 
         Args:
             reason: why, for the log.

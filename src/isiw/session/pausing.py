@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from isiw.session.asking import Asking
 from isiw.session.journal import Journal
 from isiw.session.operator import goes_on
 from isiw.session.rig import Rig
 from isiw.session.safeguards import Safeguards
 
-__all__ = ["Pausing"]
+__all__ = ["Pause", "Pausing"]
 
 _INTERRUPTED = "Interrupted by the operator."
+
+
+class Pause(NamedTuple):
+    """A pause that waits to be decided: the how manieth of its session it is, and why."""
+
+    number: int
+    reason: str
 
 
 class Pausing:
@@ -26,9 +35,8 @@ class Pausing:
         self._rig, self._journal = rig, journal
         self.decide = safeguards.on_pause or goes_on
         self.reason: str | None = None
-        self.waiting: str | None = None
+        self.waiting: Pause | None = None
         self.asking = Asking()
-        self._ending = False
 
     @property
     def due(self) -> bool:
@@ -45,18 +53,13 @@ class Pausing:
         self._rig.disarm()
 
     def end(self, reason: str) -> None:
-        """Disarm, and end before the next stimulus; from any thread.
+        """Disarm, and end before the next stimulus, whatever is answered to a pause; from any thread.
 
         Args:
             reason: why, for the log.
         """
-        self._ending = True
-        if self.waiting is None:
-            self.now(reason)
-            return
-        self._journal.event("pause", reason)
-        if self.asking.asked:
-            self.asking.answer(goes_on=False)
+        self.asking.end()
+        self.now(reason)
 
     def until_decided(self) -> str | None:
         """Pause until somebody says that the session goes on; where nobody does, the reason that it ends with.
@@ -76,15 +79,23 @@ class Pausing:
         if not self._goes_on(reason):
             if interrupts.heard:
                 raise KeyboardInterrupt
-            return reason
+            return self._last(reason)
         interrupts.settle()
         self._journal.event("pause", "The operator goes on.")
-        rig.stage()
+        if self.reason is None:
+            rig.stage()
         return None
 
+    def _last(self, reason: str) -> str:
+        """Why a paused session ends: what it has paused for, or what somebody said meanwhile."""
+        if self.reason is not None:
+            reason, self.reason = self.reason, None
+            self._journal.event("pause", reason)
+        return reason
+
     def _goes_on(self, reason: str) -> bool:
-        self.waiting = reason
+        self.waiting = Pause(self.asking.next(), reason)
         try:
-            return not self._ending and self._rig.interrupts.freely(self.decide, reason) and not self._ending
+            return not self.asking.over and self._rig.interrupts.freely(self.decide, reason) and not self.asking.over
         finally:
             self.waiting = None

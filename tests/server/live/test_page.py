@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,8 @@ import pytest
 
 import isiw
 from isiw.errors import ConfigError
-from isiw.server.live.routes import FILES
+from isiw.log.writer import LogWriter
+from isiw.server.live.routes import FILES, file_of
 from isiw.server.live.view import Shown, View
 from isiw.text import plain
 from server.live.watched import HOSTILE, Watched
@@ -31,6 +33,39 @@ def test_the_pages_files_need_no_token_as_they_say_nothing_of_the_session(watche
         assert answer.status_code == 200
         assert "P07" not in answer.text
         assert "script-src 'self';" in answer.headers["Content-Security-Policy"]
+
+
+def test_who_shows_no_token_cannot_ask_without_a_pause(watched: Watched) -> None:
+    with httpx.Client(base_url=watched.client.base_url) as stranger:
+        for path in ("updates", "live.css", "nothing"):
+            begun_s = time.monotonic()
+            for _ in range(3):
+                stranger.get(path)
+            assert time.monotonic() - begun_s > 3 * 0.05
+
+
+def test_a_browser_that_has_a_file_is_not_sent_it_again(watched: Watched) -> None:
+    for path in FILES:
+        url = watched.client.base_url.join(path)
+        tag = httpx.get(url).headers["ETag"]
+        again = httpx.get(url, headers={"If-None-Match": tag})
+        assert (again.status_code, again.content) == (304, b"")
+        assert httpx.get(url, headers={"If-None-Match": '"another"'}).status_code == 200
+
+
+def test_a_file_is_made_once_however_often_it_is_asked_for(monkeypatch: pytest.MonkeyPatch, watched: Watched) -> None:
+    made: list[str] = []
+
+    def text() -> str:
+        made.append("made")
+        return "body {}"
+
+    monkeypatch.setitem(FILES, "/live.css", ("text/css", text))
+    file_of.cache_clear()
+    for _ in range(3):
+        assert httpx.get(watched.client.base_url.join("/live.css")).text == "body {}"
+    file_of.cache_clear()
+    assert made == ["made"]
 
 
 def test_what_is_of_the_session_needs_the_token_and_the_pages_own_origin(watched: Watched) -> None:
@@ -73,8 +108,8 @@ def test_the_buttons_are_events_in_the_log(watched: Watched) -> None:
     done(watched.press("include", trial=1))
     done(watched.press("pause"))
     watched.until(lambda: watched.session.paused)
-    refused(watched.press("resume", reason="another"), 409, "OtherPause")
-    done(watched.press("resume", reason="Paused on the live page."))
+    refused(watched.press("resume", pause=2), 409, "OtherPause")
+    done(watched.press("resume", pause=1))
     watched.until(lambda: watched.session.paused is None)
     done(watched.press("exclude", trial=0))
     done(watched.press("stop"))
@@ -101,13 +136,29 @@ def test_a_paused_session_can_be_ended(watched: Watched) -> None:
     assert watched.events[-1] == ("pause", "Ended on the live page.")
 
 
-def test_a_pause_whose_reason_holds_what_terminals_obey_can_be_answered(watched: Watched) -> None:
+def test_a_pause_is_shown_without_what_terminals_obey(watched: Watched) -> None:
     with watched.viewer() as news:
         watched.start()
         watched.session.pause("The device said \x1b[2J.")
-        reason = next(state["pause"] for state in news if state["phase"] == "paused")
-        assert reason == "The device said ."
-        done(watched.press("resume", reason=reason))
+        pause = next(state["pause"] for state in news if state["phase"] == "paused")
+        assert pause == {"number": 1, "reason": "The device said ."}
+        done(watched.press("resume", pause=1))
+        watched.until(lambda: watched.session.paused is None)
+
+
+def test_going_on_after_an_earlier_pause_does_not_answer_a_later_one_for_the_same_reason(watched: Watched) -> None:
+    with watched.viewer() as news:
+        watched.start()
+        done(watched.press("pause"))
+        first = next(state["pause"] for state in news if state["phase"] == "paused")
+        done(watched.press("resume", pause=first["number"]))
+        watched.until(lambda: watched.session.paused is None)
+        done(watched.press("pause"))
+        second = next(state["pause"] for state in news if state["pause"] and state["pause"] != first)
+        assert second["reason"] == first["reason"]
+        refused(watched.press("resume", pause=first["number"]), 409, "OtherPause")
+        assert watched.session.paused == second["reason"]
+        done(watched.press("resume", pause=second["number"]))
         watched.until(lambda: watched.session.paused is None)
 
 
@@ -115,7 +166,7 @@ def test_what_cannot_be_done_is_said(watched: Watched) -> None:
     refused(watched.press("pause"), 409, "NotRunning")
     watched.start()
     refused(watched.press("exclude", trial=7), 422, "InvalidValueError")
-    refused(watched.press("resume", reason="Paused on the live page."), 409, "OtherPause")
+    refused(watched.press("resume", pause=1), 409, "OtherPause")
     refused(watched.press("note"), 422, "InvalidValueError")
     watched.finish()
     late: dict[str, dict[str, Any]] = {"pause": {}, "stop": {}, "note": {"text": "late"}, "exclude": {"trial": 0}}
@@ -133,6 +184,23 @@ def test_the_end_is_shown_and_ends_the_updates(watched: Watched) -> None:
     assert len(last["drawn"]["trials"]) == 6
 
 
+def test_a_session_that_has_run_is_not_said_to_have_not_begun_while_its_log_is_closed(
+    watched: Watched, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    phases: list[str] = []
+    close = LogWriter.close
+
+    def closing(log: LogWriter) -> None:
+        with watched.viewer() as news:
+            phases.append(next(state["phase"] for state in news if state["phase"] != "running"))
+        close(log)
+
+    monkeypatch.setattr(LogWriter, "close", closing)
+    watched.start()
+    watched.finish()
+    assert phases == ["ending"]
+
+
 def test_where_nobody_looks_on_and_there_is_no_terminal_a_pause_ends_the_session(watched: Watched) -> None:
     watched.start()
     watched.session.pause("A look at the coil.")
@@ -141,7 +209,7 @@ def test_where_nobody_looks_on_and_there_is_no_terminal_a_pause_ends_the_session
 
 
 def test_viewers_that_never_read_or_vanish_do_not_hold_a_session_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(View, "shown", _larger_than_any_buffer)
     with Watched(tmp_path / "s.mcap", trials=20) as watched:
@@ -155,6 +223,7 @@ def test_viewers_that_never_read_or_vanish_do_not_hold_a_session_up(
         watched.page.close()
         silent.close()
     assert len(watched.record.table) == 20
+    assert capfd.readouterr().err == ""
 
 
 def _larger_than_any_buffer(view: View, shown: Callable[[View], Shown] = View.shown) -> Shown:

@@ -19,14 +19,14 @@
   }
 
   const phases = {
-    waiting: "The session has not begun.", running: "The session runs.",
+    waiting: "The session has not begun.", running: "The session runs.", ending: "The session ends.",
     over: "The session has ended. This page shows its last state.",
   };
 
   function tellPhase() {
     const { phase, pause } = shown;
     element("phase").dataset.phase = phase;
-    said("phase", phase === "paused" ? `Paused: ${pause} The device is disarmed.` : phases[phase]);
+    said("phase", phase === "paused" ? `Paused: ${pause.reason} The device is disarmed.` : phases[phase]);
   }
 
   function tellLast(trial) {
@@ -200,10 +200,10 @@
   }
 
   element("pause").addEventListener("click", () => send("pause", {}, "The device is disarmed; the session pauses."));
-  element("resume").addEventListener("click", () => send("resume", { reason: shown.pause }, "The session goes on."));
+  element("resume").addEventListener("click", () => send("resume", { pause: shown.pause.number }, "The session goes on."));
   element("stop").addEventListener("click", () => askStop(true));
   element("stop-not").addEventListener("click", () => askStop(false));
-  element("stop-sure").addEventListener("click", () => send("stop", {}, "The session ends."));
+  element("stop-sure").addEventListener("click", () => send("stop", {}, "The device is disarmed; the session ends before another stimulus."));
   element("exclude").addEventListener("click", () => {
     const { number, kind } = shown.drawn.trials.at(-1);
     if (kind === "excluded") send("include", { trial: number }, `Trial ${number} counts again.`);

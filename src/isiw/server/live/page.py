@@ -51,7 +51,8 @@ class LivePage:
 
     def __init__(self, session: Session, port: int) -> None:
         self._view, token = View(session), new_token()
-        config = settings_of(make_live_app(session, self._view, token))
+        app = make_live_app(session, self._view, token)
+        config = settings_of(app, log_level="critical")  # the screen is the operator's
         self._listener = listening(_ADDRESS, port)
         self.url = f"http://{_ADDRESS}:{self._listener.getsockname()[1]}/#{token}"
         self._server = uvicorn.Server(config)

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+import hashlib
+from collections.abc import AsyncIterator, Awaitable, Callable
+from functools import cache
 from importlib import resources
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 from fastapi import APIRouter, Depends, Request, Response
 from fastapi.responses import StreamingResponse
 from plotly.offline import get_plotlyjs
 
+from isiw.errors import InvalidValueError
 from isiw.server.answers import OkAnswer
 from isiw.server.live.view import View
 from isiw.server.refusals import Refusal
 from isiw.server.requests import ExcludeRequest, GoOnRequest, IncludeRequest, NoteRequest, body_of
 from isiw.session.loop import Session
-from isiw.text import plain
 
-__all__ = ["FILES", "router"]
+__all__ = ["FILES", "file_of", "router"]
 
 GLANCE_S, MOST_S = 0.05, 0.5
 """How often is looked for news, and how long at most where none is put together for a while [s]."""
@@ -46,8 +48,8 @@ _HEADERS: Final = {
     "Content-Security-Policy": _POLICY,
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
-    "Cache-Control": "no-store",
 }
+_UPDATES_HEADERS: Final = {**_HEADERS, "Cache-Control": "no-store"}
 
 router = APIRouter()
 
@@ -56,15 +58,39 @@ def _asset(room: str, name: str) -> str:
     return (resources.files(room) / "assets" / name).read_text(encoding="utf-8")
 
 
-def _file(kind: str, text: Callable[[], str]) -> Callable[[], Response]:
-    def file() -> Response:
-        return Response(text(), media_type=kind, headers=_HEADERS)
+class _File(NamedTuple):
+    """A file of the page, made once: to read and encode the largest takes as long as a good many updates."""
+
+    content: bytes
+    kind: str
+    headers: dict[str, str]
+
+
+@cache
+def file_of(path: str) -> _File:
+    """A file of the page.
+
+    Args:
+        path: its path.
+    """
+    kind, text = FILES[path]
+    content = text().encode()
+    tag = f'"{hashlib.sha256(content).hexdigest()}"'
+    return _File(content, kind, {**_HEADERS, "Cache-Control": "no-cache", "ETag": tag})
+
+
+def _serving(path: str) -> Callable[[Request], Awaitable[Response]]:
+    async def file(request: Request) -> Response:
+        content, kind, headers = file_of(path)
+        if request.headers.get("if-none-match") == headers["ETag"]:
+            return Response(status_code=304, headers=headers)
+        return Response(content, media_type=kind, headers=headers)
 
     return file
 
 
-for path, (kind, text) in FILES.items():
-    router.get(path)(_file(kind, text))
+for path in FILES:
+    router.get(path)(_serving(path))
 
 
 def _view(request: Request) -> View:
@@ -91,7 +117,7 @@ Running = Annotated[Session, Depends(_session)]
 @router.get("/updates")
 async def updates(view: Annotated[View, Depends(_view)]) -> StreamingResponse:
     """What the page shows, whenever it changes, as Server-Sent Events; until the session has ended."""
-    return StreamingResponse(_followed(view), media_type="text/event-stream", headers=_HEADERS)
+    return StreamingResponse(_followed(view), media_type="text/event-stream", headers=_UPDATES_HEADERS)
 
 
 async def _followed(view: View) -> AsyncIterator[str]:
@@ -123,10 +149,13 @@ def pause(session: Running) -> OkAnswer:
 
 @router.post("/resume")
 def resume(session: Running, body: Annotated[GoOnRequest, Depends(body_of(GoOnRequest))]) -> OkAnswer:
-    """Let the paused session go on, if it still waits for what was shown."""
-    if session.paused is None or body.reason != plain(session.paused):
-        raise Refusal(409, "OtherPause", "the session does not wait for this answer", got=body.reason, field="reason")
-    session.go_on()
+    """Let the paused session go on, if it still waits in the pause that was shown."""
+    try:
+        session.go_on(body.pause)
+    except InvalidValueError as error:
+        raise Refusal(
+            409, "OtherPause", error.what, got=error.got, expected=error.expected, remedy=error.remedy, field="pause"
+        ) from error
     return OkAnswer()
 
 

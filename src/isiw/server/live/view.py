@@ -15,6 +15,7 @@ from isiw.log.schema import Estimate, Event, Intent, Record, Waveform
 from isiw.report.drawn import drawn
 from isiw.report.facts import first_facts
 from isiw.session.loop import Session
+from isiw.session.pausing import Pause
 from isiw.session.updates import SessionUpdate
 from isiw.text import plain
 from isiw.trials import Trial
@@ -59,6 +60,7 @@ class View:
         self._update: SessionUpdate | None = None
         self._numbers = itertools.count(1)
         self._news = self._viewers = 0
+        self._has_begun = False
         self._seen_s: float | None = None
         self._shown, self._next_s = Shown(None, ""), 0.0
         self._facts = [(fact.name, plain(fact.value)) for fact in first_facts(self._record())]
@@ -66,6 +68,7 @@ class View:
 
     def logged(self, record: Record, channel_name: str | None) -> None:
         """Keep what was logged."""
+        self._has_begun = True
         if isinstance(record, Waveform):
             self._coming[record.trial, channel_name or ""] = record
             return
@@ -108,7 +111,7 @@ class View:
 
     def shown(self) -> Shown:
         """What the page shows now; put together once for all who look, and not too often."""
-        state = (self._news, self._session.paused, self._session.running, self.over)
+        state = (self._news, self._session.pause_waiting, self._session.running, self.over)
         if state != self._shown.state and (self.over or time.monotonic() >= self._next_s):
             begun_s = time.thread_time()
             self._shown = Shown(state, json.dumps(self._contents(), allow_nan=False, separators=(",", ":")))
@@ -121,10 +124,10 @@ class View:
         return self._next_s - time.monotonic()
 
     def _contents(self) -> dict[str, Any]:
-        record, update = self._record(), self._update
+        record, update, pause = self._record(), self._update, self._session.pause_waiting
         return {
-            "phase": self._phase(),
-            "pause": plain(self._session.paused or ""),
+            "phase": self._phase(pause),
+            "pause": None if pause is None else {"number": pause.number, "reason": plain(pause.reason)},
             "subject": plain(record.header.subject) or "an unnamed subject",
             "facts": self._facts,
             "drawn": drawn(record),
@@ -135,12 +138,14 @@ class View:
             "events": [[event.trial, event.kind, plain(event.text)] for event in tuple(self._events)],
         }
 
-    def _phase(self) -> str:
+    def _phase(self, pause: Pause | None) -> str:
         if self.over:
             return "over"
-        if self._session.paused is not None:
+        if pause is not None:
             return "paused"
-        return "running" if self._session.running else "waiting"
+        if self._session.running:
+            return "running"
+        return "ending" if self._has_begun else "waiting"
 
     def _record(self) -> SessionRecord:
         """The session as a log would tell it that had the last estimate and the last sweep alone."""
