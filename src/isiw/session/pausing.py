@@ -16,7 +16,7 @@ _INTERRUPTED = "Interrupted by the operator."
 
 
 class Pause(NamedTuple):
-    """A pause that waits to be decided: the how manieth of its session it is, and why."""
+    """A pause that waits to be decided: its number in the session, from 1, and why."""
 
     number: int
     reason: str
