@@ -80,9 +80,13 @@ class JointMixture:
         )
         sizes = torch.tensor([block.means.shape[-1] for block in blocks])
         block = torch.repeat_interleave(torch.arange(len(blocks)), sizes)
-        belongs = torch.nn.functional.one_hot(block, len(blocks)).float().T
-        log_shares = shares.log().T.unsqueeze(-1) - belongs @ sds.log().unsqueeze(-1)
-        self._tables = {torch.device("cpu"): _Tables(means, sds, block, belongs, shares.cumsum(-1)[:, :-1], log_shares)}
+        several = torch.tensor([len(block.shares) > 1 for block in blocks])
+        plain, mixed = (which.nonzero().squeeze(-1) for which in (~several[block], several[block]))
+        belongs = torch.nn.functional.one_hot(block[mixed], len(blocks)).float().T[several]
+        log_shares = shares[several].log().T.unsqueeze(-1) - belongs @ sds[:, mixed].log().unsqueeze(-1)
+        below, plain_scale = shares.cumsum(-1)[:, :-1], -sds[0, plain].log().sum()
+        tables = _Tables(means, sds, block, plain, plain_scale, mixed, belongs, below, log_shares)
+        self._tables = {torch.device("cpu"): tables}
 
     def sample(self, size: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """Draws, shape (*size, d).
@@ -102,9 +106,12 @@ class JointMixture:
         """Log density but for a constant at x (..., d), shape (...)."""
         tables = self._on(x.device)
         # With the particles last, every step runs along memory.
-        z = (x.flatten(0, -2).T - tables.means.unsqueeze(-1)) / tables.sds.unsqueeze(-1)
-        parts = torch.matmul(tables.belongs, z.square_()).mul_(-0.5).add_(tables.log_shares)
-        density: Tensor = torch.logsumexp(parts, dim=0).sum(0)
+        latents = x.flatten(0, -2).T
+        density = tables.plain_scale - 0.5 * tables.squares(latents, tables.plain, components=1).sum((0, 1))
+        if len(tables.mixed):
+            squares = tables.squares(latents, tables.mixed, components=len(tables.means))
+            parts = torch.matmul(tables.belongs, squares).mul_(-0.5).add_(tables.log_shares)
+            density += torch.logsumexp(parts, dim=0).sum(0)
         return density.view(x.shape[:-1])
 
     def _on(self, device: torch.device) -> _Tables:
@@ -119,9 +126,17 @@ class _Tables(NamedTuple):
     means: Tensor  # (k, d)
     sds: Tensor  # (k, d)
     block: Tensor  # of each latent, (d,)
-    belongs: Tensor  # latents to blocks, (blocks, d)
+    plain: Tensor  # the latents of blocks with one component, (d - m,)
+    plain_scale: Tensor  # less the sum of the logs of their SDs, ()
+    mixed: Tensor  # those of blocks with several, (m,)
+    belongs: Tensor  # which of these blocks they are of, (mixed blocks, m)
     below: Tensor  # sums of the shares of earlier components, (blocks, k - 1)
-    log_shares: Tensor  # less the logs of the SDs, (k, blocks, 1)
+    log_shares: Tensor  # less the logs of the SDs, (k, mixed blocks, 1)
+
+    def squares(self, latents: Tensor, which: Tensor, components: int) -> Tensor:
+        """Squared distances of some latents (d, n) from the means of the first components, in SDs, shape (k, m, n)."""
+        means, sds = (law[:components, which].unsqueeze(-1) for law in (self.means, self.sds))
+        return ((latents[which] - means) / sds).square_()
 
 
 def drawn(shares: tuple[float, ...], quantile: Tensor) -> Tensor:

@@ -112,8 +112,8 @@ class Mover:
     def _step(self, mine: _Weighed, theirs: Latents, counts: Tensor) -> _Weighed:
         like = mine.log_likelihood
         jumps = self._uniform(like) < JUMP_PROBABILITY
-        shifted, jumped = self._shift(mine.latents, theirs), self._jump(mine.latents)
-        proposal = Latents(*(_choose(jumps, a, b) for a, b in zip(jumped, shifted, strict=True)))
+        shifted, jumped = self._shift(mine.latents, theirs), self._jump(mine.latents, jumps)
+        proposal = Latents(*(a.index_put((jumps,), b) for a, b in zip(shifted, jumped, strict=True)))
         log_likelihood = total_log_likelihood(self.prior.person(proposal), self.history)
         log_prior = self.prior.log_density(proposal.values, self.space)
         # A jump draws from the prior, so that its density cancels.
@@ -137,18 +137,26 @@ class Mover:
         blur = BLUR * self.prior.spreads.to(mine.values) * self._normal(mine.values)
         return mine._replace(values=mine.values + moves * (scale.unsqueeze(-1) * (first - second) + blur))
 
-    def _jump(self, mine: Latents) -> Latents:
-        """Draw some kinds, and the latents that go with them, anew from the prior."""
-        people, size = mine.present.shape
-        fresh = self.prior.sample(people, size, self.generator, self.space)
-        jump = drawn(tuple(JUMPS.values()), self._uniform(mine.present))
+    def _jump(self, mine: Latents, who: Tensor) -> Latents:
+        """Some of the particles, some of their kinds and the latents that go with them drawn anew from the prior.
+
+        Args:
+            mine: particles, fields of shape (b, p).
+            who: which of them jump, shape (b, p).
+
+        Returns:
+            Those who jump, fields of shape (n,).
+        """
+        before = Latents(*(field[who] for field in mine))
+        fresh = self.prior.sample(1, len(before.present), self.generator, self.space)
+        jump = drawn(tuple(JUMPS.values()), self._uniform(before.present))
         form, noise, window, _, _ = (jump == number for number in range(len(JUMPS)))
         redraw = _redrawn(mine.values.device)[jump]
         return Latents(
-            values=torch.where(redraw, fresh.values, mine.values),
-            shape=torch.where(form | window, fresh.shape, mine.shape),
-            noise=torch.where(noise, fresh.noise, mine.noise),
-            present=torch.where(window, fresh.present, mine.present),
+            values=torch.where(redraw, fresh.values[0], before.values),
+            shape=torch.where(form | window, fresh.shape[0], before.shape),
+            noise=torch.where(noise, fresh.noise[0], before.noise),
+            present=torch.where(window, fresh.present[0], before.present),
         )
 
     def _uniform(self, like: Tensor) -> Tensor:
