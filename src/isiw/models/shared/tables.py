@@ -38,6 +38,9 @@ def interpolated(table: Tensor, level: Tensor) -> Tensor:
     position = level.clamp(0.0, 1.0).sqrt() * (LEVELS - 1)
     below = position.floor().clamp_max(LEVELS - 2)
     first = LEVELS * torch.arange(table.shape[0] * table.shape[1], device=level.device).view(*table.shape[:2], 1)
-    rows, row = table.reshape(-1, table.shape[-1]), (first + below.long()).flatten()
-    between = torch.lerp(rows[row], rows[row + 1], (position - below).view(-1, 1))
+    row, above = (first + below.long()).flatten(), (position - below).flatten()
+    pairs, weights = torch.stack((row, row + 1), -1), torch.stack((1.0 - above, above), -1)
+    rows = table.reshape(-1, table.shape[-1])
+    # The weighted sum of each pair of rows in one pass, without the pairs in memory.
+    between = torch.nn.functional.embedding_bag(pairs, rows, per_sample_weights=weights, mode="sum")
     return between.view(*level.shape, -1)
