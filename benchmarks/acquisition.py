@@ -115,17 +115,18 @@ def facts_of(script: str, seed: int, people: int) -> dict[str, object]:
     return {"command": command, "versions": versions, "seed": seed, "people": people}
 
 
-def write(rows: pd.DataFrame, facts: dict[str, object], fixed: pd.DataFrame, out: Path) -> None:
-    """Tables and picture."""
+def write(rows: pd.DataFrame, facts: dict[str, object], out: Path, fixed: pd.DataFrame | None = None) -> None:
+    """Tables and picture; `fixed` is what is reached without any trial, where that was measured."""
     out.parent.mkdir(parents=True, exist_ok=True)
     table = summary(rows)
     tables = {
         "F1 by trial": table,
-        "The best fixed window: F1 without any trial": fixed,
+        "The best fixed window: F1 without any trial": pd.DataFrame() if fixed is None else fixed,
         "Pairs delivered from which on mean F1 is kept (among the marked trials)": reached(table),
         "False decisions": decisions(rows),
         "At the stopping rule": at_stopping(rows),
     }
+    tables = {title: part for title, part in tables.items() if not part.empty}
     header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
     parts = [f"## {title}\n\n{part.to_markdown(index=False, floatfmt='.3f')}\n" for title, part in tables.items()]
     out.with_suffix(".md").write_text("\n".join([header, "", *parts]))
@@ -229,7 +230,7 @@ def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
         if amplitude == 1.0:
             tables.append(run_oracle(replace(study, people=min(people, oracle_people)), workers, progress))
     fixed = fixed_windows(names, people, seed, study.space)
-    write(pd.concat(tables, ignore_index=True), facts_of("benchmarks/acquisition.py", seed, people), fixed, out)
+    write(pd.concat(tables, ignore_index=True), facts_of("benchmarks/acquisition.py", seed, people), out, fixed)
     print(out.with_suffix(".md").read_text())
 
 
