@@ -16,18 +16,18 @@ import typer
 from rich.progress import Progress
 
 from acquisition import MARKS, facts_of, write
-from isiw.studies import Failure, Processes
+from isiw.studies import Failure, Processes, SimulatedSession
 from isiw.studies.batch import simulate_batch
 from recorded_people import FOLDER, PEOPLE, RecordedSession
 
 
 def batches(
     strategies: list[str], people: int, size: int, plan: tuple[int, int, tuple[int, ...]]
-) -> list[list[RecordedSession]]:
-    """Sessions of each strategy with each kind of people, so many side by side."""
+) -> list[list[SimulatedSession]]:
+    """Sessions of each strategy with each kind of people, so many side by side; the rig states its hit delay."""
     numbers = [range(first, min(first + size, people)) for first in range(0, people, size)]
     return [
-        [RecordedSession(strategy, kind, person, *plan) for person in some]
+        [RecordedSession(strategy, kind, person, *plan).with_stated_hit_delay() for person in some]
         for strategy in strategies
         for kind in PEOPLE
         for some in numbers
