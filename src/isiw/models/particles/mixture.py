@@ -127,11 +127,11 @@ class _Tables(NamedTuple):
     sds: Tensor  # (k, d)
     block: Tensor  # of each latent, (d,)
     plain: Tensor  # the latents of blocks with one component, (d - m,)
-    plain_scale: Tensor  # less the sum of the logs of their SDs, ()
+    plain_scale: Tensor  # minus the sum of the logs of their SDs, ()
     mixed: Tensor  # those of blocks with several, (m,)
     belongs: Tensor  # which of these blocks they are of, (mixed blocks, m)
     below: Tensor  # sums of the shares of earlier components, (blocks, k - 1)
-    log_shares: Tensor  # less the logs of the SDs, (k, mixed blocks, 1)
+    log_shares: Tensor  # minus the logs of the SDs, (k, mixed blocks, 1)
 
     def squares(self, latents: Tensor, which: Tensor, components: int) -> Tensor:
         """Squared distances of some latents (d, n) from the means of the first components, in SDs, shape (k, m, n)."""
