@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-
-from forked import Forked
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 SCRIPTS = {
@@ -18,28 +18,27 @@ SCRIPTS = {
 }
 
 
-def script(name: str, arguments: list[str]) -> str:
-    """Source text that runs a benchmark as from the command line."""
-    begin = f"import runpy, sys; sys.path.insert(0, {str(FOLDER)!r}); sys.argv = {[name, *arguments]!r}"
-    return f"{begin}\nrunpy.run_path({str(FOLDER / name)!r} + '.py', run_name='__main__')"
+def run(name: str, arguments: list[str]) -> None:
+    """Run a benchmark as from the command line."""
+    command = [sys.executable, str(FOLDER / f"{name}.py"), *arguments]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - a script of this repository
+    assert ended.returncode == 0, ended.stderr
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_a_benchmark_writes_its_table(name: str, tmp_path: Path) -> None:
     out = tmp_path / name
-    with Forked(script(name, [*SCRIPTS[name].split(), "--workers", "1", "--out", str(out)])) as process:
-        _, said = process.stdout.read(), process.stderr.read()
-        assert process.returncode == 0, said
+    run(name, [*SCRIPTS[name].split(), "--workers", "1", "--out", str(out)])
     assert "- command: `python benchmarks/" in out.with_suffix(".md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
 def test_two_versions_are_compared_on_the_same_people(tmp_path: Path) -> None:
     folder, out = str(tmp_path / "now"), tmp_path / "compared"
-    runs = [["run", "--cohorts", "gaussian", "--people", "2", "--seed", "1", "--workers", "1", "--out", folder]]
-    for arguments in [*runs, ["compare", folder, folder, "--out", str(out)]]:
-        with Forked(script("before_and_now", arguments)) as process:
-            _, said = process.stdout.read(), process.stderr.read()
-            assert process.returncode == 0, said
+    run(
+        "before_and_now",
+        ["run", "--cohorts", "gaussian", "--people", "2", "--seed", "1", "--workers", "1", "--out", folder],
+    )
+    run("before_and_now", ["compare", folder, folder, "--out", str(out)])
     assert "gaussian" in out.with_suffix(".md").read_text(encoding="utf-8")
