@@ -1,4 +1,4 @@
-"""The benchmarks of the default run from end to end, with a few people."""
+"""Benchmarks of the default run from end to end, with a few people."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ import pytest
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 SCRIPTS = {
-    "acquisition": "--cohorts gaussian --strategies default --others nr --people 2 --other-people 2 --trials 5",
-    "another_day": "--people 2 --earlier-trials 4 --trials 4",
     "limits": "--cohorts late --people 2 --trials 5",
-    "people": "--cohorts gaussian,nonresponder --people 2 --trials 5",
+    "people": "--cohorts gaussian --people 2 --trials 5",
     "recorded": "--strategies default --people 1 --trials 5",
 }
 
