@@ -4,17 +4,22 @@
     PYTHONPATH=../before/src python benchmarks/before_and_now.py run --out before
     python benchmarks/before_and_now.py run --out now
     python benchmarks/before_and_now.py compare before now --out benchmarks/results/before_and_now
+    python benchmarks/before_and_now.py speed ../before/src src > benchmarks/results/before_and_now_speed.md
 
-`run` keeps one table a cohort, and goes on where it was interrupted; `compare` pairs the people of both. The hit delay
-is stated where a version can be told it. Reported people come from seed 100,000 on; seeds below 1,000 are for work.
+`run` keeps one table a cohort, and goes on where it was interrupted; `compare` pairs the people of both; `speed` has
+both run the same sessions in turn. The hit delay is stated where a version can be told it. Reported people come from
+seed 100,000 on; seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
 
 import inspect
+import os
 import platform
 import shlex
+import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,7 +27,7 @@ import pandas as pd
 import torch
 import typer
 
-from isiw.studies import Processes, Study, StudyStrategy, conduct
+from isiw.studies import Processes, Study, StudyStrategy, conduct, run_unit
 
 MARKS = (5, 10, 15, 20, 25, 30, 40)
 COHORTS = "recruitment,gaussian,nonresponder"
@@ -40,20 +45,8 @@ def run(
 ) -> None:
     """Run the default of the isiw that is imported."""
     torch.set_num_threads(1)
-    told: dict[str, Any] = {"hit_delay": "stated"} if "hit_delay" in inspect.signature(Study).parameters else {}
     for name in cohorts.split(","):
-        study = Study(
-            (StudyStrategy("default"),),
-            (name,),
-            people,
-            seed,
-            MARKS[-1],
-            MARKS,
-            engine="batched",
-            batch=25,
-            stopping="ignored",
-            **told,
-        )
+        study = study_of(name, people, seed, MARKS)
         results = conduct(study, out / f"{name}.study", executor=Processes(workers))
         results.rows().to_parquet(out / f"{name}.parquet")
 
@@ -67,14 +60,68 @@ def compare(
     """Pair the people that both versions measured."""
     table = pd.concat([paired(before / path.name, path) for path in sorted(now.glob("*.parquet"))])
     command = shlex.join(["python", "benchmarks/before_and_now.py", *sys.argv[1:]])
+    seeds = ", ".join(f"{seed:,}" for seed in pd.read_parquet(next(now.glob("*.parquet")))["seed"].unique())
     lines = [
-        f"- command: `{command}`, after `run` with both versions",
+        f"- command: `{command}`, after `run` with both versions; seed of the people {seeds}",
         f"- python {platform.python_version()}, torch {torch.__version__}",
         "- the hit delay is stated where it can be; the stopping rule is ignored",
     ]
     text = table.to_markdown(index=False, floatfmt=".3f")
     out.with_suffix(".md").write_text("\n".join([*lines, "", text, ""]), encoding="utf-8")
     print(text)
+
+
+@app.command()
+def speed(
+    before: Annotated[Path, typer.Argument(help="Folder src of the other version.")],
+    now: Annotated[Path, typer.Argument(help="Folder src of this version.")],
+    laps: Annotated[int, typer.Option(help="How often each runs 50 sessions of 30 trials.")] = 4,
+) -> None:
+    """Print the processor time of both versions, each lap first as often as second; the stopping rule is ignored."""
+    rows = []
+    for number in range(laps):
+        order = (before, now) if number % 2 == 0 else (now, before)
+        spent_s = {source: _lap_s(source, number) for source in order}
+        rows.append({"seed": number, "before_s": spent_s[before], "now_s": spent_s[now]})
+    table = pd.DataFrame(rows).assign(ratio=lambda t: t["before_s"] / t["now_s"])
+    print(f"- command: `{shlex.join(['python', 'benchmarks/before_and_now.py', *sys.argv[1:]])}`")
+    print(f"- python {platform.python_version()}, torch {torch.__version__}; {platform.machine()}, one thread")
+    print("- processor time of 50 sessions of `recruitment` side by side, 30 trials each\n")
+    print(table.to_markdown(index=False, floatfmt=".2f"))
+
+
+def _lap_s(source: Path, seed: int) -> float:
+    """Processor time of 50 sessions with the isiw in a folder [s]."""
+    environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, __file__, "lap", str(seed)]
+    ended = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)  # noqa: S603 - this file
+    return float(ended.stdout)
+
+
+@app.command(hidden=True)
+def lap(seed: int) -> None:
+    """Print the processor time of 50 sessions with the isiw that is imported [s]."""
+    torch.set_num_threads(1)
+    (unit,) = study_of("recruitment", 50, seed, (10, 20, 30), batch=50).units()
+    began_s = time.process_time()
+    run_unit(unit)
+    print(time.process_time() - began_s)
+
+
+def study_of(cohort: str, people: int, seed: int, marks: tuple[int, ...], batch: int = 25) -> Study:
+    """The default on a cohort; the stopping rule is ignored, and the hit delay stated where a version can be told it.
+
+    Args:
+        cohort: name of the cohort.
+        people: how many.
+        seed: of the people.
+        marks: trials after which there is an estimate; the last is the last.
+        batch: how many sessions are side by side.
+    """
+    told: dict[str, Any] = {"hit_delay": "stated"} if "hit_delay" in inspect.signature(Study).parameters else {}
+    default = (StudyStrategy("default"),)
+    plan: dict[str, Any] = {"engine": "batched", "batch": batch, "stopping": "ignored"}
+    return Study(default, (cohort,), people, seed, marks[-1], marks, **plan, **told)
 
 
 def paired(before: Path, now: Path) -> pd.DataFrame:

@@ -89,8 +89,8 @@ def _serving(path: str) -> Callable[[Request], Awaitable[Response]]:
     return file
 
 
-for path in FILES:
-    router.get(path)(_serving(path))
+for _path in FILES:
+    router.get(_path)(_serving(_path))
 
 
 def _view(request: Request) -> View:
