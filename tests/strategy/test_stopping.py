@@ -125,7 +125,7 @@ def test_without_an_expected_f1_neither_rule_stops() -> None:
 
 @pytest.mark.parametrize(
     ("first", "told", "probability", "stop"),
-    [(0.79, 40, 0.95, True), (0.7, 40, 0.95, False), (0.79, 39, 0.95, False), (0.79, 40, 0.6, False)],
+    [(0.79, 40, 0.95, True), (0.7, 40, 0.95, False), (0.79, 39, 0.95, False), (0.79, 40, 0.89, False)],
 )
 def test_stimuli_that_added_little_are_the_last(first: float, told: int, probability: float, *, stop: bool) -> None:
     f1s = np.linspace(first, 0.8, 11).tolist()

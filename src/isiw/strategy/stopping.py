@@ -203,7 +203,7 @@ class SmallGain:
     gain: float = 0.02
     last: int = 10
     min_told: int = 40
-    min_probability: float = 0.7
+    min_probability: float = 0.9
 
     def __post_init__(self) -> None:
         check_probabilities(self, "gain", "min_probability")
@@ -220,7 +220,8 @@ class SmallGain:
         if small and progress.told >= self.min_told:
             reason = f"Another {self.last} stimuli would add little: {added}, now {now.expected_f1:.2f}."
             return StopDecision(stop=True, reason=reason)
-        return StopDecision(stop=False, reason=f"Stimuli still add something, or too few were given: {added}.")
+        reason = f"Too early to stop: {added}, and a window has probability {now.probability:.2f}."
+        return StopDecision(stop=False, reason=reason)
 
 
 @dataclass(frozen=True)
