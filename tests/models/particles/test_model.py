@@ -10,6 +10,7 @@ from isiw.acquisition.information import mutual_information
 from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.metrics import covers
+from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import LATENTS
 from isiw.models.particles.laws import FOREARM, NoiseShares, ProfilePrior
 from isiw.models.particles.likelihood import levels, total_log_likelihood
@@ -159,7 +160,7 @@ def test_moves_without_trials_leave_the_prior_as_it_is() -> None:
     generator = torch.Generator().manual_seed(2)
     reference = prior.sample(1, 100_000, generator, VALVE_SPACE).values[0]
     latents = prior.sample(1, 8000, generator, VALVE_SPACE)
-    mover = Mover(prior, VALVE_SPACE, History.empty(1, torch.device("cpu")), generator)
+    mover = Mover(WindowTarget(prior, VALVE_SPACE), History.empty(1, torch.device("cpu")), generator)
     moved = mover.sweeps(20, latents, torch.zeros(1, 8000))
     latents = moved.latents
     assert 0.05 < moved.shifts.item() < 1

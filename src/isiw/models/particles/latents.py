@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 from typing import Final, NamedTuple
 
@@ -85,3 +86,7 @@ class Latents(NamedTuple):
     shape: Tensor
     noise: Tensor
     present: Tensor
+
+    def remade(self, fields: Iterable[Tensor]) -> Latents:
+        """Particles with other fields, in the same order."""
+        return Latents(*fields)

@@ -16,6 +16,7 @@ import torch
 from isiw.checks import MOST_OF_A_KIND, check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
+from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import levels, total_log_likelihood
 from isiw.models.particles.moves import Mover
@@ -134,7 +135,7 @@ class ParticleModel:
         ess = ess_share(after.log_weights)
         worn = ess < self.moves.min_ess
         after = self._resampled(after, worn, generator)
-        mover = Mover(self.prior, posterior.space, after.history, generator)
+        mover = Mover(WindowTarget(self.prior, posterior.space), after.history, generator)
         sweeps = self.moves.sweeps_after(after.trials, resampled=bool(worn.any()))
         moved = mover.sweeps(sweeps, after.latents, after.log_likelihood)
         health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))

@@ -12,9 +12,10 @@ import torch
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.metrics import f1
+from isiw.models.particles.moves import Mover
 from isiw.models.particles.supra import SupraModel
+from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.model import SupraPosterior
-from isiw.models.particles.supra.moves import SupraMover
 from isiw.models.particles.supra.prior import LATENTS, Segment, SupraPrior
 from isiw.models.protocol import SamplesDepression
 from isiw.models.shared.history import History
@@ -91,8 +92,8 @@ def test_what_is_sampled_has_both_kinds_of_segment() -> None:
 def test_moves_leave_the_prior_as_it_is() -> None:
     prior, generator = SupraPrior(), torch.Generator().manual_seed(2)
     drawn = prior.sample(1, 4000, generator, SPACE)
-    mover = SupraMover(prior, SPACE, History.empty(1, torch.device("cpu")), generator)
-    moved = mover.sweeps(6, drawn, torch.zeros(1, 4000))
+    mover = Mover(SupraTarget(prior, SPACE), History.empty(1, torch.device("cpu")), generator)
+    moved = mover.sweeps(8, drawn, torch.zeros(1, 4000))
     assert (moved.latents.values != drawn.values).any(-1).double().mean() > 0.9
     assert moved.shifts.item() > 0.1
     fresh = prior.sample(1, 4000, generator, SPACE)

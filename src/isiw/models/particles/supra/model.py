@@ -17,8 +17,9 @@ from isiw.design import DesignSpace
 from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.model import Moving
+from isiw.models.particles.moves import Mover
 from isiw.models.particles.prior import Person
-from isiw.models.particles.supra.moves import SupraMover
+from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraLatents, SupraPrior
 from isiw.models.protocol import Observation, Tensor
@@ -86,7 +87,7 @@ class SupraModel:
         ess = ess_share(after.log_weights)
         worn = ess < self.moves.min_ess
         after = after.resampled(worn, torch.randperm(self.particles, generator=generator))
-        mover = SupraMover(self.prior, posterior.space, after.history, generator)
+        mover = Mover(SupraTarget(self.prior, posterior.space), after.history, generator)
         sweeps = self.moves.sweeps_after(after.trials, resampled=bool(worn.any()))
         moved = mover.sweeps(sweeps, after.latents, after.log_likelihood)
         health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))

@@ -8,6 +8,7 @@ One segment ends before the other starts, also where only one is there or none, 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -71,6 +72,10 @@ class SupraLatents(NamedTuple):
     values: Tensor
     enhanced: Tensor
     depressed: Tensor
+
+    def remade(self, fields: Iterable[Tensor]) -> SupraLatents:
+        """Particles with other fields, in the same order."""
+        return SupraLatents(*fields)
 
 
 @dataclass(frozen=True)

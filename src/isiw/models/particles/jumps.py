@@ -1,0 +1,89 @@
+"""What moves may do to particles of the default model: which latents a shift moves, and which kinds a jump draws anew.
+
+A jump leads to another kind of profile, of noise, or to and from "no window".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+import torch
+
+from isiw.design import DesignSpace
+from isiw.models.particles.latents import PROFILE_BLOCKS, RESPONSE_BLOCKS, Latents, latents_of, used_by
+from isiw.models.particles.mixture import drawn
+from isiw.models.particles.prior import Person, Prior
+from isiw.models.protocol import Tensor
+
+__all__ = ["WindowTarget"]
+
+JUMPS: Final = {"form": 0.25, "noise": 0.2, "window": 0.35, "place": 0.12, "response": 0.08}
+"""Shares of the jumps. They draw anew: the profile's kind and form; the noise's kind and all that belongs to it;
+whether there is a window, and all of it; where and how wide it is; what belongs to the noise's kind."""
+
+REDRAWN: Final = {
+    "form": ("form",),
+    "noise": RESPONSE_BLOCKS,
+    "window": PROFILE_BLOCKS,
+    "place": ("start", "width"),
+    "response": RESPONSE_BLOCKS,
+}
+"""The blocks of latents that each jump draws anew."""
+
+
+@dataclass(frozen=True)
+class WindowTarget:
+    """People with a window or none; see `isiw.models.particles.moves.Target`.
+
+    Args:
+        prior: the prior.
+        space: the design space.
+    """
+
+    prior: Prior
+    space: DesignSpace
+
+    @property
+    def spreads(self) -> Tensor:
+        """Usual SD of each latent, shape (d,)."""
+        return self.prior.spreads
+
+    def person(self, latents: Latents) -> Person:
+        """What particles mean."""
+        return self.prior.person(latents)
+
+    def log_prior(self, latents: Latents) -> Tensor:
+        """Log prior density of their latents but for a constant, shape (b, p)."""
+        return self.prior.log_density(latents.values, self.space)
+
+    def shifted(self, latents: Latents, part: Tensor) -> Tensor:
+        """Which latents a difference moves, shape (b, p, d)."""
+        return _shifted(part.device)[part] & used_by(latents.noise, latents.present)
+
+    def jumped(self, latents: Latents, generator: torch.Generator) -> Latents:
+        """Particles (n,) with some kinds and latents drawn anew."""
+        fresh = self.prior.sample(1, len(latents.present), generator, self.space)
+        uniform = torch.rand(latents.present.shape, generator=generator, device=generator.device)
+        jump = drawn(tuple(JUMPS.values()), uniform)
+        form, noise, window, _, _ = (jump == number for number in range(len(JUMPS)))
+        return Latents(
+            values=torch.where(_redrawn(jump.device)[jump], fresh.values[0], latents.values),
+            shape=torch.where(form | window, fresh.shape[0], latents.shape),
+            noise=torch.where(noise, fresh.noise[0], latents.noise),
+            present=torch.where(window, fresh.present[0], latents.present),
+        )
+
+
+@cache
+def _shifted(device: torch.device) -> Tensor:
+    """Which latents a difference moves by its part, shape (parts, d)."""
+    of_profile = latents_of(*PROFILE_BLOCKS, device=device)
+    return torch.stack([torch.ones_like(of_profile), of_profile, ~of_profile])
+
+
+@cache
+def _redrawn(device: torch.device) -> Tensor:
+    """Which latents each of `JUMPS` draws anew, shape (jumps, d)."""
+    return torch.stack([latents_of(*REDRAWN[jump], device=device) for jump in JUMPS])
