@@ -13,8 +13,8 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import ConfigError, InvalidValueError, StrategyError
 from isiw.models.parametric import ParametricModel
 from isiw.models.particles import ParticleModel
-from isiw.models.particles.model import Moving
 from isiw.models.particles.prior import Prior
+from isiw.models.particles.swarm import Moving
 from isiw.models.protocol import ResponseModel
 from isiw.models.shared.scales import Scale
 from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for

@@ -125,7 +125,8 @@ class Broken:
             case "counts twice":
                 return self.model.update(after, observation)
             case "depends on chance":
-                return replace(after, log_weights=after.log_weights + 20 * torch.rand(()) * after.log_likelihood)
+                by_chance = after.swarm.log_weights + 20 * torch.rand(()) * after.swarm.log_likelihood
+                return replace(after, swarm=replace(after.swarm, log_weights=by_chance))
             case "forgets the first":
                 return after if after.trials > 1 else posterior
             case "predicts backwards":

@@ -23,7 +23,6 @@ from isiw.models.particles.latents import LATENTS, Latents, used_by
 from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Tensor
-from isiw.models.randomness import systematic
 from isiw.priors.components import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.priors.recall import recalled
 from isiw.types import FloatArray, Reference
@@ -112,13 +111,13 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
     before = _another_day(earlier, law or DayToDay())
     later = recalled(second, before)
     _require_window(second, later)
-    weights = (later.log_weights.exp() * later.latents.present)[0].double()
-    anywhere = before.log_places(later.latents.values, later.space)[0].double().softmax(-1)[:, 0]
+    weights = (later.swarm.log_weights.exp() * later.swarm.latents.present)[0].double()
+    anywhere = before.log_places(later.swarm.latents.values, later.space)[0].double().softmax(-1)[:, 0]
     return float((weights * anywhere).sum() / weights.sum())
 
 
 def _require_window(record: SessionRecord, posterior: ParticlePosterior) -> None:
-    probability = float((posterior.log_weights.exp() * posterior.latents.present).sum())
+    probability = float((posterior.swarm.log_weights.exp() * posterior.swarm.latents.present).sum())
     if probability < 0.5:
         raise InvalidValueError(
             "whether a window moved cannot be said of a session that probably has none",
@@ -130,8 +129,7 @@ def _require_window(record: SessionRecord, posterior: ParticlePosterior) -> None
 def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
     """What a posterior says of the next day."""
     usual = posterior.model.prior
-    picks = systematic(posterior.log_weights, posterior.model.particles)[0]
-    latents = Latents(*(field[:, picks] for field in posterior.latents))
+    latents = posterior.swarm.picked(posterior.model.particles)
     p_window = float(latents.present.double().mean())
     shapes, kinds = usual.profile.shapes, usual.noise
     profile = replace(

@@ -11,9 +11,8 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.models.particles import ParticlePosterior
-from isiw.models.particles.latents import Latents, used_by
+from isiw.models.particles.latents import used_by
 from isiw.models.particles.prior import Prior
-from isiw.models.randomness import systematic
 from isiw.priors.components import LATENT_BLOCKS, columns
 from isiw.priors.population import Block, HyperPrior, People
 from isiw.types import FloatArray, IntArray
@@ -41,8 +40,7 @@ def people_of(posteriors: Sequence[ParticlePosterior]) -> People:
 
 
 def _person(posterior: ParticlePosterior) -> _Person:
-    picks = systematic(posterior.log_weights, PARTICLES)[0]
-    latents = Latents(*(field[:, picks] for field in posterior.latents))
+    latents = posterior.swarm.picked(PARTICLES)
     densities = posterior.model.prior.log_densities(latents.values, posterior.space)
     values, used = latents.values[0].double().numpy(), used_by(latents.noise, latents.present)[0].numpy()
     blocks = {

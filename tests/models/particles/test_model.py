@@ -14,11 +14,12 @@ from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import LATENTS
 from isiw.models.particles.laws import FOREARM, NoiseShares, ProfilePrior
 from isiw.models.particles.likelihood import levels, total_log_likelihood
-from isiw.models.particles.model import Moving, ParticleModel, ParticlePosterior
+from isiw.models.particles.model import ParticleModel, ParticlePosterior
 from isiw.models.particles.moves import Mover
 from isiw.models.particles.noise import NoiseKind, draw_log_mep, log_gain, log_likelihood
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Person, Prior
+from isiw.models.particles.swarm import Moving
 from isiw.models.protocol import (
     Observation,
     Posterior,
@@ -87,10 +88,10 @@ def test_model_and_posterior_keep_their_protocols() -> None:
 def test_an_update_changes_no_earlier_posterior() -> None:
     model = ParticleModel(particles=200)
     before = model.begin(VALVE_SPACE, 3)
-    latents = before.latents.values.clone()
+    latents = before.swarm.latents.values.clone()
     model.update(before, observation([250.0], [0.08]))
     assert before.trials == 0
-    assert torch.equal(before.latents.values, latents)
+    assert torch.equal(before.swarm.latents.values, latents)
 
 
 def test_the_same_seed_and_trials_give_the_same_posterior() -> None:
@@ -108,9 +109,9 @@ def test_people_in_one_batch_do_not_see_each_other() -> None:
         isi_ms = 20.0 + 10.0 * trial
         calm = model.update(calm, observation([isi_ms, isi_ms], [mep_mv, 0.010]))
         wild = model.update(wild, observation([isi_ms, 280.0], [mep_mv, 0.3 * (trial + 1)]))
-        assert torch.equal(calm.latents.values[0], wild.latents.values[0])
-        assert torch.equal(calm.log_weights[0], wild.log_weights[0])
-    assert not torch.equal(calm.latents.values[1], wild.latents.values[1])
+        assert torch.equal(calm.swarm.latents.values[0], wild.swarm.latents.values[0])
+        assert torch.equal(calm.swarm.log_weights[0], wild.swarm.log_weights[0])
+    assert not torch.equal(calm.swarm.latents.values[1], wild.swarm.latents.values[1])
     assert calm.estimate(0).probability == wild.estimate(0).probability
 
 
@@ -138,11 +139,12 @@ def test_an_estimate_knows_the_noise_that_its_samples_suppose() -> None:
     # Of two kinds of noise one has wide windows only, so that kind and width must go together in every sample.
     prior = Prior(ProfilePrior(p_window=0.9), NoiseShares(0.5, 0.0, 0.5, 0.0), muscles=(FOREARM,))
     posterior = ParticleModel(prior).begin(VALVE_SPACE, 3)
-    recruits = posterior.latents.noise == NoiseKind.RECRUITMENT
+    recruits = posterior.swarm.latents.noise == NoiseKind.RECRUITMENT
     width = LATENTS.index("log_width_ms")
-    posterior.latents.values[..., width] = torch.where(recruits, math.log(250.0), math.log(35.0))
+    posterior.swarm.latents.values[..., width] = torch.where(recruits, math.log(250.0), math.log(35.0))
     weights = torch.linspace(-3.0, 3.0, recruits.shape[-1]).unsqueeze(0)  # every pick is another particle than its own
-    estimate = replace(posterior, log_weights=torch.log_softmax(weights, -1)).estimate()
+    swarm = replace(posterior.swarm, log_weights=torch.log_softmax(weights, -1))
+    estimate = replace(posterior, swarm=swarm).estimate()
     edges_ms = known(estimate.edge_samples_ms)
     kinds = np.array(estimate.hypothesis_names)[known(estimate.hypothesis_samples)]
     assert set(kinds) == {"constant-CV noise", "recruitment curve, forearm"}
@@ -179,7 +181,7 @@ def test_moved_particles_agree_with_plain_importance_sampling() -> None:
     # The reference weights 100,000 particles of the prior by the likelihood of all trials at once.
     trials = evenly(cohort("gaussian", 3, 0)[2], 6)[:4]
     reference = after(ParticleModel(particles=100_000, moves=Moving(sweeps=0, min_ess=0.0)), trials)
-    ess = torch.exp(-torch.logsumexp(2 * reference.log_weights, -1)).item()
+    ess = torch.exp(-torch.logsumexp(2 * reference.swarm.log_weights, -1)).item()
     assert ess > 500
     expected = reference.estimate()
     got = [after(ParticleModel(particles=1000), trials, seed).estimate() for seed in range(4)]
@@ -239,7 +241,7 @@ def test_data_that_break_things_give_finite_beliefs(trials: list[tuple[float, fl
     posterior = after(ParticleModel(particles=300), trials)
     estimate = posterior.estimate()
     assert 0 <= known(estimate.probability) <= 1
-    assert torch.isfinite(posterior.log_likelihood).all()
+    assert torch.isfinite(posterior.swarm.log_likelihood).all()
     mass = posterior.outcome_mass(GRID)
     assert torch.isfinite(mass).all()
     torch.testing.assert_close(mass.sum(-1), torch.ones_like(mass[..., 0]))
@@ -251,7 +253,7 @@ def test_tms_alone_teaches_the_baseline_and_nothing_about_the_window() -> None:
     before = posterior.person.response.log_floor.std().item()
     for mep_mv in (0.009, 0.011, 0.010, 0.008):
         posterior = model.update(posterior, observation([math.nan], [mep_mv]))
-    floors = posterior.person.response.log_floor[0, systematic(posterior.log_weights, 1000)[0]]
+    floors = posterior.person.response.log_floor[0, systematic(posterior.swarm.log_weights, 1000)[0]]
     assert floors.std().item() < before / 3
     assert abs(known(posterior.estimate().probability) - Prior().profile.p_window) < 0.08
 

@@ -1,76 +1,34 @@
-"""The particle posterior: sequential Monte Carlo over people, b sessions at once.
-
-Every trial multiplies the particles' weights by its likelihood. When the effective sample size falls, the particles are
-resampled, and moved by Markov chain steps (resample-move: Gilks and Berzuini, J. R. Stat. Soc. B 63, 2001).
-"""
+"""The particle posterior over people with a window or none, b sessions at once."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import torch
 
-from isiw.checks import MOST_OF_A_KIND, check_numbers, check_probabilities, check_wholes
+from isiw.checks import MOST_OF_A_KIND, check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
-from isiw.models.particles.likelihood import levels, total_log_likelihood
-from isiw.models.particles.moves import Mover
+from isiw.models.particles.likelihood import levels
 from isiw.models.particles.noise import NoiseKind, Response, draw_log_mep, log_gain
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Person, Prior
 from isiw.models.particles.shapes import Shape
+from isiw.models.particles.swarm import Moving, Swarm, taken
 from isiw.models.protocol import Observation, SimulatedPerson, Tensor
 from isiw.models.randomness import SIMULATED, step_generator, systematic
-from isiw.models.shared.history import History, observed
+from isiw.models.shared.history import observed
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Enhancement, Window, WindowEstimate
 
-__all__ = ["Moving", "ParticleModel", "ParticlePosterior"]
+__all__ = ["ParticleModel", "ParticlePosterior"]
 
 LEAST_SAMPLES = 20
 """Of fewer samples no quantile is told."""
-
-
-@dataclass(frozen=True)
-class Moving:
-    """How often particles move, and when they are resampled.
-
-    Args:
-        sweeps: sweeps of Markov chain moves after each trial; up to four times as many among the first 25, whose
-            history is short and tells apart the particles most.
-        max_trial_sweeps: sweeps times trials are at most this many, so that a tell stays fast late in a session; where
-            there are more trials, one sweep follows every second, third or later one, and each resampling.
-        min_ess: effective sample size, as a share of the particles, below which they are resampled.
-
-    Raises:
-        InvalidValueError: an invalid number.
-    """
-
-    sweeps: int = 2
-    max_trial_sweeps: int = 240
-    min_ess: float = 0.5
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "sweeps", "max_trial_sweeps", least=0)
-        check_probabilities(self, "min_ess")
-
-    def sweeps_after(self, trials: int, *, resampled: bool = True) -> int:
-        """How many sweeps follow a trial: more where the history is short, fewer where it has become long.
-
-        Args:
-            trials: how long the history is.
-            resampled: whether particles were resampled, so that some are alike.
-        """
-        if 0 < self.max_trial_sweeps < trials and self.sweeps:
-            return int(resampled or trials % math.ceil(2 * trials / self.max_trial_sweeps) == 0)
-        early = min(4.0, max(1.0, 25 / max(1, trials)))
-        return min(int(self.sweeps * early), max(1, self.max_trial_sweeps // max(1, trials)))
 
 
 @dataclass(frozen=True)
@@ -116,30 +74,14 @@ class ParticleModel:
         """
         self.prior.profile.require_space(space)
         latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0), space)
-        size, device = latents.present.shape, latents.present.device
-        return ParticlePosterior(
-            model=self,
-            space=space,
-            seed=seed,
-            latents=latents,
-            log_weights=torch.full(size, -math.log(self.particles), device=device),
-            log_likelihood=torch.zeros(size, device=device),
-            evidence=torch.zeros(people, device=device),
-            history=History.empty(people, device),
-        )
+        return ParticlePosterior(self, space, seed, Swarm.of(latents))
 
     def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The posterior after one more trial."""
         after = self.reweighted(posterior, observation)
         generator = step_generator(self.device, posterior.seed, after.trials)
-        ess = ess_share(after.log_weights)
-        worn = ess < self.moves.min_ess
-        after = self._resampled(after, worn, generator)
-        mover = Mover(WindowTarget(self.prior, posterior.space), after.history, generator)
-        sweeps = self.moves.sweeps_after(after.trials, resampled=bool(worn.any()))
-        moved = mover.sweeps(sweeps, after.latents, after.log_likelihood)
-        health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))
-        return replace(after, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
+        target = WindowTarget(self.prior, posterior.space)
+        return replace(after, swarm=after.swarm.moved(target, self.moves, generator))
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
         """Draw one person from the prior, and a MEP at each ISI; see `SimulatesPeople`."""
@@ -162,30 +104,7 @@ class ParticleModel:
         """
         known = self.detection_limit_mv, self.response_threshold_mv
         trial = observed(observation, *known, order=posterior.trials).to(self.device, torch.float32)
-        gain = total_log_likelihood(posterior.person, trial)
-        return replace(
-            posterior,
-            log_weights=torch.log_softmax(posterior.log_weights + gain, dim=-1),
-            log_likelihood=posterior.log_likelihood + gain,
-            evidence=posterior.evidence + torch.logsumexp(posterior.log_weights + gain, dim=-1),
-            history=posterior.history.appended(trial),
-        )
-
-    def _resampled(self, posterior: ParticlePosterior, worn: Tensor, generator: torch.Generator) -> ParticlePosterior:
-        """Resample those people whose effective sample size has fallen (b,); nobody else notices."""
-        # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
-        shuffled = torch.randperm(self.particles, generator=generator, device=generator.device)
-        if not bool(worn.any()):
-            return posterior
-        worn = worn.unsqueeze(-1)
-        kept = torch.arange(self.particles, device=shuffled.device)
-        picks = torch.where(worn, systematic(posterior.log_weights, self.particles)[:, shuffled], kept)
-        return replace(
-            posterior,
-            latents=Latents(*(_take(x, picks) for x in posterior.latents)),
-            log_weights=torch.where(worn, -math.log(self.particles), posterior.log_weights),
-            log_likelihood=_take(posterior.log_likelihood, picks),
-        )
+        return replace(posterior, swarm=posterior.swarm.told(trial, posterior.person))
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,55 +115,45 @@ class ParticlePosterior:
         model: the model's settings.
         space: the design space.
         seed: seed of all randomness.
-        latents: the particles, fields of shape (b, p).
-        log_weights: their normalised log weights, shape (b, p).
-        log_likelihood: of the history under each of them, shape (b, p).
-        evidence: log marginal likelihood of the history [nat], shape (b,).
-        history: the trials so far.
-        health: how the particles took the last trial; None before the first.
+        swarm: the particles.
     """
 
     model: ParticleModel
     space: DesignSpace
     seed: int
-    latents: Latents
-    log_weights: Tensor
-    log_likelihood: Tensor
-    evidence: Tensor
-    history: History
-    health: Health | None = None
+    swarm: Swarm[Latents]
 
     @property
     def trouble(self) -> str | None:
         """What is wrong with the particles; see `ReportsTrouble`."""
-        return None if self.health is None else trouble_of(self.health)
+        return self.swarm.trouble
 
     @property
     def trials(self) -> int:
         """How many trials of each person it has been told."""
-        return self.history.isi_ms.shape[-1]
+        return self.swarm.trials
 
     @cached_property
     def person(self) -> Person:
         """What the particles mean."""
-        return self.model.prior.person(self.latents)
+        return self.model.prior.person(self.swarm.latents)
 
     @cached_property
     def _thinned(self) -> PersonSample:
-        picks = systematic(self.log_weights, self.model.thinned)
-        return PersonSample(_each(self.person, lambda x: _take(x, picks)), self.space, self.trials)
+        picks = systematic(self.swarm.log_weights, self.model.thinned)
+        return PersonSample(_each(self.person, lambda x: taken(x, picks)), self.space, self.trials)
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
-        return self._thinned.outcome_mass(isi_ms.to(self.log_weights.device))
+        return self._thinned.outcome_mass(isi_ms.to(self.swarm.log_weights.device))
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows; see `SamplesWindows`."""
-        return self._thinned.window_masks(isi_ms.to(self.log_weights.device))
+        return self._thinned.window_masks(isi_ms.to(self.swarm.log_weights.device))
 
     def profiles_mv(self, isi_ms: Tensor) -> Tensor:
         """Sampled profiles; see `SamplesProfiles`."""
-        return self._thinned.expected_mep_mv(isi_ms.to(self.log_weights.device))
+        return self._thinned.expected_mep_mv(isi_ms.to(self.swarm.log_weights.device))
 
     def baselines_mv(self) -> Tensor:
         """Sampled baselines; see `SamplesProfiles`."""
@@ -256,11 +165,11 @@ class ParticlePosterior:
 
     def log_evidence(self) -> Tensor:
         """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
-        return self.evidence
+        return self.swarm.evidence
 
     def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
         """Between which amplitudes the next MEP lies; see `PredictsMeps`."""
-        isi_ms = profile_grid(self.space).to(self.log_weights.device)
+        isi_ms = profile_grid(self.space).to(self.swarm.log_weights.device)
         shares = 0.5 + 0.5 * torch.tensor([-level, level], device=isi_ms.device)
         low_mv, high_mv = self._thinned.mep_quantiles_mv(isi_ms, shares)[person].T.double().cpu().numpy()
         return low_mv, high_mv
@@ -268,12 +177,12 @@ class ParticlePosterior:
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
         one = slice(person, person + 1)
-        picks = systematic(self.log_weights[one], self.model.particles)
-        latents = Latents(*(_take(x[one], picks) for x in self.latents))
+        picks = systematic(self.swarm.log_weights[one], self.model.particles)
+        latents = Latents(*(taken(x[one], picks) for x in self.swarm.latents))
         sample = PersonSample(self.model.prior.person(latents), self.space)
-        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=picks.device)
+        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=latents.values.device)
         thinned = PersonSample(_each(self._thinned.person, lambda x: x[one]), self.space)
-        profiles_mv = thinned.expected_mep_mv(profile_grid(self.space).to(picks.device))
+        profiles_mv = thinned.expected_mep_mv(profile_grid(self.space).to(grid.device))
         profiles = SampledProfiles(profiles_mv[0], thinned.baselines_mv()[0])
         hypotheses = SampledHypotheses(self.model.prior.hypothesis(latents)[0], self.model.prior.hypotheses)
         estimate = sampled_estimate(sample.window_masks(grid)[0], profiles, self.space, hypotheses)
@@ -289,11 +198,6 @@ class ParticlePosterior:
         if excluded is None or len(shift_pct_rmt) < LEAST_SAMPLES:
             return excluded
         return excluded._replace(shift_pct_rmt=float(torch.quantile(shift_pct_rmt, EXCLUDED_AT)))
-
-
-def _take(values: Tensor, picks: Tensor) -> Tensor:
-    index = picks.unsqueeze(-1).expand(-1, -1, values.shape[-1]) if values.dim() > picks.dim() else picks
-    return torch.gather(values, 1, index)
 
 
 def _each(person: Person, function: Callable[[Tensor], Tensor]) -> Person:

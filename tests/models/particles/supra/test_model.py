@@ -106,7 +106,7 @@ def test_moves_leave_the_prior_as_it_is() -> None:
 
 def test_segments_lie_apart_before_the_first_trial_and_after_the_last() -> None:
     fresh = SupraPrior().sample(1, 1000, torch.Generator().manual_seed(3), SPACE)
-    for latents in (fresh, posterior_after(0.1).latents):
+    for latents in (fresh, posterior_after(0.1).swarm.latents):
         z = dict(zip(LATENTS, latents.values.unbind(-1), strict=True))
         first, second = (
             (z[f"{kind}start_ms"], z[f"{kind}start_ms"] + z[f"{kind}log_width_ms"].exp()) for kind in ("", "depressed_")

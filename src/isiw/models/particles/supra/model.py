@@ -1,4 +1,4 @@
-"""The particle posterior for TMS above the motor threshold: sequential Monte Carlo, as `isiw.models.particles.model`.
+"""The particle posterior for TMS above the motor threshold.
 
 Each particle has a segment in which the tap enhances the MEP, one in which it depresses it, or either, or none
 [Kim2020, 8.1.3].
@@ -6,7 +6,6 @@ Each particle has a segment in which the tap enhances the MEP, one in which it d
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -14,17 +13,14 @@ import torch
 
 from isiw.checks import MOST_OF_A_KIND, check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
-from isiw.models.particles.likelihood import total_log_likelihood
-from isiw.models.particles.model import Moving
-from isiw.models.particles.moves import Mover
 from isiw.models.particles.prior import Person
 from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraLatents, SupraPrior
+from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.randomness import step_generator, systematic
-from isiw.models.shared.history import History, observed
+from isiw.models.randomness import step_generator
+from isiw.models.shared.history import observed
 from isiw.models.windows import SampledProfiles, best_window, profile_grid, sampled_estimate
 from isiw.window import WindowEstimate
 
@@ -68,30 +64,14 @@ class SupraModel:
             people: how many people.
         """
         latents = self.prior.sample(people, self.particles, step_generator("cpu", seed, 0), space)
-        size = (people, self.particles)
-        return SupraPosterior(
-            model=self,
-            space=space,
-            seed=seed,
-            latents=latents,
-            log_weights=torch.full(size, -math.log(self.particles)),
-            log_likelihood=torch.zeros(size),
-            evidence=torch.zeros(people),
-            history=History.empty(people, torch.device("cpu")),
-        )
+        return SupraPosterior(self, space, seed, Swarm.of(latents))
 
     def update(self, posterior: SupraPosterior, observation: Observation) -> SupraPosterior:
         """The posterior after one more trial."""
         after = self.reweighted(posterior, observation)
         generator = step_generator("cpu", posterior.seed, after.trials)
-        ess = ess_share(after.log_weights)
-        worn = ess < self.moves.min_ess
-        after = after.resampled(worn, torch.randperm(self.particles, generator=generator))
-        mover = Mover(SupraTarget(self.prior, posterior.space), after.history, generator)
-        sweeps = self.moves.sweeps_after(after.trials, resampled=bool(worn.any()))
-        moved = mover.sweeps(sweeps, after.latents, after.log_likelihood)
-        health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))
-        return replace(after, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
+        target = SupraTarget(self.prior, posterior.space)
+        return replace(after, swarm=after.swarm.moved(target, self.moves, generator))
 
     def reweighted(self, posterior: SupraPosterior, observation: Observation) -> SupraPosterior:
         """The same particles, weighted by one more trial as well.
@@ -102,14 +82,7 @@ class SupraModel:
         """
         known = self.detection_limit_mv, self.response_threshold_mv
         trial = observed(observation, *known, order=posterior.trials).to("cpu", torch.float32)
-        gain = total_log_likelihood(posterior.person, trial)
-        return replace(
-            posterior,
-            log_weights=torch.log_softmax(posterior.log_weights + gain, dim=-1),
-            log_likelihood=posterior.log_likelihood + gain,
-            evidence=posterior.evidence + torch.logsumexp(posterior.log_weights + gain, dim=-1),
-            history=posterior.history.appended(trial),
-        )
+        return replace(posterior, swarm=posterior.swarm.told(trial, posterior.person))
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,61 +93,31 @@ class SupraPosterior:
         model: the model's settings.
         space: the design space.
         seed: seed of all randomness.
-        latents: the particles, fields of shape (b, p).
-        log_weights: their normalised log weights, shape (b, p).
-        log_likelihood: of the history under each of them, shape (b, p).
-        evidence: log marginal likelihood of the history [nat], shape (b,).
-        history: the trials so far.
-        health: how the particles took the last trial; None before the first.
+        swarm: the particles.
     """
 
     model: SupraModel
     space: DesignSpace
     seed: int
-    latents: SupraLatents
-    log_weights: Tensor
-    log_likelihood: Tensor
-    evidence: Tensor
-    history: History
-    health: Health | None = None
+    swarm: Swarm[SupraLatents]
 
     @property
     def trouble(self) -> str | None:
         """What is wrong with the particles; see `ReportsTrouble`."""
-        return None if self.health is None else trouble_of(self.health)
+        return self.swarm.trouble
 
     @property
     def trials(self) -> int:
         """How many trials of each person it has been told."""
-        return self.history.isi_ms.shape[-1]
+        return self.swarm.trials
 
     @cached_property
     def person(self) -> Person:
         """What the particles mean."""
-        return self.model.prior.person(self.latents)
-
-    def resampled(self, worn: Tensor, shuffled: Tensor) -> SupraPosterior:
-        """The same with equally weighted particles where they are worn.
-
-        Args:
-            worn: whose effective sample size has fallen, shape (b,).
-            shuffled: a permutation of the particles, so that both halves represent the posterior, shape (p,).
-        """
-        if not bool(worn.any()):
-            return self
-        worn = worn.unsqueeze(-1)
-        size = len(shuffled)
-        picks = torch.where(worn, systematic(self.log_weights, size)[:, shuffled], torch.arange(size))
-        return replace(
-            self,
-            latents=_picked(self.latents, picks),
-            log_weights=torch.where(worn, -math.log(size), self.log_weights),
-            log_likelihood=self.log_likelihood.gather(1, picks),
-        )
+        return self.model.prior.person(self.swarm.latents)
 
     def _sample(self, size: int, order: int) -> SupraSample:
-        picks = systematic(self.log_weights, size)
-        return SupraSample(self.model.prior.person(_picked(self.latents, picks)), self.space, order)
+        return SupraSample(self.model.prior.person(self.swarm.picked(size)), self.space, order)
 
     @cached_property
     def _thinned(self) -> SupraSample:
@@ -210,7 +153,7 @@ class SupraPosterior:
 
     def log_evidence(self) -> Tensor:
         """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
-        return self.evidence
+        return self.swarm.evidence
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person, and the segment in which the tap depresses the MEP."""
@@ -223,9 +166,3 @@ class SupraPosterior:
         probability = float(somewhere.double().mean())
         segment = best_window(depressed[somewhere], self.space.grid_ms)[0] if probability >= 0.5 else None
         return replace(estimate, depressed=segment, depressed_probability=probability)
-
-
-def _picked(latents: SupraLatents, picks: Tensor) -> SupraLatents:
-    """Some of the particles, by index (b, s)."""
-    values = latents.values.gather(1, picks.unsqueeze(-1).expand(-1, -1, latents.values.shape[-1]))
-    return SupraLatents(values, latents.enhanced.gather(1, picks), latents.depressed.gather(1, picks))

@@ -1,0 +1,169 @@
+"""Weighted particles of b people: sequential Monte Carlo, whatever a particle's latents mean.
+
+Every trial multiplies the particles' weights by its likelihood. When the effective sample size falls, the particles are
+resampled, and moved by Markov chain steps (resample-move: Gilks and Berzuini, J. R. Stat. Soc. B 63, 2001).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Generic
+
+import torch
+
+from isiw.checks import check_probabilities, check_wholes
+from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
+from isiw.models.particles.likelihood import total_log_likelihood
+from isiw.models.particles.moves import L, Mover, Target
+from isiw.models.particles.prior import Person
+from isiw.models.protocol import Tensor
+from isiw.models.randomness import systematic
+from isiw.models.shared.history import History
+
+__all__ = ["Moving", "Swarm", "taken"]
+
+
+@dataclass(frozen=True)
+class Moving:
+    """How often particles move, and when they are resampled.
+
+    Args:
+        sweeps: sweeps of Markov chain moves after each trial; up to four times as many among the first 25, whose
+            history is short and tells apart the particles most.
+        max_trial_sweeps: sweeps times trials are at most this many, so that a tell stays fast late in a session; where
+            there are more trials, one sweep follows every second, third or later one, and each resampling.
+        min_ess: effective sample size, as a share of the particles, below which they are resampled.
+
+    Raises:
+        InvalidValueError: an invalid number.
+    """
+
+    sweeps: int = 2
+    max_trial_sweeps: int = 240
+    min_ess: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_wholes(self, "sweeps", "max_trial_sweeps", least=0)
+        check_probabilities(self, "min_ess")
+
+    def sweeps_after(self, trials: int, *, resampled: bool = True) -> int:
+        """How many sweeps follow a trial: more where the history is short, fewer where it has become long.
+
+        Args:
+            trials: how long the history is.
+            resampled: whether particles were resampled, so that some are alike.
+        """
+        if 0 < self.max_trial_sweeps < trials and self.sweeps:
+            return int(resampled or trials % math.ceil(2 * trials / self.max_trial_sweeps) == 0)
+        early = min(4.0, max(1.0, 25 / max(1, trials)))
+        return min(int(self.sweeps * early), max(1, self.max_trial_sweeps // max(1, trials)))
+
+
+@dataclass(frozen=True, eq=False)
+class Swarm(Generic[L]):
+    """Weighted particles of b people.
+
+    Args:
+        latents: the particles, fields of shape (b, p).
+        log_weights: their normalised log weights, shape (b, p).
+        log_likelihood: of the history under each of them, shape (b, p).
+        evidence: log marginal likelihood of the history [nat], shape (b,).
+        history: the trials so far.
+        health: how the particles took the last trial; None before the first.
+    """
+
+    latents: L
+    log_weights: Tensor
+    log_likelihood: Tensor
+    evidence: Tensor
+    history: History
+    health: Health | None = None
+
+    @classmethod
+    def of(cls, latents: L) -> Swarm[L]:
+        """Particles of the prior, before the first trial."""
+        people, particles = latents.values.shape[:-1]
+        nothing = torch.zeros((people, particles), device=latents.values.device)
+        history = History.empty(people, nothing.device)
+        return cls(latents, nothing - math.log(particles), nothing, nothing[:, 0], history)
+
+    @property
+    def trials(self) -> int:
+        """How many trials of each person it has been told."""
+        return self.history.isi_ms.shape[-1]
+
+    @property
+    def trouble(self) -> str | None:
+        """What is wrong with the particles; see `isiw.models.protocol.ReportsTrouble`."""
+        return None if self.health is None else trouble_of(self.health)
+
+    def told(self, trial: History, person: Person) -> Swarm[L]:
+        """The same particles, weighted by one more trial as well.
+
+        Args:
+            trial: the trial of each person.
+            person: what the particles mean.
+        """
+        gain = total_log_likelihood(person, trial)
+        log_weights = self.log_weights + gain
+        return replace(
+            self,
+            log_weights=torch.log_softmax(log_weights, dim=-1),
+            log_likelihood=self.log_likelihood + gain,
+            evidence=self.evidence + torch.logsumexp(log_weights, dim=-1),
+            history=self.history.appended(trial),
+        )
+
+    def moved(self, target: Target[L], moves: Moving, generator: torch.Generator) -> Swarm[L]:
+        """The particles after the moves that follow a trial, resampled where too few carried the posterior.
+
+        Args:
+            target: whose posterior they move under.
+            moves: how often they move, and when they are resampled.
+            generator: source of randomness.
+        """
+        ess = ess_share(self.log_weights)
+        worn = ess < moves.min_ess
+        fresh = self._resampled(worn, generator)
+        sweeps = moves.sweeps_after(self.trials, resampled=bool(worn.any()))
+        moved = Mover(target, self.history, generator).sweeps(sweeps, fresh.latents, fresh.log_likelihood)
+        health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))
+        return replace(fresh, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
+
+    def picked(self, size: int) -> L:
+        """Equally weighted particles that represent the same posterior, fields of shape (b, s).
+
+        Args:
+            size: how many of each person.
+        """
+        picks = systematic(self.log_weights, size)
+        return self.latents.remade(taken(field, picks) for field in self.latents)
+
+    def _resampled(self, worn: Tensor, generator: torch.Generator) -> Swarm[L]:
+        """Resample those people whose effective sample size has fallen (b,); nobody else notices."""
+        size = self.log_weights.shape[-1]
+        # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
+        shuffled = torch.randperm(size, generator=generator, device=generator.device)
+        if not bool(worn.any()):
+            return self
+        worn = worn.unsqueeze(-1)
+        kept = torch.arange(size, device=shuffled.device)
+        picks = torch.where(worn, systematic(self.log_weights, size)[:, shuffled], kept)
+        return replace(
+            self,
+            latents=self.latents.remade(taken(field, picks) for field in self.latents),
+            log_weights=torch.where(worn, -math.log(size), self.log_weights),
+            log_likelihood=taken(self.log_likelihood, picks),
+        )
+
+
+def taken(values: Tensor, picks: Tensor) -> Tensor:
+    """Some of the particles, in any order and as often as picked, shape (b, s, ...).
+
+    Args:
+        values: of all particles, shape (b, p) or (b, p, d).
+        picks: their indices, shape (b, s).
+    """
+    index = picks.unsqueeze(-1).expand(-1, -1, values.shape[-1]) if values.dim() > picks.dim() else picks
+    return torch.gather(values, 1, index)
