@@ -79,10 +79,10 @@ class NoiseShares:
         InvalidValueError: probabilities that do not sum to 1.
     """
 
-    constant_cv: float = 0.22
-    missing: float = 0.06
-    recruitment: float = 0.66
-    all_or_none: float = 0.06
+    constant_cv: float = 0.37
+    missing: float = 0.11
+    recruitment: float = 0.44
+    all_or_none: float = 0.08
 
     def __post_init__(self) -> None:
         _check_shares(self)
