@@ -156,7 +156,7 @@ PEOPLE: dict[str, Callable[[np.random.Generator], ResponseCurve]] = {
     "occasional": _occasional,
     "scaled": _scaled,
     "climbed": _climbed,
-    "nonresponder": _nonresponder,
+    "no-window": _nonresponder,
 }
 
 
