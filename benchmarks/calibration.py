@@ -3,8 +3,9 @@
     python benchmarks/calibration.py --out benchmarks/results/calibration
 
 First, people of a model's own prior: each has MEPs at random ISIs of the valve space, by the model's own law; the ranks
-of the true edges among the posterior's samples must be uniform, and 90 % intervals must hold 90 % of them. Second,
-people of the cohorts, examined by a Gaussian-process strategy, whose prior they were not drawn from.
+of the true edges among the posterior's samples must be uniform, 90 % intervals must hold 90 % of them, and the expected
+F1 must come true. Second, people of the cohorts, examined by a Gaussian-process strategy, whose prior they were not
+drawn from.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
-from isiw.metrics import covers, edge_ranks
+from isiw.metrics import covers, edge_ranks, f1
 from isiw.models.parametric import ParametricModel
 from isiw.models.protocol import Observation, Posterior, ResponseModel, SimulatedPerson
 from isiw.studies import paired_sessions, run_study
@@ -44,6 +45,7 @@ SPACE = isiw.VALVE_SPACE
 MODELS = ("particles", "parametric")
 STRATEGY_OF = {"particles": "default", "parametric": "parametric-mi"}
 BINS = 20
+TENTHS = 10
 
 
 @dataclass(frozen=True)
@@ -56,8 +58,8 @@ class Batch:
     trials: int
 
 
-def replicate(batch: Batch) -> list[dict[str, float]]:
-    """Draw people, show the model their trials, and rank their true edges; people without a window have no edges."""
+def replicate(batch: Batch) -> list[dict[str, float | None]]:
+    """Draw people, show the model their trials, and judge what it makes of them."""
     torch.set_num_threads(1)
     model = isiw.make_strategy(STRATEGY_OF[batch.model]).model
     seeds = range(batch.first_seed, batch.first_seed + batch.people)
@@ -81,18 +83,21 @@ def _after(model: ResponseModel, posterior: Posterior, told: Sequence[Observatio
 
 def _judged(
     posterior: Posterior, people: Sequence[SimulatedPerson], seeds: Sequence[int]
-) -> Iterator[dict[str, float]]:
+) -> Iterator[dict[str, float | None]]:
+    """Expected and actual F1, ranks of the true edges and coverage; people without a window have no edges."""
     for number, (person, seed) in enumerate(zip(people, seeds, strict=True)):
-        if person.window is None:
-            continue
         estimate = posterior.estimate(number)
+        found = {"expected_f1": estimate.expected_f1, "f1": f1(estimate, person.window, SPACE)}
+        if person.window is None:
+            yield found
+            continue
         start, end = edge_ranks(estimate, person.window, SPACE, np.random.default_rng([seed, 2]))
         covered = covers(estimate, person.window, SPACE) or (math.nan, math.nan)
-        yield {"start_rank": start, "end_rank": end, "start_covered": covered[0], "end_covered": covered[1]}
+        yield found | {"start_rank": start, "end_rank": end, "start_covered": covered[0], "end_covered": covered[1]}
 
 
 def calibration(model: str, replications: int, trials: int, seed: int, workers: int) -> pd.DataFrame:
-    """Ranks and coverage of many replications of one model."""
+    """What many replications of one model came to."""
     size = 25
     batches = [Batch(model, seed + first, size, trials) for first in range(0, replications, size)]
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
@@ -102,22 +107,30 @@ def calibration(model: str, replications: int, trials: int, seed: int, workers: 
 
 def summary(rows: pd.DataFrame) -> dict[str, float]:
     """Uniformity of the ranks and coverage of the intervals."""
-    facts: dict[str, float] = {"with a window": len(rows)}
+    facts: dict[str, float] = {"with a window": rows["start_rank"].count()}
     for edge in ("start", "end"):
-        ranks = rows[f"{edge}_rank"]
+        ranks = rows[f"{edge}_rank"].dropna()
         facts[f"{edge} p (χ²)"] = scipy.stats.chisquare(np.histogram(ranks, BINS, (0, 1))[0]).pvalue
         facts[f"{edge} p (KS)"] = scipy.stats.kstest(ranks, "uniform").pvalue
         facts[f"{edge} covered"] = rows[f"{edge}_covered"].mean()
     return facts
 
 
+def foretold(rows: pd.DataFrame) -> pd.DataFrame:
+    """Expected against actual F1 of each model, by tenths of the expected."""
+    tenth = (rows["expected_f1"] * TENTHS).astype(int).clip(0, TENTHS - 1) / TENTHS
+    groups = rows.groupby(["model", tenth.rename("expected_from")])
+    people, error = groups.size().rename("people"), groups["f1"].sem().rename("f1_se")
+    return pd.concat([people, groups[["expected_f1", "f1"]].mean(), error], axis=1).reset_index()
+
+
 def figure(tables: dict[str, pd.DataFrame]) -> matplotlib.figure.Figure:
     """Histograms of the ranks, with the band in which 99 % of honest bars lie."""
     picture = matplotlib.figure.Figure(figsize=(8, 2.6 * len(tables)), layout="constrained")
     for line, (name, rows) in zip(picture.subplots(len(tables), 2, squeeze=False), tables.items(), strict=True):
-        low, high = scipy.stats.binom.ppf((0.005, 0.995), len(rows), 1 / BINS)
+        low, high = scipy.stats.binom.ppf((0.005, 0.995), rows["start_rank"].count(), 1 / BINS)
         for axes, edge in zip(line, ("start", "end"), strict=True):
-            axes.hist(rows[f"{edge}_rank"], BINS, range=(0, 1))
+            axes.hist(rows[f"{edge}_rank"].dropna(), BINS, range=(0, 1))
             axes.axhspan(low, high, color="black", alpha=0.15)
             axes.set(title=f"{name}: {edge}", xlabel="rank of the true edge", ylabel="people")
     return picture
@@ -155,7 +168,7 @@ def main() -> None:
     )
     tables = {model: run(model) for model in chosen.models.split(",")}
     table = pd.DataFrame([{"model": name, **summary(rows)} for name, rows in tables.items()])
-    parts = [markdown(table)]
+    parts = [markdown(table), markdown(foretold(pd.concat([rows.assign(model=name) for name, rows in tables.items()])))]
     if chosen.people:
         cohorts = ("gaussian", "skewed", "plateau")
         parts.append(markdown(smooth_people("gp-straddle", cohorts, chosen.people, chosen.seed, chosen.workers)))
