@@ -4,8 +4,8 @@
 
 First, people of a model's own prior: each has MEPs at random ISIs of the valve space, by the model's own law; the ranks
 of the true edges among the posterior's samples must be uniform, 90 % intervals must hold 90 % of them, and the expected
-F1 must come true. Second, people of the cohorts, examined by a Gaussian-process strategy, whose prior they were not
-drawn from.
+F1 and the probability of a window must come true. Second, people of the cohorts, examined by a Gaussian-process
+strategy, whose prior they were not drawn from.
 """
 
 from __future__ import annotations
@@ -84,10 +84,11 @@ def _after(model: ResponseModel, posterior: Posterior, told: Sequence[Observatio
 def _judged(
     posterior: Posterior, people: Sequence[SimulatedPerson], seeds: Sequence[int]
 ) -> Iterator[dict[str, float | None]]:
-    """Expected and actual F1, ranks of the true edges and coverage; people without a window have no edges."""
+    """What was expected and what was; ranks and coverage of the edges, which people without a window do not have."""
     for number, (person, seed) in enumerate(zip(people, seeds, strict=True)):
         estimate = posterior.estimate(number)
-        found = {"expected_f1": estimate.expected_f1, "f1": f1(estimate, person.window, SPACE)}
+        found = {"probability": estimate.probability, "present": float(person.window is not None)}
+        found |= {"expected_f1": estimate.expected_f1, "f1": f1(estimate, person.window, SPACE)}
         if person.window is None:
             yield found
             continue
@@ -116,12 +117,13 @@ def summary(rows: pd.DataFrame) -> dict[str, float]:
     return facts
 
 
-def foretold(rows: pd.DataFrame) -> pd.DataFrame:
-    """Expected against actual F1 of each model, by tenths of the expected."""
-    tenth = (rows["expected_f1"] * TENTHS).astype(int).clip(0, TENTHS - 1) / TENTHS
-    groups = rows.groupby(["model", tenth.rename("expected_from")])
-    people, error = groups.size().rename("people"), groups["f1"].sem().rename("f1_se")
-    return pd.concat([people, groups[["expected_f1", "f1"]].mean(), error], axis=1).reset_index()
+def by_tenths(tables: dict[str, pd.DataFrame], expected: str, actual: str) -> pd.DataFrame:
+    """What each model expected against what was, by tenths of what was expected."""
+    rows = pd.concat([table.assign(model=name) for name, table in tables.items()])
+    tenth = (rows[expected] * TENTHS).astype(int).clip(0, TENTHS - 1) / TENTHS
+    groups = rows.groupby(["model", tenth.rename(f"{expected} from")])
+    people, error = groups.size().rename("people"), groups[actual].sem().rename("standard error")
+    return pd.concat([people, groups[[expected, actual]].mean(), error], axis=1).reset_index()
 
 
 def figure(tables: dict[str, pd.DataFrame]) -> matplotlib.figure.Figure:
@@ -168,7 +170,8 @@ def main() -> None:
     )
     tables = {model: run(model) for model in chosen.models.split(",")}
     table = pd.DataFrame([{"model": name, **summary(rows)} for name, rows in tables.items()])
-    parts = [markdown(table), markdown(foretold(pd.concat([rows.assign(model=name) for name, rows in tables.items()])))]
+    foretold = [by_tenths(tables, "expected_f1", "f1"), by_tenths(tables, "probability", "present")]
+    parts = [markdown(table), *map(markdown, foretold)]
     if chosen.people:
         cohorts = ("gaussian", "skewed", "plateau")
         parts.append(markdown(smooth_people("gp-straddle", cohorts, chosen.people, chosen.seed, chosen.workers)))
