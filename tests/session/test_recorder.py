@@ -16,6 +16,7 @@ from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.errors import (
     DamagedLogError,
+    DeviceError,
     ImplausibleDataWarning,
     InvalidValueError,
     LimitExceededError,
@@ -25,6 +26,7 @@ from isiw.errors import (
 from isiw.log.reader import read_session
 from isiw.log.schema import Estimate, Intent
 from isiw.report import final_statement
+from isiw.session.loop import Session
 from isiw.session.recorder import Recorder, open_session
 from isiw.session.resume import resume
 from isiw.trials import MistrialReason, Trial
@@ -212,6 +214,27 @@ def test_a_resumed_session_keeps_the_logged_configuration_unless_another_is_give
         with open_session(scripted_strategy(9), log, resume=True, config=given):
             pass
         assert read_session(log).header.config == kept
+
+
+def test_a_session_does_not_go_on_with_the_log_of_another_person(log: Path) -> None:
+    with open_session(scripted_strategy(9), log, subject="P1") as session:
+        run(session, 1)
+    before = log.read_bytes()
+    with pytest.raises(InvalidValueError, match="another person's"):
+        open_session(scripted_strategy(9), log, resume=True, subject="P2")
+    assert log.read_bytes() == before
+    for subject in ("", "P1"):
+        with open_session(scripted_strategy(9), log, resume=True, subject=subject):
+            pass
+        assert read_session(log).header.subject == "P1"
+
+
+def test_a_loop_of_the_labs_own_does_not_go_on_with_simulated_trials(log: Path) -> None:
+    Session(ScriptedDevice(simulated=True), scripted_strategy(3), log=log).run()
+    before = log.read_bytes()
+    with pytest.raises(DeviceError, match="no person's"):
+        open_session(scripted_strategy(9), log, resume=True)
+    assert log.read_bytes() == before
 
 
 @pytest.mark.parametrize("limit", [{"max_coil_c": 40.0}, {"intensity_pct_mso": 60.0}])

@@ -25,7 +25,7 @@ from isiw.session.header import header_of, require_parts
 from isiw.session.journal import Journal, learn, relearned
 from isiw.session.judging import Judging
 from isiw.session.replay import replay, warn_where_differing
-from isiw.session.resume import ages_s, continued, resumption, with_lost_pulses
+from isiw.session.resume import ages_s, continued, require_as_real, resumption, with_lost_pulses
 from isiw.signals.faults import remedy_for
 from isiw.signals.judgement import SignalLimits
 from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
@@ -64,7 +64,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
             nobody reports these here.
         clock: tells the time, and waits in `ask` until the interval, the rest and the period of the limits have passed,
             before the first stimulus, too, as nobody knows what came before.
-        subject: the person's code, for the log.
+        subject: the person's code, for the log; of a session that goes on, the logged one by default.
         visit: what is noted about the visit, for the log; of a session that goes on, the logged one by default.
         protocol: intervals, blocks and rests, which `ask` waits for; of a session that goes on, the logged one by
             default. Control trials are the loop's own: `tell(None, …)` is TMS alone.
@@ -76,8 +76,9 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
 
     Raises:
         DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
-        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; a subject that is no text;
-            a protocol with control trials.
+        DeviceError: the log is of a simulated device.
+        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; a subject that is no text,
+            or another than the log's; a protocol with control trials.
         LogError: there is a log already, or it cannot be written or read.
         StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
 
@@ -111,7 +112,9 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     if not (resume and (path.exists() or part_of(path).exists())):
         return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
     salvaged = salvage(path)
-    record = with_lost_pulses(read_salvaged(salvaged), lost_pulses)
+    record = read_salvaged(salvaged)
+    _require_same_person(header, record.header)
+    record = with_lost_pulses(record, lost_pulses)
     replayed = replay(record, strategy)
     warn_where_differing(replayed, record.header)
     kept = {
@@ -129,6 +132,18 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     writer.append(resumption(record, replayed))
     writer.sync()
     return Recorder(replayed.strategy, writer, header, clock, replayed.trials, ages, on_doubt)
+
+
+def _require_same_person(header: Header, logged: Header) -> None:
+    """Raise where the log's trials are another person's, or nobody's."""
+    require_as_real(header.device, logged.device)
+    if header.subject and logged.subject and header.subject != logged.subject:
+        raise InvalidValueError(
+            "the log is another person's",
+            got=header.subject,
+            expected=logged.subject,
+            remedy="Begin a log of its own for each person: isiw.open_session(strategy, log=NEW_PATH, subject=...).",
+        )
 
 
 def _without_controls(protocol: VisitProtocol) -> VisitProtocol:

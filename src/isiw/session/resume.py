@@ -10,7 +10,7 @@ from pathlib import Path
 from isiw.checks import whole
 from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Device, HasMemory
+from isiw.devices.protocol import Device, DeviceInfo, HasMemory
 from isiw.errors import DamagedLogError, DeviceError, InvalidValueError
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord, read_salvaged
@@ -76,7 +76,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
     header = record.header
-    _require_as_real(device, header)
+    require_as_real(device.describe(), header.device)
     record = with_lost_pulses(record, lost_pulses)
     replayed = replay(record, strategy.restarted() if strategy else strategy_of(header), verify=verify)
     warn_where_differing(replayed, header)
@@ -218,9 +218,16 @@ def _require_end(record: SessionRecord) -> None:
         )
 
 
-def _require_as_real(device: Device, header: Header) -> None:
-    """Raise where the session would go on without waiting or with answers from nobody, or a simulation on a person."""
-    info, was = device.describe(), header.device
+def require_as_real(info: DeviceInfo, was: DeviceInfo) -> None:
+    """Raise where the session would go on without waiting or with answers from nobody, or a simulation on a person.
+
+    Args:
+        info: what the session would go on with.
+        was: what it was run with.
+
+    Raises:
+        DeviceError: one of them is simulated, and the other is not.
+    """
     if info.simulated and not was.simulated:
         raise DeviceError(
             "the session was run with a real device, and cannot go on with a simulated one",
@@ -234,5 +241,6 @@ def _require_as_real(device: Device, header: Header) -> None:
             "the session was run with a simulated device, and its limits and trials are no person's",
             got=info.name,
             expected=f"a simulated one, as {was.name} was",
-            remedy="Start a session of its own with the real device: isiw.Session(device, strategy, log=NEW_PATH).",
+            remedy="Start a session of its own: isiw.Session(device, strategy, log=NEW_PATH), or "
+            "isiw.open_session(strategy, log=NEW_PATH).",
         )
