@@ -8,11 +8,14 @@ from typing import Any
 
 import pytest
 
+from isiw import priors
 from isiw.config.rig import TEMPLATE_FILES, device_from_factory, write_rig_template
 from isiw.config.run import device_for, load_config, session_for
+from isiw.design import IMPACT_SPACE
 from isiw.errors import ConfigError
 from isiw.log.reader import read_session
 from known import known
+from priors.logged import write_log
 
 
 @pytest.fixture
@@ -96,3 +99,33 @@ def test_a_factory_is_a_module_and_a_function(tmp_path: Path) -> None:
     path.write_text('[device]\nfactory = "rig.py"\n')
     with pytest.raises(ConfigError, match=r"device\.factory.*'rig.py'"):
         load_config(path)
+
+
+def with_real_device(template: Path) -> Path:
+    """The starting point for the subject P01, as with hardware that stimulates."""
+    path = template / "session.toml"
+    path.write_text(path.read_text(encoding="utf-8").replace("simulated = true", "simulated = false"), encoding="utf-8")
+    return path
+
+
+def test_a_session_starts_from_the_same_persons_earlier_ones_alone(template: Path, tmp_path: Path) -> None:
+    own, others = (
+        write_log(tmp_path / f"{subject}.mcap", subject=subject, trials=3, space=IMPACT_SPACE)
+        for subject in ("P01", "P02")
+    )
+    config = load_config(with_real_device(template)).with_overrides(log=tmp_path / "s.mcap")
+    prior = session_for(config.with_overrides(after=[own])).strategy.recipe.settings["prior"]
+    assert prior != session_for(config).strategy.recipe.settings.get("prior")
+    with pytest.raises(ConfigError, match=r"another person's.*P02.*P01"):
+        session_for(config.with_overrides(after=[own, others]))
+
+
+def test_what_simulated_sessions_taught_is_not_used_on_a_person(template: Path, tmp_path: Path) -> None:
+    simulated = write_log(tmp_path / "sim.mcap", subject="P01", trials=3, space=IMPACT_SPACE, simulated=True)
+    lab = priors.write_lab_prior(priors.learn([simulated]), tmp_path / "lab.toml")
+    rehearsal = load_config(template / "session.toml").with_overrides(log=tmp_path / "s.mcap")
+    assert session_for(rehearsal.with_overrides(after=[simulated], prior=lab)).strategy.recipe.settings["prior"]
+    config = load_config(with_real_device(template)).with_overrides(log=tmp_path / "s.mcap")
+    for taught in ({"after": [simulated]}, {"prior": lab}):
+        with pytest.raises(ConfigError, match="simulated sessions"):
+            session_for(config.with_overrides(**taught))

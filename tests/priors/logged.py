@@ -30,6 +30,7 @@ def write_log(
     trials: int = 25,
     space: DesignSpace = VALVE_SPACE,
     seed: int = 1,
+    simulated: bool = False,
 ) -> Path:
     """The log of a session with ISIs all over the range."""
     header = Header(
@@ -40,7 +41,7 @@ def write_log(
         strategy=StrategyRecipe(name="", seed=seed),
         space=space,
         limits=Limits.of_space(space),
-        device=DeviceInfo("bench", space.reference),
+        device=DeviceInfo("bench", space.reference, simulated=simulated),
         signals=SignalLimits(),
     )
     responder = (person or gaussian_person()).begin(seed)

@@ -96,6 +96,13 @@ def test_of_a_session_without_a_window_it_cannot_be_said_whether_it_moved(first:
         priors.moved(none, first)
 
 
+def test_days_of_different_people_are_refused(first: Any, folder: Path) -> None:
+    other = read_session(write_log(folder / "other.mcap", person(), subject="P2", trials=5))
+    for together in (priors.after, priors.moved):
+        with pytest.raises(InvalidValueError, match="different people"):
+            together(first, other)
+
+
 def test_days_on_different_clocks_are_refused(first: Any, folder: Path) -> None:
     other = read_session(write_log(folder / "impact.mcap", person(), trials=5, space=IMPACT_SPACE))
     with pytest.raises(InvalidValueError, match="different events"):

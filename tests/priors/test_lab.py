@@ -44,6 +44,7 @@ def path(lab: Any, tmp_path: Path) -> Any:
 def test_a_lab_prior_names_its_sessions_by_their_content(lab: Any, logs: Any) -> None:
     assert [session.sha256 for session in lab.sessions] == [hashlib.sha256(p.read_bytes()).hexdigest() for p in logs]
     assert [(session.subject, session.trials) for session in lab.sessions] == [(f"P{k}", TRIALS) for k in range(3)]
+    assert not lab.simulated
 
 
 def test_every_session_is_reported_once_it_is_learnt(tmp_path: Path) -> None:
@@ -77,6 +78,14 @@ def test_sessions_on_different_clocks_are_refused(logs: Any, tmp_path: Path) -> 
     other = write_log(tmp_path / "impact.mcap", subject="Q", trials=4, space=IMPACT_SPACE)
     with pytest.raises(LogError, match="different events"):
         priors.learn([logs[0], other])
+
+
+def test_simulated_sessions_are_not_mixed_with_people(logs: Any, tmp_path: Path) -> None:
+    other = write_log(tmp_path / "simulated.mcap", subject="Q", trials=4, simulated=True)
+    with pytest.raises(LogError, match=r"some of the sessions are simulated.*simulated\.mcap"):
+        priors.learn([logs[0], other])
+    file = priors.write_lab_prior(priors.learn([other]), tmp_path / "simulated.toml")
+    assert priors.read_lab_prior(file).simulated
 
 
 def test_nothing_is_learnt_from_nobody(tmp_path: Path) -> None:

@@ -26,12 +26,13 @@ from isiw.checks import choice
 from isiw.config.rig import device_from_factory
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Device
+from isiw.devices.protocol import Device, DeviceInfo
 from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord, read_session
-from isiw.priors import after, load
+from isiw.models.particles.prior import Prior
+from isiw.priors import after, read_lab_prior
 from isiw.session.loop import Session
 from isiw.session.updates import SessionUpdate
 from isiw.signals.judgement import SignalLimits
@@ -322,15 +323,16 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         on_trial: called after each trial.
 
     Raises:
-        ConfigError: no recordings, or no prior, where the configuration says.
+        ConfigError: no recordings, or no prior, where the configuration says; earlier sessions of another person, or
+            simulated ones where the device is real.
         LogError: an earlier session of the person that cannot be read, or has no accepted trial.
         StrategyError: a prior for a strategy that has none of this kind.
     """
     space = config.space.design()
     log = config.log or fresh_log_path(config)
     device = device_for(config)
-    known = {"hit_delay_ms": device.describe().hit_delay_ms}
-    settings = known_settings(config.strategy.name, known) | _settings_for(config)
+    info = device.describe()
+    settings = known_settings(config.strategy.name, {"hit_delay_ms": info.hit_delay_ms}) | _settings_for(config, info)
     return Session(
         device,
         make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),
@@ -346,7 +348,7 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
     )
 
 
-def _settings_for(config: RunConfig) -> dict[str, Any]:
+def _settings_for(config: RunConfig, device: DeviceInfo) -> dict[str, Any]:
     """The strategy's settings, with what earlier sessions taught as its prior."""
     settings = dict(config.strategy.settings)
     if config.prior is None and not config.after:
@@ -356,8 +358,35 @@ def _settings_for(config: RunConfig) -> dict[str, Any]:
             "strategy.settings.prior and a prior from earlier sessions exclude each other",
             remedy="Give only one of them.",
         )
-    lab = None if config.prior is None else load(config.prior)
-    return settings | {"prior": after(*map(read_session, config.after), prior=lab)}
+    return settings | {"prior": _taught(config, device)}
+
+
+def _taught(config: RunConfig, device: DeviceInfo) -> Prior:
+    """What the lab's people and the person's earlier sessions taught."""
+    lab = None if config.prior is None else read_lab_prior(config.prior)
+    earlier = [read_session(path) for path in config.after]
+    nobodys = [str(record.path) for record in earlier if record.header.device.simulated]
+    if lab is not None and lab.simulated:
+        nobodys.append(str(config.prior))
+    if nobodys and not device.simulated:
+        raise ConfigError(
+            "what simulated sessions taught says nothing about the person who will be stimulated",
+            got=nobodys,
+            remedy="Leave it out, or learn from sessions with people.",
+        )
+    _require_same_person(config.visit.subject, earlier)
+    return after(*earlier, prior=None if lab is None else lab.joined())
+
+
+def _require_same_person(subject: str, earlier: Sequence[SessionRecord]) -> None:
+    others = [record for record in earlier if record.header.subject not in {"", subject}]
+    if subject and others:
+        raise ConfigError(
+            "the earlier session is another person's",
+            got=f"{others[0].header.subject} in {others[0].path}",
+            expected=f"{subject}, as visit.subject says",
+            remedy="Give this person's own logs, or correct visit.subject.",
+        )
 
 
 def _code(config: RunConfig) -> str:

@@ -6,7 +6,7 @@ thresholds change. The posterior is handed on as mixtures of normal laws, which 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Final, TypeAlias
@@ -86,8 +86,9 @@ def after(*records: SessionRecord, prior: Prior | None = None, law: DayToDay | N
 
     Raises:
         LogError: a session without an accepted trial.
-        InvalidValueError: sessions, or a prior, that count ISIs from different events.
+        InvalidValueError: sessions of different people; sessions, or a prior, that count ISIs from different events.
     """
+    _require_one_person(records)
     prior, law = prior or Prior(), law or DayToDay()
     for record in records:
         prior = _another_day(recalled(record, prior), law)
@@ -104,8 +105,10 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
 
     Raises:
         LogError: a session without an accepted trial.
-        InvalidValueError: sessions that count ISIs from different events, or one in which there is probably no window.
+        InvalidValueError: sessions of different people, or that count ISIs from different events, or one in which
+            there is probably no window.
     """
+    _require_one_person((first, second))
     earlier = recalled(first, Prior())
     _require_window(first, earlier)
     before = _another_day(earlier, law or DayToDay())
@@ -114,6 +117,12 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
     weights = (later.swarm.log_weights.exp() * later.swarm.latents.present)[0].double()
     anywhere = before.log_places(later.swarm.latents.values, later.space)[0].double().softmax(-1)[:, 0]
     return float((weights * anywhere).sum() / weights.sum())
+
+
+def _require_one_person(records: Sequence[SessionRecord]) -> None:
+    subjects = sorted({record.header.subject for record in records} - {""})
+    if len(subjects) > 1:
+        raise InvalidValueError("the sessions are of different people", got=subjects, expected="one subject's")
 
 
 def _require_window(record: SessionRecord, posterior: ParticlePosterior) -> None:

@@ -44,11 +44,13 @@ class LearntSession:
         sha256: hash of its log's bytes.
         subject: the person's identifier in it.
         trials: how many accepted trials it has.
+        simulated: whether its device was a simulated one.
     """
 
     sha256: str
     subject: str
     trials: int
+    simulated: bool = False
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,11 @@ class LabPrior:
 
     def __post_init__(self) -> None:
         check_probabilities(self, "p_window")
+
+    @property
+    def simulated(self) -> bool:
+        """Whether it was learnt from simulated people."""
+        return any(session.simulated for session in self.sessions)
 
     def joined(self, usual: Prior | None = None) -> Prior:
         """A prior in which the lab's laws stand beside those of people in general.
@@ -127,7 +134,7 @@ def learn(
 
     Raises:
         LogError: no log, one that cannot be read or has no accepted trial, the same log or person twice, or sessions
-            that count ISIs from different events.
+            that count ISIs from different events, or of which some are simulated and others are not.
     """
     records = [read_session(path) for path in logs]
     sessions = tuple(_learnt_session(record) for record in records)
@@ -144,11 +151,11 @@ def learn(
 
 def _learnt_session(record: SessionRecord) -> LearntSession:
     digest = hashlib.sha256(record.path.read_bytes()).hexdigest()
-    return LearntSession(digest, record.header.subject, len(record.table.told))
+    return LearntSession(digest, record.header.subject, len(record.table.told), record.header.device.simulated)
 
 
 def _require_different(records: Sequence[SessionRecord], sessions: Sequence[LearntSession], *, again: bool) -> None:
-    """Raise where one log or person would count twice, or where clocks differ."""
+    """Raise where one log or person would count twice, or where sessions do not belong together."""
     if not records:
         raise LogError("there is no session to learn from", remedy="Name at least one log.")
     hashes = [session.sha256 for session in sessions]
@@ -157,6 +164,9 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
         subjects = [session.subject for session in sessions]
         remedy = "Leave one out, or count each session as a person of its own: again=True, or --again."
         _require_once(records, subjects, "two logs are of the same person, or do not say of whom", remedy)
+    if len({session.simulated for session in sessions}) > 1:
+        simulated = [str(record.path) for record in records if record.header.device.simulated]
+        raise LogError("some of the sessions are simulated, others are not", got=simulated, remedy="Leave these out.")
     references = {record.header.space.reference for record in records}
     if len(references) > 1:
         remedy = "Learn a prior from each kind of session."
