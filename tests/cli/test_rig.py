@@ -55,6 +55,19 @@ def test_from_nothing_to_a_session_and_on(isiw: Command, tmp_path: Path) -> None
     assert read_session("s.mcap").events[-1].kind == "limit"
 
 
+def test_a_log_does_not_go_on_with_the_next_persons_configuration(isiw: Command, tmp_path: Path) -> None:
+    isiw("new", "rig", ".")
+    changed(tmp_path / "session.toml", "max_trials = 40", "max_trials = 2")
+    assert isiw("run", "session.toml", "--log", "P01.mcap").exit_code == 0
+    before = (tmp_path / "P01.mcap").read_bytes()
+    changed(tmp_path / "session.toml", 'subject = "P01"', 'subject = "P02"')
+    refused = isiw("resume", "P01.mcap", "session.toml")
+    assert refused.exit_code == 1
+    assert "another person's" in refused.output
+    assert "visit.subject" in refused.output
+    assert (tmp_path / "P01.mcap").read_bytes() == before
+
+
 def test_a_faulty_rig_fails_its_check_with_a_table_and_the_fault(isiw: Command, tmp_path: Path) -> None:
     isiw("new", "rig", ".")
     changed(tmp_path / "rig.py", 'Channel(emg_mv, RATE_HZ, "mV"', 'Channel(1e3 * emg_mv, RATE_HZ, "mV"')

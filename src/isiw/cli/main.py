@@ -123,6 +123,7 @@ def resume(
     with errors_reported():
         record = isiw.read_session(log)
         settings = isiw.config.load_config(config) if config else isiw.config.config_of_log(record)
+        isiw.config.require_same_person(settings, [record])
         device = isiw.config.device_for(settings.with_overrides(data=data))
         _run_to_the_end(isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify), live=live)
 

@@ -51,6 +51,7 @@ __all__ = [
     "fresh_log_path",
     "has_truth",
     "load_config",
+    "require_same_person",
     "session_for",
     "subject_for",
     "true_window",
@@ -374,18 +375,28 @@ def _taught(config: RunConfig, device: DeviceInfo) -> Prior:
             got=nobodys,
             remedy="Leave it out, or learn from sessions with people.",
         )
-    _require_same_person(config.visit.subject, earlier)
+    require_same_person(config, earlier)
     return after(*earlier, prior=None if lab is None else lab.joined())
 
 
-def _require_same_person(subject: str, earlier: Sequence[SessionRecord]) -> None:
-    others = [record for record in earlier if record.header.subject not in {"", subject}]
+def require_same_person(config: RunConfig, records: Sequence[SessionRecord]) -> None:
+    """Check that sessions are of the person whom a configuration names, where both say whom they are of.
+
+    Args:
+        config: the configuration.
+        records: the sessions.
+
+    Raises:
+        ConfigError: a session of another subject than `visit.subject`.
+    """
+    subject = config.visit.subject
+    others = [record for record in records if record.header.subject not in {"", subject}]
     if subject and others:
         raise ConfigError(
-            "the earlier session is another person's",
+            "the log is another person's",
             got=f"{others[0].header.subject} in {others[0].path}",
             expected=f"{subject}, as visit.subject says",
-            remedy="Give this person's own logs, or correct visit.subject.",
+            remedy="Give this person's own log, or correct visit.subject.",
         )
 
 
