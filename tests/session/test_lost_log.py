@@ -9,11 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from isiw.devices.protocol import DeviceInfo
 from isiw.errors import LogError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
+from isiw.session.recorder import open_session
 from isiw.session.resume import resume
+from isiw.session.threshold import open_threshold
 from isiw.session.updates import SessionUpdate
+from isiw.strategy.threshold import IntensityRange, make_threshold_search
 from isiw.trials import Measurement, Stimulus
 from scripted import ScriptedDevice, scripted_strategy
 
@@ -75,3 +79,32 @@ def test_a_log_that_is_gone_after_the_last_stimulus_is_no_success(log: Path) -> 
     with pytest.raises(LogError, match=r"s\.rescued\.mcap"):
         Session(ScriptedDevice(), scripted_strategy(3), log=log, on_trial=on_trial).run()
     assert len(read_session(log.with_name("s.rescued.mcap")).table) == 3
+
+
+@pytest.mark.parametrize("happening", HAPPENINGS)
+def test_a_loop_of_the_labs_own_gets_no_further_isi_once_its_log_is_gone(log: Path, happening: str) -> None:
+    def loop() -> None:
+        with open_session(scripted_strategy(9), log) as session:
+            session.tell(session.ask(), 0.1)
+            HAPPENINGS[happening](log.with_name("s.mcap.part"))
+            with pytest.raises(LogError, match="Nothing more is delivered"):
+                session.ask()
+            assert session.asked is None
+            session.ask()
+
+    with pytest.raises(LogError, match="no longer as it was written"):
+        loop()
+    if happening in {"deleted", "moved"}:
+        assert len(read_session(log.with_name("s.rescued.mcap")).table.told) == 1
+
+
+def test_a_threshold_search_gets_no_further_intensity_once_its_log_is_gone(log: Path) -> None:
+    search = make_threshold_search("maximum-likelihood", IntensityRange(20, 80))
+    recorder = open_threshold(search, log, device=DeviceInfo("nobody", "impact", simulated=True))
+    recorder.ask()
+    recorder.tell(0.01)
+    log.with_name("s.mcap.part").unlink()
+    with pytest.raises(LogError, match="Nothing more is delivered"):
+        recorder.ask()
+    with pytest.raises(LogError, match=r"s\.rescued\.mcap"):
+        recorder.close()

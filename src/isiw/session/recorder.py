@@ -210,7 +210,7 @@ class Recorder(Judging):
 
         Raises:
             LimitExceededError: a limit is reached; deliver nothing.
-            LogError: the log cannot be written; deliver nothing.
+            LogError: the log cannot be written, or is no longer at its path; deliver nothing.
         """
         if self._asked is None or self._asked.isi_ms is None:
             isi_ms = self.strategy.ask(deadline_s)
@@ -227,6 +227,7 @@ class Recorder(Judging):
         self._limits.require_state(Readiness())
         self._clock.sleep_s(self._earliest_s(stimulus.trial) - self._clock.now_s())
         self._journal.intent(stimulus, self._clock.now_s(), fallback)
+        self._journal.log.require_in_place()
         self._asked = stimulus
 
     def _earliest_s(self, trial: int) -> float:

@@ -205,7 +205,7 @@ class ThresholdRecorder:
 
         Raises:
             LimitExceededError: a limit is reached; deliver nothing.
-            LogError: the log cannot be written; deliver nothing.
+            LogError: the log cannot be written, or is no longer at its path; deliver nothing.
         """
         if self._asked is None:
             self._limits.require_left(self.given)
@@ -215,6 +215,7 @@ class ThresholdRecorder:
             now_s = self._clock.now_s()
             self._log.append(Intent(trial=self.given, isi_ms=None, t_s=now_s, intensity_pct_mso=intensity))
             self._log.sync()
+            self._log.require_in_place()
             self._asked = intensity
         return self._asked
 
