@@ -19,6 +19,7 @@ __all__ = [
     "ENOUGH_PAIRS",
     "MIN_EXCESS_MV",
     "MIN_EXCESS_OF_BASELINE",
+    "TOO_FEW",
     "BestISI",
     "Enhancement",
     "Interval",
@@ -38,6 +39,9 @@ MIN_EXCESS_OF_BASELINE = 0.10
 
 ENOUGH_PAIRS = 3
 """With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
+
+TOO_FEW = "Too few trials counted to speak of a window: most of what is believed was believed beforehand."
+"""What is said instead."""
 
 Interval: TypeAlias = tuple[float, float]
 _Edge: TypeAlias = tuple[float | None, float | None, float | None]
@@ -259,6 +263,8 @@ class WindowEstimate:
         return dict(zip(self.hypothesis_names, shares, strict=True))
 
     def __str__(self) -> str:
+        if not self.rests_on_data:
+            return TOO_FEW
         start, end = self.interval(0.9) or ((None, None), (None, None))
         depressed = self.depressed, self.depressed_probability
         return finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end), depressed)

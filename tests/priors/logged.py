@@ -31,11 +31,12 @@ def write_log(
     space: DesignSpace = VALVE_SPACE,
     seed: int = 1,
     simulated: bool = False,
+    created: str = "2026-11-21T10:00:00+00:00",
 ) -> Path:
     """The log of a session with ISIs all over the range."""
     header = Header(
         isiw_version="0.1.0",
-        created="2026-11-21T10:00:00+00:00",
+        created=created,
         subject=subject,
         seed=seed,
         strategy=StrategyRecipe(name="", seed=seed),

@@ -103,6 +103,20 @@ def test_days_of_different_people_are_refused(first: Any, folder: Path) -> None:
             together(first, other)
 
 
+def test_a_session_counts_once_also_as_a_copy(first: Any, folder: Path) -> None:
+    copy = folder / "copy.mcap"
+    copy.write_bytes(first.path.read_bytes())
+    for together in (priors.after, priors.moved):
+        with pytest.raises(InvalidValueError, match=r"same session.*copy\.mcap"):
+            together(first, read_session(copy))
+
+
+def test_days_come_in_the_order_in_which_they_were(first: Any, folder: Path) -> None:
+    later = read_session(write_log(folder / "later.mcap", person(), trials=5, created="2026-11-22T10:00:00+00:00"))
+    with pytest.raises(InvalidValueError, match="the first one first"):
+        priors.after(later, first)
+
+
 def test_days_on_different_clocks_are_refused(first: Any, folder: Path) -> None:
     other = read_session(write_log(folder / "impact.mcap", person(), trials=5, space=IMPACT_SPACE))
     with pytest.raises(InvalidValueError, match="different events"):

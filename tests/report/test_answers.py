@@ -48,6 +48,16 @@ def test_timing_is_said_by_the_median_and_the_largest_error_and_what_it_cost(rec
     assert answer(with_history(record, trials), "timing").answer == "yes"
 
 
+def test_an_isi_beyond_the_tolerance_is_not_right_where_nobody_rejected_it(record: SessionRecord) -> None:
+    trials = [trial(0, isi_ms=150.0), trial(1, isi_ms=51.0)]
+    assert answer(with_history(record, trials), "timing").answer == "not in 1 of 2 trials"
+
+
+def test_a_tense_muscle_is_not_at_rest_where_nobody_rejected_the_trial(record: SessionRecord) -> None:
+    trials = [trial(0, background_rms_uv=450.0), trial(1, background_rms_uv=1.0)]
+    assert answer(with_history(record, trials), "at rest").answer == "not in 1 of 2 trials"
+
+
 def test_a_device_that_only_repeats_what_was_wanted_is_not_taken_for_exact(record: SessionRecord) -> None:
     _, said, detail = answer(record, "timing")
     assert said == "as the device says"

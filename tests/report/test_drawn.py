@@ -11,8 +11,9 @@ import pytest
 
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
-from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, TOO_FEW, drawn
+from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, drawn
 from isiw.trials import Channel
+from isiw.window import TOO_FEW
 from report.sessions import tapped
 
 

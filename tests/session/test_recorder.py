@@ -28,8 +28,11 @@ from isiw.log.schema import Estimate, Intent
 from isiw.report import final_statement
 from isiw.session.loop import Session
 from isiw.session.recorder import Recorder, open_session
-from isiw.session.resume import resume
+from isiw.session.resume import exclude, resume
+from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.strategy import Strategy
 from isiw.trials import MistrialReason, Trial
+from isiw.types import Reference
 from known import known
 from logs import cut_after
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
@@ -235,6 +238,30 @@ def test_a_loop_of_the_labs_own_does_not_go_on_with_simulated_trials(log: Path) 
     with pytest.raises(DeviceError, match="no person's"):
         open_session(scripted_strategy(9), log, resume=True)
     assert log.read_bytes() == before
+
+
+def test_a_session_goes_on_in_its_own_design_space(log: Path) -> None:
+    def strategy(reference: Reference) -> Strategy:
+        return make_strategy("even", space=DesignSpace(0, 320, reference=reference), seed=1, max_trials=8)
+
+    with open_session(strategy("impact"), log) as session:
+        run(session, 2)
+    with pytest.raises(StrategyError, match=r"another design space.*valve.*impact"):
+        open_session(strategy("valve"), log, resume=True)
+    assert read_session(log).header.space.reference == "impact"
+
+
+def test_a_resumed_session_logs_what_is_believed_after_trials_were_judged_anew(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        run(session, 4)
+    exclude(log, 1, "sneezed")
+    assert "judged anew" in str(read_session(log))
+    assert "isiw.open_session(" in final_statement(read_session(log))
+    with open_session(scripted_strategy(9), log, resume=True):
+        pass
+    record = read_session(log)
+    assert not record.is_judged_since
+    assert record.estimates[-1].trial == 3
 
 
 @pytest.mark.parametrize("limit", [{"max_coil_c": 40.0}, {"intensity_pct_mso": 60.0}])

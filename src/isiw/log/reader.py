@@ -30,12 +30,12 @@ from isiw.log.schema import (
     Waveform,
 )
 from isiw.log.topics import decode
-from isiw.log.verdicts import under_all
+from isiw.log.verdicts import VERDICTS, under_all
 from isiw.log.writer import CONFIGURATION
 from isiw.strategy.stopping import StopDecision
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial, TrialTable
-from isiw.window import ENOUGH_PAIRS
+from isiw.window import ENOUGH_PAIRS, TOO_FEW
 
 __all__ = ["Records", "SessionRecord", "of_production", "read_any", "read_salvaged", "read_session"]
 
@@ -83,7 +83,12 @@ class SessionRecord:
             f"Trials: {self.table}" + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
         ]
         if last is not None:
-            lines += [str(last), f"{'Ended' if last.stop else 'Not over'}: {last.reason}"]
+            lines += [
+                str(last) if self.rests_on_data else TOO_FEW,
+                f"{'Ended' if last.stop else 'Not over'}: {last.reason}",
+            ]
+            if self.is_judged_since:
+                lines.append("Trials were judged anew after this estimate.")
         return "\n".join([*lines, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
 
     @cached_property
@@ -104,6 +109,12 @@ class SessionRecord:
     def rests_on_data(self) -> bool:
         """Whether enough pairs of stimuli count to speak of a window."""
         return sum(trial.isi_ms is not None for trial in self.table.told) >= ENOUGH_PAIRS
+
+    @property
+    def is_judged_since(self) -> bool:
+        """Whether trials were judged anew after the last estimate, so that it does not know of it."""
+        since = itertools.takewhile(lambda entry: not isinstance(entry, Estimate), reversed(self.history))
+        return any(isinstance(entry, Event) and entry.kind in VERDICTS for entry in since)
 
     @property
     def intents(self) -> tuple[Intent, ...]:

@@ -6,6 +6,7 @@ thresholds change. The posterior is handed on as mixtures of normal laws, which 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -86,9 +87,10 @@ def after(*records: SessionRecord, prior: Prior | None = None, law: DayToDay | N
 
     Raises:
         LogError: a session without an accepted trial.
-        InvalidValueError: sessions of different people; sessions, or a prior, that count ISIs from different events.
+        InvalidValueError: sessions of different people, the same twice, or a later one first; sessions, or a prior,
+            that count ISIs from different events.
     """
-    _require_one_person(records)
+    _require_days_of_one_person(records)
     prior, law = prior or Prior(), law or DayToDay()
     for record in records:
         prior = _another_day(recalled(record, prior), law)
@@ -105,10 +107,10 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
 
     Raises:
         LogError: a session without an accepted trial.
-        InvalidValueError: sessions of different people, or that count ISIs from different events, or one in which
-            there is probably no window.
+        InvalidValueError: sessions of different people, the same twice, or the later one first; sessions that count
+            ISIs from different events, or one in which there is probably no window.
     """
-    _require_one_person((first, second))
+    _require_days_of_one_person((first, second))
     earlier = recalled(first, Prior())
     _require_window(first, earlier)
     before = _another_day(earlier, law or DayToDay())
@@ -119,10 +121,22 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
     return float((weights * anywhere).sum() / weights.sum())
 
 
-def _require_one_person(records: Sequence[SessionRecord]) -> None:
+def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
+    """Raise where sessions are of different people, one counts twice, or a later one comes first."""
     subjects = sorted({record.header.subject for record in records} - {""})
     if len(subjects) > 1:
         raise InvalidValueError("the sessions are of different people", got=subjects, expected="one subject's")
+    for first, second in itertools.pairwise(records):
+        if first.header.created > second.header.created:  # as text, which ISO 8601 in UTC sorts
+            raise InvalidValueError(
+                "the sessions are not in the order in which they were run",
+                got=[f"{record.path}, {record.header.created}" for record in (first, second)],
+                expected="the first one first",
+            )
+    for first, second in itertools.combinations(records, 2):
+        if all(one == other for one, other in zip(first.table, second.table, strict=False)):
+            paths = f"{first.path} and {second.path}"
+            raise InvalidValueError("two logs are of the same session", got=paths, expected="each session once")
 
 
 def _require_window(record: SessionRecord, posterior: ParticlePosterior) -> None:

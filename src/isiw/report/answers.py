@@ -55,7 +55,9 @@ def _timing(record: SessionRecord) -> Answer:
     is_timed = any(trial.t_hit_ms is not None or trial.t_tms_ms is not None for trial in record.table)
     if not errors_ms:
         return Answer(
-            question, _verdict(record, rejected, 0), f"No trial that counts has a realised ISI. {_listed(rejected)}"
+            question,
+            _verdict(record, len(rejected), 0),
+            f"No trial that counts has a realised ISI. {_listed(rejected)}",
         )
     if not any(errors_ms) and not is_timed:
         detail = "It reports every ISI as it was wanted, and no time of a pulse or a hit to check that by."
@@ -64,14 +66,17 @@ def _timing(record: SessionRecord) -> Answer:
     sizes = f"{statistics.median(errors_ms):.1f} ms (median), at most {max(errors_ms):.1f} ms"
     detail = f"Trials that count are off by {sizes}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
     known = sum(trial.commanded_isi_ms is None or trial.isi_ms is not None for trial in record.table)
-    return Answer(question, _verdict(record, rejected, known), detail)
+    off = sum(abs(t.isi_error_ms or 0.0) > tolerance_ms and t.overruled not in _OF_TIMING for t in record.table.told)
+    return Answer(question, _verdict(record, len(rejected) + off, known), detail)
 
 
 def _rest(record: SessionRecord) -> Answer:
     question, limit_uv = "Was the muscle at rest?", record.header.signals.background_uv
     levels_uv = [t.background_rms_uv for t in record.table if t.background_rms_uv is not None]
-    rejected = _rejected_for(record, frozenset({MistrialReason.BACKGROUND_ACTIVITY}))
-    verdict = _verdict(record, rejected, len(levels_uv))
+    reasons = frozenset({MistrialReason.BACKGROUND_ACTIVITY})
+    rejected = _rejected_for(record, reasons)
+    tense = sum((t.background_rms_uv or 0.0) > limit_uv and t.overruled not in reasons for t in record.table.told)
+    verdict = _verdict(record, len(rejected) + tense, len(levels_uv))
     if not levels_uv:
         return Answer(question, verdict, f"The log has no background EMG. {_listed(rejected)}")
     sizes = f"{statistics.median(levels_uv):.2g} µV RMS (median), at most {max(levels_uv):.2g} µV"
@@ -85,11 +90,11 @@ def _rejected_for(record: SessionRecord, reasons: frozenset[MistrialReason]) -> 
     return lost + overruled
 
 
-def _verdict(record: SessionRecord, rejected: list[str], known: int) -> str:
+def _verdict(record: SessionRecord, wrong: int, known: int) -> str:
     """Whether it was right in all trials, as far as is known."""
     given = len(record.table)
-    if rejected:
-        return f"not in {len(rejected)} of {given} trials"
+    if wrong:
+        return f"not in {wrong} of {given} trials"
     if not known:
         return "not known"
     return "yes" if known == given else f"yes, where it is known ({known} of {given} trials)"

@@ -14,7 +14,7 @@ from isiw.report.words import finding_sentence
 from isiw.text import plain
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
-from isiw.window import ENOUGH_PAIRS
+from isiw.window import ENOUGH_PAIRS, TOO_FEW
 
 __all__ = ["drawn"]
 
@@ -23,8 +23,6 @@ NEAR_MS: Final = (-60.0, 100.0)
 
 MOST_NEAR, MOST_WHOLE, MOST_ISIS = 1000, 300, 260
 """Points that are drawn of the EMG near the pulse, of a whole waveform, and of a profile."""
-
-TOO_FEW: Final = "Too few trials counted to speak of a window: most of this is what was believed beforehand."
 
 _MOST_DECIMALS: Final = 12
 

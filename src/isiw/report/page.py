@@ -22,7 +22,7 @@ from isiw.report.drawn import drawn
 from isiw.report.facts import first_facts, further_facts, settings_facts
 from isiw.report.html import asset, library, rendered
 from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
-from isiw.report.words import finding_sentences, fit_sentence, is_judged_since
+from isiw.report.words import finding_sentences, fit_sentence
 from isiw.window import Window
 
 __all__ = ["report_page", "save_report"]
@@ -89,7 +89,7 @@ def _states(record: SessionRecord) -> list[str]:
     elif not record.finished:
         last = f"trial {record.table[-1].index}" if len(record.table) else "its beginning"
         said.append(f"The log is not closed: the session is running, or was interrupted. It is shown up to {last}.")
-    if record.estimates and is_judged_since(record):
+    if record.estimates and record.is_judged_since:
         said.append("Trials were judged anew after the last estimate, which does not know of it; resume the session.")
     return said
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections import Counter
 
 from isiw.design import DesignSpace
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Estimate, Event
-from isiw.log.verdicts import VERDICTS
+from isiw.log.schema import Estimate
 from isiw.metrics import f1
 from isiw.report.depression import depression_sentence
 from isiw.report.evidence import contradiction, nothing_measured
 from isiw.session.progress import asked, outcome
+from isiw.session.recorder import OWN_LOOP
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.window import Window
 
@@ -24,7 +23,6 @@ __all__ = [
     "finding_sentence",
     "finding_sentences",
     "fit_sentence",
-    "is_judged_since",
     "trial_rows",
     "truth_sentence",
 ]
@@ -66,12 +64,19 @@ def final_statement(record: SessionRecord) -> str:
             f"isiw resume --lost-pulses N {record.path}"
         )
     elif not last.stop:
-        sentences.append(f"The session is not over; go on with: isiw resume {record.path}")
-    if is_judged_since(record):
+        sentences.append(f"The session is not over; go on with: {_resuming(record)}")
+    if record.is_judged_since:
         sentences.append(
             "Trials were judged anew after this estimate; resume the session to have it with what counts now."
         )
     return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _resuming(record: SessionRecord) -> str:
+    """What goes on with a session: a command, or the call that a loop of the lab's own was begun with."""
+    if record.header.device.name == OWN_LOOP:
+        return f'isiw.open_session(strategy, "{record.path}", resume=True)'
+    return f"isiw resume {record.path}"
 
 
 def finding_sentences(record: SessionRecord) -> list[str]:
@@ -223,16 +228,6 @@ def _unstated_hit_delay(record: SessionRecord) -> str:
         "The device does not state its hit delay (DeviceInfo.hit_delay_ms), which would have saved stimuli; "
         f"isiw timing {record.path} measures it."
     )
-
-
-def is_judged_since(record: SessionRecord) -> bool:
-    """Whether trials were judged anew after the last estimate, so that it does not know of it.
-
-    Args:
-        record: the session, with an estimate.
-    """
-    since = itertools.takewhile(lambda entry: not isinstance(entry, Estimate), reversed(record.history))
-    return any(isinstance(entry, Event) and entry.kind in VERDICTS for entry in since)
 
 
 def truth_sentence(record: SessionRecord, truth: Window | None) -> str:

@@ -35,7 +35,10 @@ from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
 from isiw.visit import Visit, VisitProtocol
 from isiw.window import WindowEstimate
 
-__all__ = ["Recorder", "open_session"]
+__all__ = ["OWN_LOOP", "Recorder", "open_session"]
+
+OWN_LOOP = "a loop of the lab's own"
+"""What the log calls the device of such a session."""
 
 
 def open_session(  # noqa: PLR0913 - all but two are keyword-only
@@ -104,7 +107,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         visit=visit or Visit(),
         protocol=_without_controls(protocol or VisitProtocol()),
         limits=limits or Limits.of_space(strategy.space, min_iti_s=0.0),
-        device=DeviceInfo("a loop of the lab's own", strategy.space.reference),
+        device=DeviceInfo(OWN_LOOP, strategy.space.reference),
         signals=SignalLimits(),
         config=dict(config or {}),
     )
@@ -130,6 +133,9 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     for trial in replayed.unknown:
         writer.append(trial)
     writer.append(resumption(record, replayed))
+    if record.is_judged_since:
+        strategy = replayed.strategy
+        writer.append(believed(strategy, len(replayed.trials) - 1, strategy.decision(), None))
     writer.sync()
     return Recorder(replayed.strategy, writer, header, clock, replayed.trials, ages, on_doubt)
 

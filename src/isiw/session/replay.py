@@ -58,8 +58,10 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
         verify: whether to compare what the strategy asks with what it asked then.
 
     Raises:
-        StrategyError: it asks something else, although the versions are those that were logged.
+        StrategyError: it has another design space, or asks something else, although the versions are those that were
+            logged.
     """
+    _require_same_space(strategy, record.header)
     told: list[Trial] = []
     differing: list[int] = []
     first = record.header.asks_from
@@ -140,6 +142,16 @@ def _renamed(settings: Mapping[str, Any]) -> dict[str, Any]:
     if "max_iterations" in renamed:  # which left the initial trials out
         renamed["max_trials"] = renamed["initial"] + renamed.pop("max_iterations")
     return renamed
+
+
+def _require_same_space(strategy: Strategy, header: Header) -> None:
+    if strategy.space != header.space:
+        raise StrategyError(
+            "the strategy has another design space than the session",
+            got=str(strategy.space),
+            expected=str(header.space),
+            remedy="Make it with space=isiw.read_session(LOG).header.space.",
+        )
 
 
 def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
