@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from isiw.report.evidence import contradiction
+from isiw.report.evidence import contradiction, no_comparison
 from isiw.trials import Status, Trial
 from isiw.window import Window
 
@@ -37,3 +37,11 @@ def test_larger_meps_too_few_of_them_and_no_window_contradict_nothing(
     window: Window | None, inside_mv: list[float], outside_mv: list[float]
 ) -> None:
     assert contradiction(window, trials(inside_mv, outside_mv)) is None
+
+
+def test_a_window_with_hardly_a_trial_outside_has_nothing_to_be_compared_with() -> None:
+    told = trials([1.0, 1.1, 0.9, 1.0, 1.0], [1.0])
+    assert "1 of 6 pairs are outside, and 0 pulses were TMS alone" in str(no_comparison(WINDOW, told))
+    alone = [Trial(6 + k, Status.ACCEPTED, None, mep_mv=0.02) for k in range(3)]
+    assert no_comparison(WINDOW, [*told, *alone]) is None
+    assert no_comparison(None, told) is None

@@ -251,6 +251,13 @@ def test_a_session_goes_on_in_its_own_design_space(log: Path) -> None:
     assert read_session(log).header.space.reference == "impact"
 
 
+def test_a_doubt_is_in_the_final_statement(log: Path) -> None:
+    with open_session(scripted_strategy(9), log, on_doubt=lambda _text: None) as session:
+        for _ in range(5):
+            session.tell(session.ask(), 0.05)
+    assert "Doubt since trial 3: " in final_statement(read_session(log))
+
+
 def test_a_resumed_session_logs_what_is_believed_after_trials_were_judged_anew(log: Path) -> None:
     with open_session(scripted_strategy(9), log) as session:
         run(session, 4)

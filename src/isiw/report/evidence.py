@@ -12,7 +12,7 @@ from isiw.log.reader import SessionRecord
 from isiw.trials import Trial
 from isiw.window import Window
 
-__all__ = ["contradiction", "nothing_measured"]
+__all__ = ["contradiction", "no_comparison", "nothing_measured"]
 
 ENOUGH_ON_EACH_SIDE = 4
 NO_LARGER = 0.5
@@ -56,13 +56,39 @@ def contradiction(window: Window | None, trials: Sequence[Trial]) -> str | None:
     """
     if window is None:
         return None
-    placed = [(t.isi_ms, t.mep_mv) for t in trials if t.isi_ms is not None and t.mep_mv is not None]
-    is_inside = window.mask([isi_ms for isi_ms, _ in placed])
-    inside = [mep_mv for (_, mep_mv), within in zip(placed, is_inside, strict=True) if within]
-    outside = [mep_mv for (_, mep_mv), within in zip(placed, is_inside, strict=True) if not within]
+    inside, outside = _inside_and_outside(window, trials)
     if min(len(inside), len(outside)) < ENOUGH_ON_EACH_SIDE:
         return None
     if float(mannwhitneyu(inside, outside, alternative="greater").pvalue) < NO_LARGER:
         return None
     medians = " and ".join(f"{1e3 * statistics.median(meps_mv):.0f}" for meps_mv in (inside, outside))
     return f"The data do not bear this out: the MEPs inside are no larger than those outside (medians {medians} µV)."
+
+
+def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:
+    """That hardly a trial shows how large MEPs are outside a reported window; None where some do, or too few are inside.
+
+    Args:
+        window: the reported window; None where none is.
+        trials: the trials that count.
+    """
+    if window is None:
+        return None
+    inside, outside = _inside_and_outside(window, trials)
+    alone = sum(trial.isi_ms is None for trial in trials)
+    if len(inside) < ENOUGH_ON_EACH_SIDE or len(outside) + alone >= ENOUGH_ON_EACH_SIDE:
+        return None
+    pairs = len(outside) + len(inside)
+    return (
+        f"Hardly anything shows how large MEPs are without enhancement: {len(outside)} of {pairs} pairs are outside, and "
+        f"{alone} pulses were TMS alone. Give TMS alone, or a wider range of ISIs."
+    )
+
+
+def _inside_and_outside(window: Window, trials: Sequence[Trial]) -> tuple[list[float], list[float]]:
+    """The MEPs of pairs inside and outside a window [mV]."""
+    placed = [(t.isi_ms, t.mep_mv) for t in trials if t.isi_ms is not None and t.mep_mv is not None]
+    is_inside = window.mask([isi_ms for isi_ms, _ in placed])
+    inside = [mep_mv for (_, mep_mv), within in zip(placed, is_inside, strict=True) if within]
+    outside = [mep_mv for (_, mep_mv), within in zip(placed, is_inside, strict=True) if not within]
+    return inside, outside
