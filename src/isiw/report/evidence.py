@@ -66,7 +66,7 @@ def contradiction(window: Window | None, trials: Sequence[Trial]) -> str | None:
 
 
 def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:
-    """That hardly a trial shows how large MEPs are outside a reported window; None where some do, or too few are inside.
+    """That hardly a trial shows the MEP outside a reported window; None where some do, or few are inside.
 
     Args:
         window: the reported window; None where none is.
@@ -80,8 +80,8 @@ def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:
         return None
     pairs = len(outside) + len(inside)
     return (
-        f"Hardly anything shows how large MEPs are without enhancement: {len(outside)} of {pairs} pairs are outside, and "
-        f"{alone} pulses were TMS alone. Give TMS alone, or a wider range of ISIs."
+        f"Hardly anything shows how large MEPs are without enhancement: {len(outside)} of {pairs} pairs are outside, "
+        f"and {alone} pulses were TMS alone. Give TMS alone, or a wider range of ISIs."
     )
 
 
