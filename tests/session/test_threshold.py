@@ -147,6 +147,22 @@ def test_a_value_that_cannot_be_is_not_logged_and_can_be_told_right(log: Path, m
     assert len(read_threshold(log).history) == 3
 
 
+def test_a_first_amplitude_in_volts_is_not_logged_and_can_be_told_right(log: Path) -> None:
+    with opened(log) as recorder:
+        recorder.ask()
+        with pytest.raises(InvalidValueError, match=r"Is it in V\? Multiply by 1000"):
+            recorder.tell(0.0012)
+        recorder.tell(1.2)
+    assert [outcome.mep_mv for outcome in recorder.outcomes] == [1.2]
+
+
+def test_after_it_is_closed_nothing_is_asked(log: Path) -> None:
+    with opened(log) as recorder:
+        answer(recorder, 1)
+    with pytest.raises(LogError, match="the log is closed"):
+        recorder.ask()
+
+
 def test_nothing_is_told_that_was_not_asked(log: Path) -> None:
     with opened(log) as recorder:
         with pytest.raises(InvalidValueError, match="Call ask"):

@@ -4,7 +4,7 @@ import pytest
 
 from isiw.design import IMPACT_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.signals.plausibility import DoubtKind, doubt_of, implausible_amplitude, require_plausible
+from isiw.signals.plausibility import DoubtKind, doubt_of, implausible_amplitude, implausible_scale, require_plausible
 
 
 @pytest.mark.parametrize("mep_mv", [0.0, 0.0005, 0.008, 0.3, 12.0, 25.0])
@@ -65,3 +65,13 @@ def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv: list[float], kind
 )
 def test_usual_amplitudes_are_not_doubted(meps_mv: list[float]) -> None:
     assert doubt_of(meps_mv) is None
+
+
+@pytest.mark.parametrize("meps_mv", [[0.0011], [0.0, 0.0015, 0.0012]])
+def test_pulses_whose_amplitudes_are_all_below_the_emg_at_rest_may_be_in_volts(meps_mv: list[float]) -> None:
+    assert "Is it in V?" in (implausible_scale(meps_mv) or "")
+
+
+@pytest.mark.parametrize("meps_mv", [[], [0.0], [0.002], [0.008, 0.0005], [0.0005, 0.008]])
+def test_amplitudes_with_one_as_large_as_the_emg_at_rest_are_believed(meps_mv: list[float]) -> None:
+    assert implausible_scale(meps_mv) is None

@@ -165,8 +165,16 @@ class LogWriter:
             self.on_append(record, channel_name)
 
     def sync(self) -> None:
-        """Return when everything appended is on the disk."""
+        """Return when everything appended is on the disk.
+
+        Raises:
+            LogError: the log is closed.
+        """
         with self._lock:
+            if self._file.closed:
+                raise LogError(
+                    "the log is closed, so nothing can be added to it", got=str(self.path), remedy="Resume it to go on."
+                )
             self._writer.flush()
             self._file.sync()
 

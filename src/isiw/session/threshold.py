@@ -227,8 +227,8 @@ class ThresholdRecorder:
             response: whether a response was seen, instead of an amplitude.
 
         Raises:
-            InvalidValueError: nothing was asked, or a value that cannot be; nothing is logged, and the right value can
-                be told.
+            InvalidValueError: nothing was asked, or a value that cannot be, or a slip of unit; nothing is logged, and
+                the right value can be told.
             LogError: the log cannot be written.
         """
         pulse = self.search.checked(self._require_asked(), mep_mv, response=response)

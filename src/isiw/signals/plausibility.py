@@ -15,12 +15,24 @@ from enum import StrEnum
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 
-__all__ = ["Doubt", "DoubtKind", "doubt_of", "implausible_amplitude", "off_by", "require_plausible"]
+__all__ = [
+    "Doubt",
+    "DoubtKind",
+    "doubt_of",
+    "implausible_amplitude",
+    "implausible_scale",
+    "off_by",
+    "require_plausible",
+]
 
 SMALLEST_MV = 2e-4
 """No EMG amplifier is so quiet: the noise of the electrodes alone has more."""
 
 LARGEST_MV = 30.0
+
+AT_REST_MV = 2e-3
+"""EMG at rest has hardly ever less, since the noise of electrodes and amplifier alone has a few µV peak-to-peak; an MEP
+of up to 2 mV that is told in V has less."""
 
 SMALL_MV, LARGE_MV = 8e-4, 2.0
 """Of several in a row, the largest is never smaller, and their geometric mean is hardly ever larger from the start."""
@@ -69,6 +81,23 @@ def implausible_amplitude(mep_mv: float) -> str | None:
     if mep_mv > LARGEST_MV:
         return f"{mep_mv:.4g} mV is more than any muscle gives. Is it in µV? Divide by 1000."
     return None
+
+
+def implausible_scale(meps_mv: Sequence[float]) -> str | None:
+    """Why amplitudes of single pulses to a muscle at rest cannot be in mV, and the likely slip; None where they can.
+
+    Once one of them is as large as EMG at rest the scale is believed, and smaller ones may be a quiet sweep.
+
+    Args:
+        meps_mv: all amplitudes so far [mV], in order; 0, below the detection limit, says nothing about the scale.
+    """
+    largest_mv = max(meps_mv, default=0.0)
+    if not 0 < largest_mv < AT_REST_MV:
+        return None
+    return (
+        f"{largest_mv:.2g} mV is less than EMG at rest has. Is it in V? Multiply by 1000; "
+        "an amplitude below the detection limit is 0."
+    )
 
 
 def off_by(isi_ms: float, asked_ms: float, space: DesignSpace) -> bool:

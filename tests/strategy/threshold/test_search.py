@@ -1,8 +1,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
+import numpy as np
 import pytest
 
 from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
@@ -44,6 +45,78 @@ def test_what_is_asked_stays_until_something_is_told() -> None:
     assert search.ask() == asked
     search.tell(asked, 0.01)
     assert search.ask() > asked
+
+
+def ended(search: ThresholdSearch, amplitude: Callable[[], float]) -> ThresholdSearch:
+    """The search, ended with amplitudes that do not depend on the intensity."""
+    while not search.decision().stop:
+        search.tell(search.ask(), amplitude())
+        assert len(search.pulses) <= 40
+    return search
+
+
+def test_hum_at_one_intensity_gives_no_number_and_ends_with_the_budget() -> None:
+    rng = np.random.default_rng(2)
+    search = ended(make_threshold_search("bayes", IntensityRange(20, 80)), lambda: 0.05 * math.exp(rng.normal(0, 0.1)))
+    assert {pulse.intensity_pct_mso for pulse in search.pulses} == {55}
+    assert {pulse.responded for pulse in search.pulses} == {True, False}
+    assert search.estimate().threshold_pct_mso is None
+    assert search.estimate().reason == search.decision().reason
+    assert "At 55 % MSO some pulses were answered and some not" in search.decision().reason
+    assert "budget of 40 pulses is used up" in search.decision().reason
+    assert "hum or an artefact" in search.decision().reason
+
+
+@pytest.mark.parametrize("mep_mv", [0.048, 0.05, 0.06])
+def test_answers_of_one_kind_end_with_the_budget(mep_mv: float) -> None:
+    search = ended(make_threshold_search("bayes", IntensityRange(20, 80)), lambda: mep_mv)
+    assert len(search.pulses) == 40
+    assert search.estimate().threshold_pct_mso is None
+    assert "budget of 40 pulses is used up" in search.decision().reason
+
+
+def test_the_budget_of_maximum_likelihood_holds_where_nothing_was_answered_yet() -> None:
+    search = ended(make_threshold_search("maximum-likelihood", SPACE, pulses=3), lambda: 0.01)
+    assert len(search.pulses) == 3
+    assert "No pulse was answered, up to " in search.decision().reason
+
+
+@pytest.mark.parametrize("method", ["bayes", "maximum-likelihood"])
+@pytest.mark.parametrize(
+    ("missed", "answered", "number"), [(50, 50, False), (50, 45, False), (45, 50, True), (50, 51, True)]
+)
+def test_a_number_needs_an_answer_above_an_intensity_without_one(
+    *, method: str, missed: float, answered: float, number: bool
+) -> None:
+    search = make_threshold_search(method, SPACE)
+    for _ in range(6):
+        search.tell(missed, 0.01)
+        search.tell(answered, 0.2)
+    assert (search.estimate().threshold_pct_mso is not None) == number
+
+
+def test_a_mixture_at_the_end_of_the_range_still_ends_the_search() -> None:
+    low = make_threshold_search("five-of-ten", IntensityRange(40, 80))
+    for number in range(9):
+        low.tell(40, response=number % 2 == 0)
+    assert low.decision().stop
+    assert "begins too high" in low.decision().reason
+    high = make_threshold_search("bayes", IntensityRange(20, 40))
+    for number in range(10):
+        high.tell(40, response=number == 5)
+    assert high.decision().stop
+    assert "above the highest intensity" in high.decision().reason
+
+
+def test_a_first_amplitude_in_volts_is_refused_and_a_quiet_sweep_later_is_not() -> None:
+    search = make_threshold_search("bayes", SPACE)
+    search.tell(50, 0.0)
+    with pytest.raises(InvalidValueError, match=r"Is it in V\? Multiply by 1000"):
+        search.tell(50, 0.0013)
+    assert len(search.pulses) == 1
+    search.tell(50, 0.008)
+    search.tell(50, 0.0013)
+    assert len(search.pulses) == 3
 
 
 @pytest.mark.parametrize(

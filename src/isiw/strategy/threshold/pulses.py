@@ -17,7 +17,7 @@ from isiw.strategy.stopping import StopDecision
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
-__all__ = ["IntensityRange", "Pulse", "ThresholdEstimate", "ThresholdMethod", "one_sided"]
+__all__ = ["IntensityRange", "Pulse", "ThresholdEstimate", "ThresholdMethod", "not_growing", "one_sided"]
 
 ENOUGH_AT_THE_END: Final = 6
 NEAR_THE_END_PCT_MSO: Final = 3.0
@@ -220,3 +220,18 @@ def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | 
         seen = f"No pulse was answered, up to {max(pulse.intensity_pct_mso for pulse in pulses):g} % MSO."
         advice = f"The range ends too low, at {end:g} %. Or is the coil off the hot spot, or the amplifier off?"
     return StopDecision(at_end >= ENOUGH_AT_THE_END, f"{seen} {advice}" if at_end >= ENOUGH_AT_THE_END else seen)
+
+
+def not_growing(pulses: Sequence[Pulse]) -> str | None:
+    """That no pulse was answered at a higher intensity than one that was not, in words; None where one was.
+
+    Args:
+        pulses: what was told so far, of both kinds.
+    """
+    answered = max(pulse.intensity_pct_mso for pulse in pulses if pulse.responded)
+    missed = min(pulse.intensity_pct_mso for pulse in pulses if not pulse.responded)
+    if answered > missed:
+        return None
+    if answered == missed:
+        return f"At {missed:g} % MSO some pulses were answered and some not, and none was answered above it."
+    return f"Pulses were answered up to {answered:g} % MSO, but not from {missed:g} % MSO on."

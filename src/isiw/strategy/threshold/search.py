@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from typing import Any, Final
 
 from isiw.checks import choice, number
 from isiw.errors import InvalidValueError
-from isiw.signals.plausibility import implausible_amplitude
+from isiw.signals.plausibility import implausible_amplitude, implausible_scale
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.bayes import BayesThreshold
 from isiw.strategy.threshold.hunting import MaximumLikelihood
-from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate, ThresholdMethod, one_sided
+from isiw.strategy.threshold.pulses import (
+    IntensityRange,
+    Pulse,
+    ThresholdEstimate,
+    ThresholdMethod,
+    not_growing,
+    one_sided,
+)
 from isiw.strategy.threshold.relative import FiveOfTen
 from isiw.text.toml_files import checked
 
@@ -23,6 +31,9 @@ METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen]
     "maximum-likelihood": MaximumLikelihood,
     "five-of-ten": FiveOfTen,
 }
+
+_LOOK: Final = "Do the amplitudes grow with the intensity? If they do not, look for hum or an artefact in the EMG."
+"""What to do where the budget is used up and the pulses give no number."""
 
 
 def list_threshold_methods() -> dict[str, str]:
@@ -55,7 +66,11 @@ def require_plausible(mep_mv: float) -> None:
     Raises:
         InvalidValueError: it cannot; the message names the likely slip of unit.
     """
-    if (wrong := implausible_amplitude(number("mep_mv", mep_mv, least=0))) is not None:
+    _refuse(mep_mv, implausible_amplitude(number("mep_mv", mep_mv, least=0)))
+
+
+def _refuse(mep_mv: float, wrong: str | None) -> None:
+    if wrong is not None:
         what, _, remedy = wrong.partition(". ")
         raise InvalidValueError(f"the amplitude cannot be an MEP's: {what}", got=mep_mv, remedy=remedy)
 
@@ -98,7 +113,8 @@ class ThresholdSearch:
             response: whether a response was seen, instead of an amplitude.
 
         Raises:
-            InvalidValueError: NaN, a negative amplitude, one that no muscle gives, or not exactly one outcome.
+            InvalidValueError: NaN, a negative amplitude, one that no muscle gives, one below the EMG at rest before
+                any other was told, or not exactly one outcome.
             LimitExceededError: an intensity beyond the range or off its grid.
         """
         self.pulses = (*self.pulses, self.checked(intensity_pct_mso, mep_mv, response=response))
@@ -118,15 +134,39 @@ class ThresholdSearch:
         self.space.require(intensity_pct_mso)
         if mep_mv is not None:
             require_plausible(mep_mv)
+            told_mv = [pulse.mep_mv for pulse in self.pulses if pulse.mep_mv is not None]
+            _refuse(mep_mv, implausible_scale([*told_mv, mep_mv]))
         return Pulse(intensity_pct_mso, mep_mv, response)
 
     def estimate(self) -> ThresholdEstimate:
-        """What is believed now; no number before there were both responses and pulses without one."""
-        refused = one_sided(self.pulses, self.space)
+        """What is believed now; no number before a pulse was answered at a higher intensity than one that was not."""
+        refused = self._refused()
         if refused is not None:
             return ThresholdEstimate(None, reason=refused.reason)
         return self.method.estimate(self.pulses, self.space)
 
     def decision(self) -> StopDecision:
-        """Whether to stop now, and why; not before there were both kinds of pulses, unless the range is wrong."""
-        return one_sided(self.pulses, self.space) or self.method.decision(self.pulses, self.space)
+        """Whether to stop now, and why; without a number only where the range is wrong or the budget used up."""
+        return self._refused() or self.method.decision(self.pulses, self.space)
+
+    def _refused(self) -> StopDecision | None:
+        """Why the pulses give no number, whatever the method says; None where they may."""
+        refused = one_sided(self.pulses, self.space) or self._not_growing()
+        if refused is None or refused.stop or len(self.pulses) < (budget := _budget(self.method)):
+            return refused
+        return StopDecision(stop=True, reason=f"{refused.reason} The budget of {budget:g} pulses is used up. {_LOOK}")
+
+    def _not_growing(self) -> StopDecision | None:
+        seen = not_growing(self.pulses)
+        if seen is None or self.method.estimate(self.pulses, self.space).threshold_pct_mso is None:
+            return None
+        return StopDecision(stop=False, reason=seen)
+
+
+def _budget(method: ThresholdMethod) -> float:
+    """After how many pulses a method stops whatever it knows; infinite where it does not say."""
+    match method:
+        case BayesThreshold(max_pulses=most) | MaximumLikelihood(pulses=most):
+            return most
+        case _:
+            return math.inf
