@@ -111,6 +111,12 @@ def test_a_session_counts_once_also_as_a_copy(first: Any, folder: Path) -> None:
             together(first, read_session(copy))
 
 
+def test_a_path_is_no_session(first: Any) -> None:
+    for ask in (priors.after, priors.moved, lambda *paths: priors.differences(paths)):
+        with pytest.raises(InvalidValueError, match=r"isiw\.read_session"):
+            ask(first.path, first.path)
+
+
 def test_days_come_in_the_order_in_which_they_were(first: Any, folder: Path) -> None:
     later = read_session(write_log(folder / "later.mcap", person(), trials=5, created="2026-11-22T10:00:00+00:00"))
     with pytest.raises(InvalidValueError, match="the first one first"):

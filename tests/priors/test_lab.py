@@ -141,6 +141,12 @@ def test_a_lab_prior_from_the_valve_is_refused_in_a_space_from_the_impact(path: 
         make_strategy(space=IMPACT_SPACE, prior=priors.load(path), particles=100)
 
 
+def test_the_path_of_a_lab_prior_is_no_prior(path: Path) -> None:
+    for given in (path, str(path)):
+        with pytest.raises(ConfigError, match=r"isiw\.priors\.load"):
+            make_strategy(prior=given)
+
+
 def test_a_strategy_with_another_model_does_not_take_a_lab_prior(path: Path) -> None:
     with pytest.raises(StrategyError, match="another kind of model"):
         make_strategy("parametric-mi", prior=priors.load(path))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
@@ -46,6 +47,15 @@ def test_samples_that_are_no_numbers_are_told_from_a_flat_line() -> None:
     answer.channels["emg"].values[7] = math.inf
     fault = likely_fault(answer, judge(answer, stimulus, SPACE))
     assert "no numbers" in str(fault)
+
+
+def test_a_sweep_without_the_time_of_the_hit_is_told_from_one_without_emg() -> None:
+    stimulus = Stimulus(0, 100.0)
+    answer = replace(instance(Sweep, rig(accelerometer=False).simulation.answer(stimulus)), t_hit_ms=None)
+    space = replace(SPACE, reference="impact")
+    fault = likely_fault(answer, judge(answer, stimulus, space))
+    assert "no time of the event that ISIs count from" in str(fault)
+    assert "t_hit_ms" in str(fault)
 
 
 def test_every_reason_of_a_mistrial_has_a_remedy() -> None:

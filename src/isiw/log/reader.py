@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Final, TypeVar
 import pandas as pd
 from pydantic import ValidationError
 
-from isiw.errors import DamagedLogError, LogError
+from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.log.frames import trial_frame
 from isiw.log.onsets import Onset, Onsets
 from isiw.log.production import Production, ProductionHeader
@@ -37,7 +37,7 @@ from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial, TrialTable
 from isiw.window import ENOUGH_PAIRS, TOO_FEW
 
-__all__ = ["Records", "SessionRecord", "of_production", "read_any", "read_salvaged", "read_session"]
+__all__ = ["Records", "SessionRecord", "of_production", "read_any", "read_salvaged", "read_session", "require_records"]
 
 HeaderKind = TypeVar("HeaderKind", Header, ProductionHeader)
 
@@ -352,3 +352,19 @@ def _checked_version(header: HeaderKind, newest: int, path: Path) -> HeaderKind:
             remedy="Upgrade isiw.",
         )
     return header
+
+
+def require_records(records: Iterable[object]) -> None:
+    """Check that sessions were read, and are not their paths.
+
+    Args:
+        records: what should be records of sessions.
+
+    Raises:
+        InvalidValueError: something else.
+    """
+    for record in records:
+        if not isinstance(record, SessionRecord):
+            raise InvalidValueError(
+                "this is no record of a session", got=record, remedy="Read the log first: isiw.read_session(path)."
+            )

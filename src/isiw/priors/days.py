@@ -18,7 +18,7 @@ from sklearn.mixture import GaussianMixture
 
 from isiw.checks import check_numbers, check_probabilities
 from isiw.errors import InvalidValueError
-from isiw.log.reader import SessionRecord
+from isiw.log.reader import SessionRecord, require_records
 from isiw.models.particles import ParticlePosterior
 from isiw.models.particles.latents import LATENTS, Latents, used_by
 from isiw.models.particles.places import Place
@@ -123,6 +123,7 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
 
 def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
     """Raise where sessions are of different people, one counts twice, or a later one comes first."""
+    require_records(records)
     subjects = sorted({record.header.subject for record in records} - {""})
     if len(subjects) > 1:
         raise InvalidValueError("the sessions are of different people", got=subjects, expected="one subject's")

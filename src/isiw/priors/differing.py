@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.log.reader import SessionRecord
+from isiw.log.reader import SessionRecord, require_records
 from isiw.models.particles.prior import Prior
 from isiw.priors.days import moved
 from isiw.priors.recall import recalled
@@ -56,8 +56,9 @@ def differences(records: Sequence[SessionRecord]) -> list[Difference]:
         records: the sessions, at least two.
 
     Raises:
-        InvalidValueError: fewer than two sessions, or some whose ISIs count from different events.
+        InvalidValueError: no records of sessions, fewer than two, or some whose ISIs count from different events.
     """
+    require_records(records)
     references = {record.header.space.reference for record in records}
     if len(records) < 2:
         raise InvalidValueError("a comparison needs sessions", got=len(records), expected="at least two")

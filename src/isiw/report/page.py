@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from isiw.log.outputs import write_output
-from isiw.log.reader import SessionRecord
+from isiw.log.reader import SessionRecord, require_records
 from isiw.plots.course import course_figure
 from isiw.plots.inline import inline_svg
 from isiw.plots.session import session_figure
@@ -41,7 +41,7 @@ def save_report(
 
     Raises:
         ConfigError: plotly or jinja2 is not installed.
-        InvalidValueError: there is a file that is not to be replaced.
+        InvalidValueError: no record of a session, or there is a file that is not to be replaced.
     """
     return write_output(path, report_page(record, truth=truth).encode(), overwrite=overwrite)
 
@@ -55,7 +55,9 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
 
     Raises:
         ConfigError: plotly or jinja2 is not installed.
+        InvalidValueError: no record of a session.
     """
+    require_records((record,))
     scripts = [library("plotly.offline").get_plotlyjs(), asset("draw.js"), asset("page.js")]
     return rendered("page.html", scripts, pictures=_pictures(record, truth), **_contents(record))
 

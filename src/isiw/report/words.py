@@ -6,7 +6,7 @@ import math
 from collections import Counter
 
 from isiw.design import DesignSpace
-from isiw.log.reader import SessionRecord
+from isiw.log.reader import SessionRecord, require_records
 from isiw.log.schema import Estimate
 from isiw.metrics import f1
 from isiw.report.depression import depression_sentence
@@ -47,7 +47,11 @@ def final_statement(record: SessionRecord) -> str:
 
     Args:
         record: the session.
+
+    Raises:
+        InvalidValueError: no record of a session.
     """
+    require_records((record,))
     if not record.estimates:
         return "No trial has been completed."
     last = record.estimates[-1]

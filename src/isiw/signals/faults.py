@@ -111,9 +111,21 @@ def _fault_of_sweep(sweep: Sweep, trial: Trial) -> Fault | None:
         return Fault(
             "EMG and acceleration do not last equally long", "Check the sampling rates that the channels are given."
         )
-    if trial.reason is not None and (found := _fault_of_hammer(sweep, emg, acceleration)):
+    found = _fault_of_hammer(sweep, emg, acceleration) or _fault_of_start(sweep, trial)
+    if trial.reason is not None and found is not None:
         return found
     return _fault_of_rate(emg, trial)
+
+
+def _fault_of_start(sweep: Sweep, trial: Trial) -> Fault | None:
+    """A pulse whose ISI cannot be counted, with nothing that the hit could be found in."""
+    is_missing = trial.reason is MistrialReason.MISSING_CHANNEL and sweep.t_tms_ms is not None
+    if not is_missing or "acceleration" in sweep.channels or trial.isi_ms is not None or trial.commanded_isi_ms is None:
+        return None
+    return Fault(
+        "the sweep has no time of the event that ISIs count from",
+        "Where it is the impact, give t_hit_ms or the acceleration; where it is the valve command, t_valve_ms.",
+    )
 
 
 def _fault_of_hammer(sweep: Sweep, emg: Channel, acceleration: Channel | None) -> Fault | None:

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import reduce
 from numbers import Integral
+from os import PathLike
 from typing import Any, Final, Protocol, TypeVar, get_args, get_type_hints
 
 import numpy as np
@@ -21,7 +22,7 @@ from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import acquisition_named
 from isiw.checks import MOST_OF_A_KIND, check_numbers, check_probabilities, check_wholes, whole
 from isiw.design import DesignSpace
-from isiw.errors import StrategyError
+from isiw.errors import ConfigError, StrategyError
 from isiw.models.protocol import ResponseModel
 from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoWindow, SmallGain, StoppingRule
 from isiw.text.toml_files import checked
@@ -210,7 +211,7 @@ def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
 
     Raises:
         StrategyError: a key that the family does not have, or an object of another family.
-        ConfigError: a nested key or value that cannot be used.
+        ConfigError: a nested key or value that cannot be used, or a path where values are wanted.
         InvalidValueError: an invalid value.
     """
     known = settings_keys(kind)
@@ -254,6 +255,13 @@ def _converted(setting: Setting, value: Any, source: str) -> Any:
     if kind is not None and is_dataclass(value) and not isinstance(value, kind):
         raise StrategyError(
             f"{source} is of another kind of model", got=type(value).__module__, expected=kind.__module__
+        )
+    if kind is not None and isinstance(value, str | PathLike):
+        raise ConfigError(
+            f"{source} cannot be a text or a path",
+            got=str(value),
+            expected=f"a {kind.__name__}, or a table of its fields",
+            remedy="A lab's prior is read with isiw.priors.load(path).",
         )
     if kind is None or not isinstance(value, Mapping):
         return value.item() if isinstance(value, np.generic) else value
