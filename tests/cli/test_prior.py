@@ -55,6 +55,29 @@ def test_a_lab_prior_is_shown_beside_the_built_in_one_and_drawn(isiw: Any, lab: 
     assert (folder / "lab.png").stat().st_size > 5000
 
 
+@pytest.mark.parametrize("flags", [(), ("--overwrite",)])
+def test_learning_replaces_no_log_and_asks_before_the_work_begins(isiw: Any, logs: Any, flags: Any) -> None:
+    before = logs[0].read_bytes()
+    result = isiw("prior", "learn", *logs, "-o", logs[0], *flags)
+    assert result.exit_code == 1
+    assert "overwritten" in result.output
+    assert "sessions" not in result.output  # the bar of a work that has begun
+    assert logs[0].read_bytes() == before
+
+
+def test_a_prior_and_its_picture_are_replaced_only_where_that_is_asked_for(isiw: Any, lab: Any, folder: Path) -> None:
+    picture = folder / "kept.png"
+    picture.write_bytes(b"kept")
+    for command in (("learn", folder / "1.mcap", "-o", lab), ("show", lab, "-o", picture)):
+        before = lab.read_bytes()
+        refused = isiw("prior", *command)
+        assert refused.exit_code == 1
+        assert "--overwrite" in refused.output
+        assert (lab.read_bytes(), picture.read_bytes()) == (before, b"kept")
+    assert isiw("prior", "show", lab, "-o", picture, "--overwrite").exit_code == 0
+    assert picture.stat().st_size > 5000
+
+
 def test_a_session_is_run_with_a_lab_prior_and_its_log_holds_the_numbers(isiw: Any, lab: Any, folder: Path) -> None:
     result = isiw("run", "short.toml", "--prior", lab, "--log", "with.mcap")
     assert result.exit_code == 0, result.output

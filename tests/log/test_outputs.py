@@ -30,6 +30,11 @@ def test_a_log_is_never_overwritten(finished_log: Path, overwrite: Any) -> None:
     assert finished_log.read_bytes() == before
 
 
+def test_a_folder_is_no_place_for_a_file(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match=r"a folder of this name.*Name a file"):
+        write_output(tmp_path, b"a picture", overwrite=True)
+
+
 def no_room(_: Any) -> Never:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 

@@ -91,6 +91,8 @@ def test_simulated_sessions_are_not_mixed_with_people(logs: Any, tmp_path: Path)
 def test_nothing_is_learnt_from_nobody(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="no session"):
         priors.learn([])
+    with pytest.raises(LogError, match=r"a list of paths.*\[\"a\.mcap\"\]"):
+        priors.learn("a.mcap")
     with pytest.raises(LogError, match="no accepted trial"):
         priors.learn([write_log(tmp_path / "empty.mcap", trials=0)])
 

@@ -308,6 +308,19 @@ def test_an_excluded_trial_is_unlearnt_and_stays_so(log: Path) -> None:
         assert resumed.ask() == after
 
 
+@pytest.mark.parametrize("nothing", [None, 3])
+def test_what_is_said_about_a_session_is_a_text(log: Path, nothing: Any) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        run(session, 1)
+        with pytest.raises(InvalidValueError, match="a note must be a text"):
+            session.note(nothing)
+        with pytest.raises(InvalidValueError, match="the reason of an exclusion must be a text"):
+            session.exclude(0, nothing)
+    record = read_session(log)
+    assert not record.events
+    assert record.table[0].counts
+
+
 def test_a_resumed_session_asks_what_an_uninterrupted_one_would_have(log: Path, tmp_path: Path) -> None:
     with open_session(scripted_strategy(9), tmp_path / "whole.mcap") as session:
         whole = run(session, 6)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -14,12 +14,23 @@ from rich.text import Text
 import isiw
 from isiw.text import plain
 
-__all__ = ["DAMAGED", "INTERRUPTED", "NO_DEFAULT", "errors_reported", "refuse_ignored", "show", "show_entry"]
+__all__ = [
+    "DAMAGED",
+    "INTERRUPTED",
+    "NO_DEFAULT",
+    "Overwrite",
+    "errors_reported",
+    "refuse_ignored",
+    "show",
+    "show_entry",
+]
 
 DAMAGED = 3
 INTERRUPTED = 130  # what shells report for Ctrl-C
 
 NO_DEFAULT: dict[str, Any] = {"show_default": False}
+
+Overwrite = Annotated[bool, typer.Option(help="Replace a file that is there; a log never is.")]
 
 
 def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:

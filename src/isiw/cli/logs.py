@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 import isiw
-from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show
+from isiw.cli.console import DAMAGED, NO_DEFAULT, Overwrite, errors_reported, show
 
 __all__ = ["app"]
 
@@ -46,7 +46,7 @@ def compare(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Page (.html) or picture to write.", **NO_DEFAULT)
     ] = None,
-    overwrite: Annotated[bool, typer.Option(help="Replace a file that is there; a log never is.")] = False,  # noqa: FBT002 - a flag
+    overwrite: Overwrite = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Compare the windows of sessions: of one person on several days, or of several people."""
     with errors_reported():

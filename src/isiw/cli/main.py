@@ -13,7 +13,7 @@ import typer
 
 import isiw
 from isiw.cli import interval, logs, prior, serve, study, threshold
-from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, show, show_entry
+from isiw.cli.console import DAMAGED, NO_DEFAULT, Overwrite, errors_reported, show, show_entry
 
 if TYPE_CHECKING:
     from isiw.repeatability import TimingStudy
@@ -41,7 +41,6 @@ _INTERRUPTED = "Interrupted: the device is stopped and the log is closed."
 
 Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
 Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **NO_DEFAULT)]
-Overwrite = Annotated[bool, typer.Option(help="Replace a file that is there; a log never is.")]
 Live = Annotated[
     bool, typer.Option("--live", help="Show the session in the browser while it runs, and operate it there.")
 ]

@@ -10,7 +10,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, errors_reported, show
+from isiw.cli.console import NO_DEFAULT, Overwrite, errors_reported, show
+from isiw.log.outputs import check_output
 
 if TYPE_CHECKING:
     from isiw.priors import LabPrior
@@ -28,13 +29,15 @@ def learn(
     output: Annotated[Path, typer.Option("--output", "-o", help="Where to: .toml")],
     again: Annotated[bool, typer.Option(help="Take further sessions of a person as further people.")] = False,  # noqa: FBT002 - a flag
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 0,
+    overwrite: Overwrite = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Learn what a lab's people are like from sessions already run."""
     with errors_reported("Interrupted: nothing was written."):
+        check_output(output, overwrite=overwrite)
         with Progress(console=Console(stderr=True)) as progress:
             task = progress.add_task("sessions", total=len(logs))
             lab = isiw.priors.learn(logs, again=again, seed=seed, on_done=lambda _record: progress.advance(task))
-        isiw.priors.write_lab_prior(lab, output)
+        isiw.priors.write_lab_prior(lab, output, overwrite=overwrite)
         _print(lab)
         show(f"prior: {output}\nRun a session with it: isiw run --prior {output}")
 
@@ -43,13 +46,14 @@ def learn(
 def show_prior(
     source: LabFile,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
+    overwrite: Overwrite = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Say what a lab's people are like, beside what is believed of people in general."""
     with errors_reported():
         lab = isiw.priors.read_lab_prior(source)
         _print(lab)
         if output is not None:
-            picture = isiw.plots.save_prior_plot(isiw.priors.densities(lab), output)
+            picture = isiw.plots.save_prior_plot(isiw.priors.densities(lab), output, overwrite=overwrite)
             show(f"picture: {picture}")
 
 

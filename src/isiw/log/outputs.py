@@ -8,7 +8,7 @@ from typing import Final
 from isiw.errors import InvalidValueError
 from isiw.log.durable import put
 
-__all__ = ["write_output"]
+__all__ = ["check_output", "write_output"]
 
 _LOG: Final = b"\x89MCAP"
 """What every log begins with."""
@@ -23,21 +23,43 @@ def write_output(path: str | Path, content: bytes, *, overwrite: bool = False) -
         overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: there is a file that is not to be replaced.
+        InvalidValueError: there is a file that is not to be replaced, or a folder.
     """
     target = Path(path)
+    check_output(target, overwrite=overwrite)
     target.parent.mkdir(parents=True, exist_ok=True)
-    if overwrite and _is_log(target):
-        raise InvalidValueError("a log is never overwritten", got=str(target), remedy="Choose another path.")
     try:
         put(target, content, replacing=overwrite)
     except FileExistsError as error:
-        raise InvalidValueError(
-            "there is a file already, and it is not overwritten unasked",
-            got=str(target),
-            remedy="Choose another path, or ask for it: --overwrite, or overwrite=True.",
-        ) from error
+        raise _taken(target) from error
     return target
+
+
+def check_output(path: str | Path, *, overwrite: bool = False) -> None:
+    """Check that `write_output` may write a file; for whoever has long work to do before.
+
+    Args:
+        path: where to.
+        overwrite: whether to replace a file that is there; a log never is.
+
+    Raises:
+        InvalidValueError: there is a file that is not to be replaced, or a folder.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise InvalidValueError("there is a folder of this name", got=str(target), remedy="Name a file.")
+    if overwrite and _is_log(target):
+        raise InvalidValueError("a log is never overwritten", got=str(target), remedy="Choose another path.")
+    if not overwrite and target.exists():
+        raise _taken(target)
+
+
+def _taken(target: Path) -> InvalidValueError:
+    return InvalidValueError(
+        "there is a file already, and it is not overwritten unasked",
+        got=str(target),
+        remedy="Choose another path, or ask for it: --overwrite, or overwrite=True.",
+    )
 
 
 def _is_log(path: Path) -> bool:

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable, Iterable
 from typing import Final
 
+from isiw.checks import text
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.log.schema import Event, EventKind
@@ -57,10 +58,10 @@ def exclusion(trials: TrialTable, number: int, reason: str = "") -> Event:
         reason: why, for whoever reads the log.
 
     Raises:
-        InvalidValueError: no trial that counts has this number.
+        InvalidValueError: no trial that counts has this number, or a reason that is no text.
     """
     _require("exclude", number, [trial.index for trial in trials if trial.counts], "that counts")
-    return Event(kind="exclusion", trial=number, text=reason)
+    return Event(kind="exclusion", trial=number, text=text("the reason of an exclusion", reason))
 
 
 def inclusion(trials: TrialTable, number: int) -> Event:

@@ -15,17 +15,18 @@ __all__ = ["prior_figure", "save_prior_plot"]
 _COLUMNS = 4
 
 
-def save_prior_plot(table: pd.DataFrame, path: str | Path) -> Path:
+def save_prior_plot(table: pd.DataFrame, path: str | Path, *, overwrite: bool = False) -> Path:
     """Draw a lab's prior into a file; its suffix chooses the format.
 
     Args:
         table: as `isiw.priors.densities` returns it.
         path: where to.
+        overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: a format that matplotlib does not know.
+        InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
     """
-    return save_figure(prior_figure(table), path)
+    return save_figure(prior_figure(table), path, overwrite=overwrite)
 
 
 def prior_figure(table: pd.DataFrame) -> Figure:

@@ -9,6 +9,7 @@ from typing import Any
 import tomli_w
 
 from isiw.errors import ConfigError
+from isiw.log.outputs import write_output
 from isiw.models.particles.prior import Prior
 from isiw.priors.lab import SCHEMA_VERSION, LabPrior
 from isiw.text.toml_files import checked, read_toml
@@ -16,17 +17,18 @@ from isiw.text.toml_files import checked, read_toml
 __all__ = ["load", "read_lab_prior", "write_lab_prior"]
 
 
-def write_lab_prior(lab: LabPrior, path: str | Path) -> Path:
+def write_lab_prior(lab: LabPrior, path: str | Path, *, overwrite: bool = False) -> Path:
     """Write a lab's prior as TOML, into a folder that is made where it is missing.
 
     Args:
         lab: the lab's prior.
         path: where to.
+        overwrite: whether to replace a file that is there; a log never is.
+
+    Raises:
+        InvalidValueError: there is a file that is not to be replaced.
     """
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(tomli_w.dumps(_plain(asdict(lab))), encoding="utf-8")
-    return target
+    return write_output(path, tomli_w.dumps(_plain(asdict(lab))).encode(), overwrite=overwrite)
 
 
 def read_lab_prior(path: str | Path) -> LabPrior:

@@ -133,9 +133,11 @@ def learn(
         on_done: called after each session.
 
     Raises:
-        LogError: no log, one that cannot be read or has no accepted trial, the same log or person twice, or sessions
-            that count ISIs from different events, or of which some are simulated and others are not.
+        LogError: no list, no log in it, one that cannot be read or has no accepted trial, the same log or person
+            twice, or sessions that count ISIs from different events, or of which some are simulated and others are not.
     """
+    if isinstance(logs, str | Path):
+        raise LogError("logs must be a list of paths", got=str(logs), remedy=f'Write ["{logs}"] for a single one.')
     records = [read_session(path) for path in logs]
     sessions = tuple(_learnt_session(record) for record in records)
     _require_different(records, sessions, again=again)

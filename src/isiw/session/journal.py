@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from isiw import checks
 from isiw.devices.protocol import Answer
 from isiw.errors import InvalidValueError, LimitExceededError, told
 from isiw.log.schema import Event, EventKind, Intent, Waveform
@@ -104,8 +105,12 @@ class Journal:
         self.log.append(Event(kind=kind, trial=self.last, text=text))
 
     def note(self, text: str) -> None:
-        """Put a remark on disk."""
-        self.event("note", text)
+        """Put a remark on disk.
+
+        Raises:
+            InvalidValueError: it is no text.
+        """
+        self.event("note", checks.text("a note", text))
         self.log.sync()
 
     def judge(self, verdict: Callable[[TrialTable], Event]) -> Event:

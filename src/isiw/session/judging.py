@@ -36,7 +36,7 @@ class Judging(ABC):
             text: anything.
 
         Raises:
-            InvalidValueError: the session is not open.
+            InvalidValueError: it is no text, or the session is not open.
         """
         self._journal.note(text)
 
@@ -48,7 +48,7 @@ class Judging(ABC):
             reason: why, for whoever reads the log.
 
         Raises:
-            InvalidValueError: no trial that counts has this number, or the session is not open.
+            InvalidValueError: no trial that counts has this number, the reason is no text, or the session is not open.
         """
         self._judge(lambda trials: exclusion(trials, trial, reason))
 
