@@ -67,6 +67,29 @@ def test_hum_at_one_intensity_gives_no_number_and_ends_with_the_budget() -> None
     assert "hum or an artefact" in search.decision().reason
 
 
+@pytest.mark.parametrize("method", ["bayes", "maximum-likelihood", "five-of-ten"])
+def test_hum_that_answers_at_several_intensities_gives_no_number(method: str) -> None:
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        search = make_threshold_search(method, IntensityRange(20, 80))
+        while not search.decision().stop:
+            search.tell(search.ask(), 0.05 * math.exp(rng.normal(0, 0.05)))
+        assert search.estimate().threshold_pct_mso is None
+
+
+def test_answered_pulses_must_be_larger_than_the_others() -> None:
+    search = make_threshold_search("five-of-ten", SPACE)
+    for _ in range(6):
+        search.tell(44, 0.04)
+        search.tell(45, 0.059)
+    assert search.estimate().threshold_pct_mso is None
+    assert "59 µV in the median, is hardly larger than the rest, 40 µV" in search.decision().reason
+    assert "hum or an artefact" in search.decision().reason
+    for _ in range(7):
+        search.tell(45, 0.07)
+    assert search.estimate().threshold_pct_mso == 45
+
+
 @pytest.mark.parametrize("mep_mv", [0.048, 0.05, 0.06])
 def test_answers_of_one_kind_end_with_the_budget(mep_mv: float) -> None:
     search = ended(make_threshold_search("bayes", IntensityRange(20, 80)), lambda: mep_mv)

@@ -17,11 +17,22 @@ from isiw.strategy.stopping import StopDecision
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
-__all__ = ["IntensityRange", "Pulse", "ThresholdEstimate", "ThresholdMethod", "not_growing", "one_sided"]
+__all__ = [
+    "IntensityRange",
+    "Pulse",
+    "ThresholdEstimate",
+    "ThresholdMethod",
+    "hardly_larger",
+    "not_growing",
+    "one_sided",
+]
 
 ENOUGH_AT_THE_END: Final = 6
 NEAR_THE_END_PCT_MSO: Final = 3.0
 """After so many pulses so near to the end of the range, none of which changed anything, the range is wrong."""
+
+LEAST_RATIO: Final = 1.5
+"""Answered pulses are larger than the others by more than this; 1.66 was the least in 1,200 simulated searches."""
 
 _GRID_TOLERANCE: Final = 1e-6
 
@@ -235,3 +246,20 @@ def not_growing(pulses: Sequence[Pulse]) -> str | None:
     if answered == missed:
         return f"At {missed:g} % MSO some pulses were answered and some not, and none was answered above it."
     return f"Pulses were answered up to {answered:g} % MSO, but not from {missed:g} % MSO on."
+
+
+def hardly_larger(pulses: Sequence[Pulse]) -> str | None:
+    """That the amplitudes of answered pulses are about those of the others, in words; None where they are larger.
+
+    Args:
+        pulses: what was told so far, of both kinds.
+    """
+    answered_mv = [pulse.mep_mv for pulse in pulses if pulse.responded and pulse.mep_mv is not None]
+    missed_mv = [pulse.mep_mv for pulse in pulses if not pulse.responded and pulse.mep_mv is not None]
+    if not (answered_mv and missed_mv):
+        return None
+    answered, missed = float(np.median(answered_mv)), float(np.median(missed_mv))
+    if answered > LEAST_RATIO * missed:
+        return None
+    medians = f"{1e3 * answered:.0f} µV in the median, is hardly larger than the rest, {1e3 * missed:.0f} µV"
+    return f"What counts as an MEP, {medians}."

@@ -18,6 +18,7 @@ from isiw.strategy.threshold.pulses import (
     Pulse,
     ThresholdEstimate,
     ThresholdMethod,
+    hardly_larger,
     not_growing,
     one_sided,
 )
@@ -139,7 +140,11 @@ class ThresholdSearch:
         return Pulse(intensity_pct_mso, mep_mv, response)
 
     def estimate(self) -> ThresholdEstimate:
-        """What is believed now; no number before a pulse was answered at a higher intensity than one that was not."""
+        """What is believed now.
+
+        There is no number before a pulse was answered at a higher intensity than one that was not, nor where answered
+        pulses are hardly larger than the others.
+        """
         refused = self._refused()
         if refused is not None:
             return ThresholdEstimate(None, reason=refused.reason)
@@ -151,16 +156,17 @@ class ThresholdSearch:
 
     def _refused(self) -> StopDecision | None:
         """Why the pulses give no number, whatever the method says; None where they may."""
-        refused = one_sided(self.pulses, self.space) or self._not_growing()
+        refused = one_sided(self.pulses, self.space) or self._like_hum()
         if refused is None or refused.stop or len(self.pulses) < (budget := _budget(self.method)):
             return refused
         return StopDecision(stop=True, reason=f"{refused.reason} The budget of {budget:g} pulses is used up. {_LOOK}")
 
-    def _not_growing(self) -> StopDecision | None:
-        seen = not_growing(self.pulses)
+    def _like_hum(self) -> StopDecision | None:
+        seen = not_growing(self.pulses) or hardly_larger(self.pulses)
         if seen is None or self.method.estimate(self.pulses, self.space).threshold_pct_mso is None:
             return None
-        return StopDecision(stop=False, reason=seen)
+        over = math.isinf(_budget(self.method)) and self.method.decision(self.pulses, self.space).stop
+        return StopDecision(stop=over, reason=f"{seen} {_LOOK}" if over else seen)
 
 
 def _budget(method: ThresholdMethod) -> float:
