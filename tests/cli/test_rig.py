@@ -55,6 +55,59 @@ def test_from_nothing_to_a_session_and_on(isiw: Command, tmp_path: Path) -> None
     assert read_session("s.mcap").events[-1].kind == "limit"
 
 
+@pytest.fixture
+def begun(isiw: Command, tmp_path: Path) -> Path:
+    """The configuration of a session that has reached its limit of three pulses."""
+    isiw("new", "rig", ".")
+    changed(tmp_path / "session.toml", "max_trials = 40", "max_trials = 6")
+    changed(tmp_path / "session.toml", "max_pulses = 100", "max_pulses = 3")
+    assert isiw("run", "session.toml", "--log", "s.mcap").exit_code == 0
+    return tmp_path / "session.toml"
+
+
+def test_a_session_goes_on_within_the_limits_that_the_configuration_says_now(isiw: Command, begun: Path) -> None:
+    changed(begun, "max_pulses = 3", "max_pulses = 5\nmax_coil_c = 40.0")
+    hot = isiw("resume", "s.mcap", begun)
+    assert hot.exit_code == 1
+    assert "no temperature" in hot.output
+    assert len(read_session("s.mcap").trials) == 3
+    changed(begun, "\nmax_coil_c = 40.0", "")
+    changed(begun, "background_uv = 10.0", "background_uv = 25.0")
+    changed(begun, 'factory = "rig:make"', 'timeout_s = 7.0\nfactory = "rig:make"')
+    result = isiw("resume", "s.mcap", begun)
+    assert result.exit_code == 0, result.output
+    assert "limits.max_coil_c is not set from here on; it was 40.0." in result.output
+    assert "signals.background_uv is 25.0 from here on; it was 10.0." in result.output
+    record = read_session("s.mcap")
+    assert len(record.trials) == 5
+    assert (record.header.limits.max_pulses, record.header.limits.min_iti_s) == (5, 5.0)
+    assert (record.header.signals.background_uv, record.header.timeout_s) == (25.0, 7.0)
+
+
+def test_a_section_that_the_configuration_does_not_have_stays_as_it_was_logged(isiw: Command, begun: Path) -> None:
+    text = begun.read_text()
+    begun.write_text(text[: text.index("[limits]")] + text[text.index("[protocol]") : text.index("[signals]")])
+    assert isiw("resume", "s.mcap", begun).exit_code == 0
+    header = read_session("s.mcap").header
+    assert (header.limits.max_pulses, header.signals.mep_window_ms) == (3, (15.0, 35.0))
+
+
+def test_what_cannot_change_on_the_way_is_refused_or_said(isiw: Command, begun: Path) -> None:
+    changed(begun, "max_trials = 6", "max_trials = 4")
+    changed(begun, "rest_s = 120.0", "rest_s = 60.0")
+    changed(begun, "day = 1", "day = 2")
+    result = isiw("resume", "s.mcap", begun)
+    assert result.exit_code == 0
+    assert "strategy.settings.max_trials stays as the session began, 6; the configuration says 4." in result.output
+    assert "protocol.rest_s stays as the session began, 120.0; the configuration says 60.0." in result.output
+    assert "visit.day stays as the session began, 1; the configuration says 2." in result.output
+    assert result.output.count("stays as the session began") == 3
+    changed(begun, "high_ms = 320.0", "high_ms = 100.0")
+    refused = isiw("resume", "s.mcap", begun)
+    assert refused.exit_code == 1
+    assert "the design space that it began with" in refused.output
+
+
 def test_a_log_does_not_go_on_with_the_next_persons_configuration(isiw: Command, tmp_path: Path) -> None:
     isiw("new", "rig", ".")
     changed(tmp_path / "session.toml", "max_trials = 40", "max_trials = 2")

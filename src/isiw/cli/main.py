@@ -118,13 +118,17 @@ def resume(
     verify: Annotated[bool, typer.Option(help="Check that the strategy asks again what the log says it asked.")] = True,  # noqa: FBT002 - a flag of the command line
     live: Live = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
-    """Go on with a session that was interrupted."""
+    """Go on with a session that was interrupted: in its space and with its strategy, within the limits of CONFIG."""
     with errors_reported():
         record = isiw.read_session(log)
         settings = isiw.config.load_config(config) if config else isiw.config.config_of_log(record)
         isiw.config.require_same_person(settings, [record])
+        changes = isiw.config.changes_on_resume(settings, record) if config else {}
         device = isiw.config.device_for(settings.with_overrides(data=data))
-        _run_to_the_end(isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify), live=live)
+        session = isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify, **changes)
+        for difference in isiw.config.differences_on_resume(settings, record) if config else ():
+            show(difference, style="yellow", stderr=True)
+        _run_to_the_end(session, live=live)
 
 
 @app.command()

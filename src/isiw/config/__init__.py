@@ -1,5 +1,6 @@
 """Configuration files, and the sessions that they describe."""
 
+from isiw.config.going_on import changes_on_resume, differences_on_resume
 from isiw.config.rig import write_rig_template
 from isiw.config.run import (
     RunConfig,
@@ -16,8 +17,10 @@ from isiw.config.run import (
 
 __all__ = [
     "RunConfig",
+    "changes_on_resume",
     "config_of_log",
     "device_for",
+    "differences_on_resume",
     "fresh_log_path",
     "has_truth",
     "load_config",

@@ -22,6 +22,7 @@ from isiw.session.loop import Session
 from isiw.session.replay import Replayed, replay, resumption_text, strategy_of, warn_where_differing
 from isiw.session.safeguards import Safeguards
 from isiw.session.updates import SessionUpdate
+from isiw.signals.judgement import SignalLimits
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus, TrialTable
 
@@ -34,6 +35,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     strategy: Strategy | None = None,
     *,
     limits: Limits | None = None,
+    signals: SignalLimits | None = None,
     clock: Clock | None = None,
     on_trial: Callable[[SessionUpdate], None] | None = None,
     timeout_s: float | None = None,
@@ -52,6 +54,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         device: the device to go on with; one with a memory is brought to where the logged stimuli left it.
         strategy: needed where the session's strategy was built from a user's own objects: the same again.
         limits: other limits than those that were logged last.
+        signals: other demands on sweeps than those that were logged last; trials that were judged stay as they are.
         clock: as for `Session`.
         on_trial: as for `Session`.
         timeout_s: another time for one delivery than the logged one [s].
@@ -90,7 +93,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         clock=clock,
         on_trial=on_trial,
         subject=header.subject,
-        signals=header.signals,
+        signals=signals or header.signals,
         config=header.config,
         timeout_s=header.timeout_s if timeout_s is None else timeout_s,
         ask_deadline_s=header.ask_deadline_s if ask_deadline_s is None else ask_deadline_s,

@@ -1,0 +1,103 @@
+"""Going on with a logged session and a configuration: what it says holds, is refused, or is said to be left aside."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+from isiw.config.run import RunConfig
+from isiw.devices.limits import Limits
+from isiw.errors import ConfigError
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import Header
+from isiw.strategy.catalogue import make_strategy
+
+__all__ = ["changes_on_resume", "differences_on_resume"]
+
+
+def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any]:
+    """What a session goes on with, as arguments of `isiw.resume`: limits, signals and the device's time-out.
+
+    A section that the file does not have stays as it was logged last.
+
+    Args:
+        config: read from a file.
+        record: the session.
+
+    Raises:
+        ConfigError: the file has another design space than the session.
+    """
+    header, given = record.header, config.model_fields_set
+    _require_space(config, header)
+    changes: dict[str, Any] = {"limits": _limits(config, header.limits)}
+    if "signals" in given:
+        changes["signals"] = config.signals
+    if config.device is not None and "timeout_s" in config.device.model_fields_set:
+        changes["timeout_s"] = config.timeout_s
+    return changes
+
+
+def differences_on_resume(config: RunConfig, record: SessionRecord) -> tuple[str, ...]:
+    """What the file says otherwise than the log, in words: what changes, and what a session does not change on its way.
+
+    Args:
+        config: read from a file.
+        record: the session.
+    """
+    header = record.header
+    changes = (("limits", header.limits, _limits(config, header.limits)), ("signals", header.signals, config.signals))
+    changed = [
+        f"{name}.{key} is {_told(now)} from here on; it was {_told(was)}."
+        for name, before, after in changes
+        if name in config.model_fields_set
+        for key, was, now in _fields(before, after)
+        if was != now
+    ]
+    kept = [
+        f"{key} stays as the session began, {_told(was)}; the configuration says {_told(now)}."
+        for key, was, now in _unchangeable(config, header)
+        if was != now
+    ]
+    return (*changed, *kept)
+
+
+def _limits(config: RunConfig, logged: Limits) -> Limits:
+    return dataclasses.replace(logged, **config.limits.model_dump()) if "limits" in config.model_fields_set else logged
+
+
+def _require_space(config: RunConfig, header: Header) -> None:
+    if "space" not in config.model_fields_set or (space := config.space.design()) == header.space:
+        return
+    raise ConfigError(
+        "a session goes on in the design space that it began with",
+        got=f"{space} in the configuration",
+        expected=f"{header.space}",
+        remedy="Correct [space], or start a new session with isiw run.",
+    )
+
+
+def _fields(before: Any, after: Any) -> Iterator[tuple[str, object, object]]:
+    for field in dataclasses.fields(before):
+        yield field.name, getattr(before, field.name), getattr(after, field.name)
+
+
+def _unchangeable(config: RunConfig, header: Header) -> Iterator[tuple[str, object, object]]:
+    given = config.model_fields_set
+    if "strategy" in given:
+        yield "strategy.name", header.strategy.name, config.strategy.name
+        if config.strategy.name == header.strategy.name:
+            strategy = make_strategy(config.strategy.name, header.space, **config.strategy.settings)
+            for key in config.strategy.settings:
+                now = strategy.recipe.settings.get(key)
+                yield f"strategy.settings.{key}", header.strategy.settings.get(key, now), now
+    if "protocol" in given:
+        for key, was, now in _fields(header.protocol, config.protocol):
+            yield f"protocol.{key}", was, now
+    noted = config.visit.noted()
+    for name in config.visit.model_fields_set - {"subject"}:
+        yield f"visit.{name}", getattr(header.visit, name), getattr(noted, name)
+
+
+def _told(value: object) -> object:
+    return "not set" if value in (None, "") else value
