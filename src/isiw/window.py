@@ -19,6 +19,7 @@ __all__ = [
     "ENOUGH_PAIRS",
     "MIN_EXCESS_MV",
     "MIN_EXCESS_OF_BASELINE",
+    "NO_MEP",
     "TOO_FEW",
     "BestISI",
     "Enhancement",
@@ -42,6 +43,9 @@ ENOUGH_PAIRS = 3
 
 TOO_FEW = "Too few trials counted to speak of a window: most of what is believed was believed beforehand."
 """What is said instead."""
+
+NO_MEP = "No MEP was seen in any trial, so nothing is known about a window."
+"""What is said where every amplitude was below the detection limit."""
 
 Interval: TypeAlias = tuple[float, float]
 _Edge: TypeAlias = tuple[float | None, float | None, float | None]

@@ -1,12 +1,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 
+import isiw
+from isiw.errors import LogError
 from isiw.report.evidence import contradiction, no_comparison
 from isiw.trials import Status, Trial
 from isiw.window import Window
+from scripted import scripted_strategy
 
 
 def trials(inside_mv: Sequence[float], outside_mv: Sequence[float]) -> list[Trial]:
@@ -45,3 +49,21 @@ def test_a_window_with_hardly_a_trial_outside_has_nothing_to_be_compared_with() 
     alone = [Trial(6 + k, Status.ACCEPTED, None, mep_mv=0.02) for k in range(3)]
     assert no_comparison(WINDOW, [*told, *alone]) is None
     assert no_comparison(None, told) is None
+
+
+def test_amplitudes_that_are_all_zero_are_doubted_and_find_nothing(tmp_path: Path) -> None:
+    with isiw.open_session(scripted_strategy(12), tmp_path / "zeros.mcap") as session:
+        with pytest.warns(UserWarning, match="None of the first 10 pulses gave an MEP"):
+            for _ in range(12):
+                session.tell(session.ask(), 0.0)
+    record = isiw.read_session(tmp_path / "zeros.mcap")
+    assert [event.trial for event in record.events if event.kind == "doubt"] == [9]
+    assert not record.rests_on_data
+    said = isiw.report.final_statement(record)
+    assert "No MEP was seen in any trial" in said
+    assert "The amplitudes of all 12 trials that count are 0" in said
+    for confident in ("No window was found", "excluded", "expected F1", "There is no window"):
+        assert confident not in said
+    assert "No MEP was seen" in str(record)
+    with pytest.raises(LogError, match="no MEP to learn from"):
+        isiw.priors.learn([record.path])

@@ -43,6 +43,7 @@ def test_an_isi_far_from_the_one_asked_is_a_doubt(space: DesignSpace) -> None:
         ([0.0005, 0.0004, 0.0003], DoubtKind.SMALL),
         ([8.0, 6.0, 12.0], DoubtKind.LARGE),
         ([0.008, 0.01, 0.1, 8.0, 11.0, 9.0], DoubtKind.JUMP),
+        ([0.0] * 10, DoubtKind.SILENT),
     ],
 )
 def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv: list[float], kind: DoubtKind) -> None:
@@ -57,6 +58,7 @@ def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv: list[float], kind
     [
         [],
         [0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.006] + [0.0] * 20,
         [0.05, 0.05, 0.05],
         [0.008, 0.01, 0.009, 1.5, 0.9, 1.2],
         [0.0027, 0.0008, 0.002],

@@ -35,7 +35,7 @@ from isiw.log.writer import CONFIGURATION
 from isiw.strategy.stopping import StopDecision
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial, TrialTable
-from isiw.window import ENOUGH_PAIRS, TOO_FEW
+from isiw.window import ENOUGH_PAIRS, NO_MEP, TOO_FEW
 
 __all__ = ["Records", "SessionRecord", "of_production", "read_any", "read_salvaged", "read_session", "require_records"]
 
@@ -84,7 +84,7 @@ class SessionRecord:
         ]
         if last is not None:
             lines += [
-                str(last) if self.rests_on_data else TOO_FEW,
+                str(last) if self.rests_on_data else NO_MEP if self.is_silent else TOO_FEW,
                 f"{'Ended' if last.stop else 'Not over'}: {last.reason}",
             ]
             if self.is_judged_since:
@@ -107,8 +107,14 @@ class SessionRecord:
 
     @property
     def rests_on_data(self) -> bool:
-        """Whether enough pairs of stimuli count to speak of a window."""
-        return sum(trial.isi_ms is not None for trial in self.table.told) >= ENOUGH_PAIRS
+        """Whether enough pairs of stimuli count to speak of a window, and any trial showed an MEP."""
+        return not self.is_silent and sum(trial.isi_ms is not None for trial in self.table.told) >= ENOUGH_PAIRS
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether trials count, and the amplitude of each was 0, below the detection limit."""
+        told = self.table.told
+        return bool(told) and all(trial.mep_mv == 0 for trial in told)
 
     @property
     def is_judged_since(self) -> bool:

@@ -151,6 +151,8 @@ def _finish_profile(axes: Axes, record: SessionRecord) -> None:
 
 
 def _title(record: SessionRecord) -> str:
+    if record.is_silent:
+        return "No MEP was seen"
     if not record.rests_on_data:
         return f"Too little was measured ({len(record.table.told)} count)"
     window = record.estimates[-1].window if record.estimates else None

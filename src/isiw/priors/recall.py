@@ -22,12 +22,18 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
         particles: how many particles.
 
     Raises:
-        LogError: it has no accepted trial.
+        LogError: it has no accepted trial, or none with an MEP.
         InvalidValueError: the prior's places count from another event than the session's ISIs.
     """
     if not record.table.told:
         raise LogError(
             "the session has no accepted trial to learn from", got=str(record.path), remedy="Leave this log out."
+        )
+    if record.is_silent:
+        raise LogError(
+            "the session has no MEP to learn from: every amplitude is 0, below the detection limit",
+            got=str(record.path),
+            remedy="Leave this log out.",
         )
     model = ParticleModel(_of_rig(prior, record), particles=particles)
     if (limit_mv := record.header.device.detection_limit_mv) is not None:

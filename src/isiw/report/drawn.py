@@ -14,7 +14,7 @@ from isiw.report.words import finding_sentence
 from isiw.text import plain
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
-from isiw.window import ENOUGH_PAIRS, TOO_FEW
+from isiw.window import ENOUGH_PAIRS, NO_MEP, TOO_FEW
 
 __all__ = ["drawn"]
 
@@ -70,8 +70,10 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
 
 def _belief(record: SessionRecord, estimate: Estimate) -> dict[str, Any]:
     pairs = sum(trial.index <= estimate.trial and trial.isi_ms is not None for trial in record.table.told)
-    window = estimate.window if pairs >= ENOUGH_PAIRS else None
-    found = finding_sentence(estimate, record.header.space) if pairs >= ENOUGH_PAIRS else TOO_FEW
+    window_is_told = pairs >= ENOUGH_PAIRS and not record.is_silent
+    window = estimate.window if window_is_told else None
+    nothing = NO_MEP if record.is_silent else TOO_FEW
+    found = finding_sentence(estimate, record.header.space) if window_is_told else nothing
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
     bands = {
         "profile": estimate.profile_mv,

@@ -10,13 +10,15 @@ from scipy.stats import mannwhitneyu
 
 from isiw.log.reader import SessionRecord
 from isiw.trials import Trial
-from isiw.window import Window
+from isiw.window import NO_MEP, Window
 
 __all__ = ["contradiction", "no_comparison", "nothing_measured"]
 
 ENOUGH_ON_EACH_SIDE = 4
 NO_LARGER = 0.5
 """From this p-value of a one-sided rank test on, MEPs are not larger at all."""
+
+_LOOK = "Did the stimulator fire, was the EMG recorded, was the intensity enough?"
 
 
 def nothing_measured(record: SessionRecord) -> str | None:
@@ -28,6 +30,8 @@ def nothing_measured(record: SessionRecord) -> str | None:
     if record.rests_on_data:
         return None
     given, told = len(record.table) + len(record.unknown), len(record.table.told)
+    if record.is_silent:
+        return f"{NO_MEP} The amplitudes of all {told} trials that count are 0. {_LOOK}"
     if told:
         return f"Too little was measured to speak of a window: {told} of {given} trials count."
     lost = [trial for trial in record.table if trial.reason is not None]

@@ -60,7 +60,7 @@ def final_statement(record: SessionRecord) -> str:
         counts_sentence(record),
         fit_sentence(record),
         _unstated_hit_delay(record),
-        last.reason,
+        "" if record.is_silent else last.reason,
     ]
     if record.end_lost:
         sentences.append(

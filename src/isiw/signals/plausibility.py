@@ -42,6 +42,7 @@ JUMP = 300.0
 
 IN_A_ROW = 3
 EQUAL_IN_A_ROW = 4
+SILENT_FROM_THE_START = 10
 
 
 class DoubtKind(StrEnum):
@@ -49,6 +50,7 @@ class DoubtKind(StrEnum):
 
     ISI_OFF = "ISI far from the one asked"
     EQUAL = "equal amplitudes"
+    SILENT = "no MEP at all"
     SMALL = "small amplitudes"
     LARGE = "large amplitudes"
     JUMP = "a jump of the scale"
@@ -160,13 +162,17 @@ def doubt_of(meps_mv: Sequence[float]) -> Doubt | None:
     """What is odd about the last amplitudes of a person; None where nothing is.
 
     Args:
-        meps_mv: all amplitudes told so far [mV], in order; 0, below the detection limit, says nothing about the scale.
+        meps_mv: all amplitudes told so far [mV], in order; 0 is below the detection limit.
     """
     last = list(meps_mv[-EQUAL_IN_A_ROW:])
     if len(last) == EQUAL_IN_A_ROW and len(set(last)) == 1 and last[0] > 0:
         text = f"The last {EQUAL_IN_A_ROW} amplitudes are exactly equal ({last[0]:g} mV). Is the EMG still recorded?"
         return Doubt(DoubtKind.EQUAL, text)
     seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
+    if len(meps_mv) >= SILENT_FROM_THE_START and not seen:
+        text = f"None of the first {SILENT_FROM_THE_START} pulses gave an MEP: every amplitude is 0."
+        ask = "Does the stimulator fire, is the EMG recorded, is the intensity enough?"
+        return Doubt(DoubtKind.SILENT, f"{text} {ask}")
     return _doubt_of_scale(seen[:-IN_A_ROW], seen[-IN_A_ROW:]) if len(seen) >= IN_A_ROW else None
 
 
