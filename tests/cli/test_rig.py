@@ -137,3 +137,49 @@ def test_a_rig_that_stimulates_is_checked_only_when_somebody_says_so(isiw: Comma
     assert refused.exit_code == 1
     assert "Is the coil on a phantom?" in refused.output
     assert "background EMG" not in refused.output
+
+
+def test_a_driver_beside_the_rig_may_be_imported_late(isiw: Command, tmp_path: Path) -> None:
+    isiw("new", "rig", ".")
+    (tmp_path / "vendor_driver.py").write_text("SIMULATED = True\n", encoding="utf-8")
+    rig = (tmp_path / "rig.py").read_text(encoding="utf-8")
+    (tmp_path / "rig.py").write_text(
+        rig + "\n\ndef late(simulated):\n    from vendor_driver import SIMULATED\n\n    return make(SIMULATED)\n",
+        encoding="utf-8",
+    )
+    changed(tmp_path / "session.toml", "rig:make", "rig:late")
+    changed(tmp_path / "session.toml", "max_trials = 40", "max_trials = 2")
+    result = isiw("run", "session.toml", "--log", "s.mcap")
+    assert result.exit_code == 0, result.output
+
+
+def test_a_session_that_pauses_where_nobody_is_ends_with_a_code_of_its_own(isiw: Command, tmp_path: Path) -> None:
+    isiw("new", "rig", ".")
+    changed(tmp_path / "rig.py", 'Channel(emg_mv, RATE_HZ, "mV"', 'Channel(1e3 * emg_mv, RATE_HZ, "mV"')
+    result = isiw("run", "session.toml", "--log", "a lab.mcap")
+    assert result.exit_code == 5
+    assert "The session is paused" in result.output
+    assert "go on with: isiw resume 'a lab.mcap' CONFIG" in result.output
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ('[subject]\ndata = "recordings"\n', "would be ignored"),
+        ("[visit]\nintensity_pct_rmt = 1.2\n", "probably a ratio"),
+    ],
+)
+def test_what_would_be_ignored_or_is_in_the_wrong_unit_is_refused(
+    isiw: Command, tmp_path: Path, lines: str, words: str
+) -> None:
+    (tmp_path / "c.toml").write_text(lines, encoding="utf-8")
+    result = isiw("run", "c.toml")
+    assert result.exit_code == 1
+    assert words in result.output
+
+
+@pytest.mark.parametrize("source", ["nope.mcap", ".", "logs/P01"])
+def test_a_path_without_a_log_has_no_timing(isiw: Command, source: str) -> None:
+    result = isiw("timing", source)
+    assert result.exit_code == 1
+    assert "there is no such log" in result.output

@@ -53,9 +53,12 @@ def test_a_window_with_hardly_a_trial_outside_has_nothing_to_be_compared_with() 
 
 def test_amplitudes_that_are_all_zero_are_doubted_and_find_nothing(tmp_path: Path) -> None:
     with isiw.open_session(scripted_strategy(12), tmp_path / "zeros.mcap") as session:
+        for _ in range(9):
+            session.tell(session.ask(), 0.0)
         with pytest.warns(UserWarning, match="None of the first 10 pulses gave an MEP"):
-            for _ in range(12):
-                session.tell(session.ask(), 0.0)
+            session.tell(session.ask(), 0.0)
+        for _ in range(2):
+            session.tell(session.ask(), 0.0)
     record = isiw.read_session(tmp_path / "zeros.mcap")
     assert [event.trial for event in record.events if event.kind == "doubt"] == [9]
     assert not record.rests_on_data

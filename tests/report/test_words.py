@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
@@ -13,7 +14,7 @@ from isiw.log.schema import Estimate, Event, StrategyRecipe
 from isiw.report.words import TRIAL_HEADINGS, final_statement, trial_rows, truth_sentence
 from isiw.session.loop import Session
 from isiw.session.resume import exclude
-from isiw.trials import Measurement
+from isiw.trials import Channel, Measurement
 from isiw.window import Window
 from known import instance
 from scripted import ScriptedDevice, scripted_strategy
@@ -112,9 +113,12 @@ def run_by(record: SessionRecord, name: str, *, delay_ms: tuple[float, float] | 
 
 
 def test_a_hit_delay_that_nobody_stated_is_said_to_have_cost_stimuli(record: SessionRecord) -> None:
-    said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms), which would have saved stimuli;"
-    statement = final_statement(run_by(record, "default", delay_ms=None))
-    assert f"{said} isiw timing {record.path} measures it." in statement
+    said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms), which would have saved stimuli"
+    unstated = run_by(record, "default", delay_ms=None)
+    assert f"{said}." in final_statement(unstated)
+    wave = Channel(np.zeros(10), 1000.0, "m/s^2")
+    with_sensor = replace(unstated, waveforms={(0, "acceleration"): wave}, path=Path("a lab/s.mcap"))
+    assert f"{said}; isiw timing 'a lab/s.mcap' measures it." in final_statement(with_sensor)
 
 
 @pytest.mark.parametrize(

@@ -57,6 +57,17 @@ def shown(desk: Desk, capsys: pytest.CaptureFixture[str]) -> Iterator[list[str]]
     lines += capsys.readouterr().err.splitlines()
 
 
+def test_keys_mean_the_trial_on_the_screen_not_one_delivered_since() -> None:
+    session = Operated(trial(0), trial(1))
+    desk = Desk(session)
+    session.trials = TrialTable((trial(0), trial(1), trial(2)))
+    press(desk, "xj")
+    assert session.done == [("exclude", 1, "Excluded by the operator."), ("reject", 1)]
+    desk.shown = 2
+    press(desk, "j")
+    assert session.done[-1] == ("reject", 2)
+
+
 def test_each_key_does_what_it_stands_for(capsys: pytest.CaptureFixture[str]) -> None:
     session = Operated(trial(0), trial(1, excluded=True), trial(2))
     desk = Desk(session)

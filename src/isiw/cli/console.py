@@ -17,6 +17,7 @@ from isiw.text import plain
 __all__ = [
     "DAMAGED",
     "INTERRUPTED",
+    "NOT_OVER",
     "NO_DEFAULT",
     "Overwrite",
     "errors_reported",
@@ -26,6 +27,7 @@ __all__ = [
 ]
 
 DAMAGED = 3
+NOT_OVER = 5  # a session that a person should look at, or that its operator ended early
 INTERRUPTED = 130  # what shells report for Ctrl-C
 
 NO_DEFAULT: dict[str, Any] = {"show_default": False}

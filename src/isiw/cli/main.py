@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import shlex
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -13,7 +14,7 @@ import typer
 
 import isiw
 from isiw.cli import interval, logs, prior, serve, study, threshold
-from isiw.cli.console import DAMAGED, NO_DEFAULT, Overwrite, errors_reported, show, show_entry
+from isiw.cli.console import DAMAGED, NO_DEFAULT, NOT_OVER, Overwrite, errors_reported, show, show_entry
 
 if TYPE_CHECKING:
     from isiw.repeatability import TimingStudy
@@ -101,7 +102,7 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
             day=day,
             operator=operator,
         )
-        _run_to_the_end(isiw.config.session_for(settings), live=live)
+        _run_to_the_end(isiw.config.session_for(settings), config if settings.device else None, live=live)
 
 
 @app.command()
@@ -128,7 +129,7 @@ def resume(
         session = isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify, **changes)
         for difference in isiw.config.differences_on_resume(settings, record) if config else ():
             show(difference, style="yellow", stderr=True)
-        _run_to_the_end(session, live=live)
+        _run_to_the_end(session, config, live=live)
 
 
 @app.command()
@@ -165,7 +166,7 @@ def new_rig(
     with errors_reported():
         for file in isiw.config.write_rig_template(folder):
             show(f"{file}")
-        show(f"It runs as it is, on made-up EMG: isiw run {folder / 'session.toml'}", style="bold")
+        show(f"It runs as it is, on made-up EMG: isiw run {shlex.quote(str(folder / 'session.toml'))}", style="bold")
 
 
 @app.command("show")
@@ -281,6 +282,8 @@ def timing(
 def _timing_study(source: str, taps: int, seed: int) -> TimingStudy:
     if _is_log(source):
         return isiw.repeatability.study_session(isiw.read_session(source))
+    if Path(source).exists() or "." in source or "/" in source:
+        raise isiw.errors.LogError("there is no such log", got=source, remedy="Give the path of a session's log.")
     if source == "vane":
         return isiw.repeatability.study_vane(rotations=taps, seed=seed)
     return isiw.repeatability.study_preset(source, taps=taps, seed=seed)
@@ -311,7 +314,7 @@ def _is_log(source: str) -> bool:
     return Path(closed).is_file() or Path(f"{closed}.part").is_file()
 
 
-def _run_to_the_end(session: Session, *, live: bool) -> None:
+def _run_to_the_end(session: Session, config: Path | None, *, live: bool) -> None:
     if session.log_path.suffix.lower() == ".png":
         raise isiw.errors.ConfigError(
             "the log would be overwritten by its picture", got=str(session.log_path), expected=".mcap"
@@ -323,7 +326,8 @@ def _run_to_the_end(session: Session, *, live: bool) -> None:
             result = session.run(progress=True)
     except BaseException:
         if len(session.trials) > before:
-            show(f"The session ended early. Its log is safe; go on with: isiw resume {session.log_path}")
+            command = shlex.join(["isiw", "resume", *map(str, filter(None, (session.log_path, config)))])
+            show(f"The session ended early. Its log is safe; go on with: {command}")
         raise
     record = isiw.read_session(result.log)
     truth = isiw.config.true_window(record)
@@ -332,6 +336,8 @@ def _run_to_the_end(session: Session, *, live: bool) -> None:
         show(isiw.report.truth_sentence(record, truth))
     picture = isiw.plots.save_session_plot(record, _free_beside(result.log, ".png"), truth=truth)
     show(f"log:     {result.log}\npicture: {picture}")
+    if not result.decision.stop:
+        raise typer.Exit(NOT_OVER)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,7 +40,7 @@ def learn(
             lab = isiw.priors.learn(logs, again=again, seed=seed, on_done=lambda _record: progress.advance(task))
         isiw.priors.write_lab_prior(lab, output, overwrite=overwrite)
         _print(lab)
-        show(f"prior: {output}\nRun a session with it: isiw run --prior {output}")
+        show(f"prior: {output}\nRun a session with it: isiw run --prior {shlex.quote(str(output))}")
 
 
 @app.command("show")

@@ -15,6 +15,7 @@ from __future__ import annotations
 import dataclasses
 import datetime as dt
 import itertools
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -29,8 +30,9 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, DeviceInfo
 from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
-from isiw.errors import ConfigError
+from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.reader import SessionRecord, read_session
+from isiw.log.schema import RUN_KEY
 from isiw.models.particles.prior import Prior
 from isiw.priors import after, read_lab_prior
 from isiw.session.loop import Session
@@ -62,8 +64,8 @@ SESSIONS = Path("isiw-sessions")
 
 TIMEOUT_S = 30.0
 
-RUN_KEY = "isiw_run"
-"""The name under which `isiw run` keeps its configuration in a log; other software may keep its own there."""
+LEAST_PCT = 3.0
+"""Nobody stimulates with so low an intensity; 1.2 is meant as 120 %."""
 
 
 class _Section(BaseModel):
@@ -82,6 +84,16 @@ class SubjectConfig(_Section):
     @classmethod
     def _known(cls, name: str) -> str:
         return str(choice("the cohort", name, COHORTS))
+
+    @model_validator(mode="after")
+    def _data_are_used(self) -> Self:
+        if self.data is not None and self.kind != "recorded":
+            raise ConfigError(
+                "recordings are for a subject of the kind recorded, and would be ignored",
+                got=str(self.data),
+                remedy='Add --subject recorded, or kind = "recorded" under [subject]; or leave the data out.',
+            )
+        return self
 
 
 class SpaceConfig(_Section):
@@ -157,6 +169,18 @@ class VisitConfig(_Section):
     intensity_pct_rmt: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     intensity_pct_mso: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     electrodes: str = ""
+
+    @field_validator("intensity_pct_rmt", "intensity_pct_mso")
+    @classmethod
+    def _in_percent(cls, intensity_pct: float | None) -> float | None:
+        if intensity_pct is not None and intensity_pct < LEAST_PCT:
+            raise InvalidValueError(
+                "an intensity is in %, and this is probably a ratio",
+                got=intensity_pct,
+                expected=f"at least {LEAST_PCT:g}",
+                remedy="Multiply it by 100: 90 for 90 %.",
+            )
+        return intensity_pct
 
     def noted(self) -> Visit:
         """What is noted about the visit."""
@@ -262,8 +286,9 @@ def config_of_log(record: SessionRecord) -> RunConfig:
         raise ConfigError(
             "the session was not run by isiw run with a simulated person, so its device is not known here",
             got=record.header.device.name,
-            remedy=f"With a configuration that has a device: isiw resume {record.path} CONFIG. From other software: "
-            "isiw.resume(path, device).run()",
+            remedy=f"With a configuration that has a device: isiw resume {shlex.quote(str(record.path))} CONFIG. From "
+            "other software: isiw.resume(path, device).run(), or for a loop of your own "
+            "isiw.open_session(strategy, path, resume=True).",
         )
     return _validated(record.header.config[RUN_KEY], str(record.path))
 

@@ -38,6 +38,7 @@ from isiw.window import Window, WindowEstimate, finding
 
 __all__ = [
     "MOST_TRIALS",
+    "RUN_KEY",
     "SCHEMA_VERSION",
     "AnyHeader",
     "Estimate",
@@ -79,6 +80,10 @@ class StrategyRecipe(_Record):
     name: str
     seed: int
     settings: dict[str, Any] = Field(default_factory=dict)
+
+
+RUN_KEY: Final = "isiw_run"
+"""The name under which `isiw run` keeps its configuration in `Header.config`; other software may keep its own there."""
 
 
 class Header(_Record):

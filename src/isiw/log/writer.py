@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import shlex
 import shutil
 import threading
 import time
@@ -293,16 +294,17 @@ def _way_on(existing: Path) -> str:
     except LogError:
         return "Choose another path; this is no log that can be continued."
     topics = {message.topic for message in found.messages}
+    name = shlex.quote(str(log_of(existing)))
     if "/production_header" in topics:
-        return f"Choose another path, or go on with it: isiw interval {log_of(existing)} --resume"
+        return f"Choose another path, or go on with it: isiw interval {name} --resume"
     header = _header_of(found)
     if header is None:
         return "Choose another path; nothing of this log can be continued."
     if header.intensities is not None:
-        return f"Choose another path, or go on with it: isiw threshold {log_of(existing)} --resume"
+        return f"Choose another path, or go on with it: isiw threshold {name} --resume"
     return (
-        f"Choose another path, or go on with it: isiw resume {log_of(existing)}, if isiw run has made it; otherwise "
-        "isiw.resume(path, device).run() in your own software."
+        f"Choose another path, or go on with it: isiw resume {name}, if isiw run has made it, with CONFIG behind it "
+        "if there was one; otherwise isiw.resume(path, device).run() in your own software."
     )
 
 

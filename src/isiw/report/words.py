@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections import Counter
 
 from isiw.design import DesignSpace
 from isiw.log.reader import SessionRecord, require_records
-from isiw.log.schema import Estimate
+from isiw.log.schema import RUN_KEY, Estimate
 from isiw.metrics import f1
 from isiw.report.depression import depression_sentence
 from isiw.report.evidence import contradiction, no_comparison, nothing_measured
@@ -65,10 +66,10 @@ def final_statement(record: SessionRecord) -> str:
     if record.end_lost:
         sentences.append(
             "The log's end is missing; go on with the number of pulses that the stimulator counted besides: "
-            f"isiw resume --lost-pulses N {record.path}"
+            f"{resuming(record)} --lost-pulses N"
         )
     elif not last.stop:
-        sentences.append(f"The session is not over; go on with: {_resuming(record)}")
+        sentences.append(f"The session is not over; go on with: {resuming(record)}")
     if record.is_judged_since:
         sentences.append(
             "Trials were judged anew after this estimate; resume the session to have it with what counts now."
@@ -76,11 +77,16 @@ def final_statement(record: SessionRecord) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def _resuming(record: SessionRecord) -> str:
-    """What goes on with a session: a command, or the call that a loop of the lab's own was begun with."""
+def resuming(record: SessionRecord) -> str:
+    """What goes on with a session: a command, or the call that a loop of the lab's own was begun with.
+
+    Args:
+        record: the session.
+    """
     if record.header.device.name == OWN_LOOP:
         return f'isiw.open_session(strategy, "{record.path}", resume=True)'
-    return f"isiw resume {record.path}"
+    command = f"isiw resume {shlex.quote(str(record.path))}"
+    return command if RUN_KEY in record.header.config else f"{command} CONFIG"
 
 
 def finding_sentences(record: SessionRecord) -> list[str]:
@@ -230,10 +236,10 @@ def _unstated_hit_delay(record: SessionRecord) -> str:
         return ""
     if not known_settings(recipe.name, {"hit_delay_ms": True}):
         return ""
-    return (
-        "The device does not state its hit delay (DeviceInfo.hit_delay_ms), which would have saved stimuli; "
-        f"isiw timing {record.path} measures it."
-    )
+    said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms), which would have saved stimuli"
+    if not any(name == "acceleration" for _, name in record.waveforms):
+        return f"{said}."
+    return f"{said}; isiw timing {shlex.quote(str(record.path))} measures it."
 
 
 def truth_sentence(record: SessionRecord, truth: Window | None) -> str:

@@ -57,6 +57,11 @@ class Desk:
     Args:
         session: what is operated.
         asking: whether a paused session goes on; others may answer, too.
+
+    Attributes:
+        shown: the trial whose row the operator saw last, which is what the keys mean; a later one may have been
+            delivered.
+        away: is entered while the keys are not heard.
     """
 
     def __init__(self, session: Operated, asking: Asking | None = None) -> None:
@@ -64,6 +69,7 @@ class Desk:
         self._note: str | None = None
         self._left_alone = False
         self._counted: int | None = None
+        self.shown = session.trials[-1].index if session.trials else None
         self.away: Callable[[], AbstractContextManager[None]] = nullcontext
 
     @contextmanager
@@ -157,9 +163,9 @@ class Desk:
         self.screen.say(f"Trial {number} {outcome}.")
 
     def _last(self) -> int:
-        if not self._session.trials:
+        if self.shown is None:
             raise InvalidValueError("there is no trial yet")
-        return self._session.trials[-1].index
+        return self.shown
 
     def _exclude(self) -> None:
         self._judge(

@@ -247,6 +247,8 @@ class Session(Judging):
             desk.show(fitted(row), standing(update, self._space))
         else:
             show_progress(row)
+        if desk is not None:
+            desk.shown = update.trial.index
 
     @contextmanager
     def _operated(self, *, keys: bool) -> Iterator[None]:
