@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from isiw.models.protocol import (
     Conditions,
-    ExpectsTheUsual,
     HasBotorchModel,
     HasEvidence,
     Observation,
@@ -21,7 +20,6 @@ from isiw.models.protocol import (
 
 __all__ = [
     "Conditions",
-    "ExpectsTheUsual",
     "HasBotorchModel",
     "HasEvidence",
     "Observation",
