@@ -183,3 +183,27 @@ def test_a_path_without_a_log_has_no_timing(isiw: Command, source: str) -> None:
     result = isiw("timing", source)
     assert result.exit_code == 1
     assert "there is no such log" in result.output
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('raise RuntimeError("no cable")', "error: RuntimeError: no cable (rig.py, line "),
+        ("raise SystemExit(0)", "error: SystemExit: 0 (rig.py, line "),
+    ],
+)
+def test_what_a_rig_raises_is_shown_where_it_happened_and_how_to_go_on_last(
+    isiw: Command, tmp_path: Path, line: str, words: str
+) -> None:
+    isiw("new", "rig", ".")
+    text = (tmp_path / "rig.py").read_text(encoding="utf-8")
+    head, deliver, body = text.partition("def deliver")
+    signature, _, rest = body.partition("\n")
+    broken = f"{head}{deliver}{signature}\n        if stimulus.trial == 1:\n            {line}\n{rest}"
+    (tmp_path / "rig.py").write_text(broken, encoding="utf-8")
+    result = isiw("run", "session.toml", "--log", "s.mcap")
+    assert result.exit_code == 1
+    assert "Traceback" in result.output
+    assert words in result.output
+    last = "The session ended early. Its log is safe; go on with: isiw resume s.mcap session.toml"
+    assert result.output.splitlines()[-1] == last

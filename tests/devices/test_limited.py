@@ -262,6 +262,15 @@ def test_a_device_that_is_not_ready_delivers_nothing_and_may_be_tried_again(
     assert len(inner.delivered) == 1
 
 
+@pytest.mark.parametrize("state", [None, True])
+def test_a_state_that_is_none_delivers_nothing(inner: ScriptedDevice, clock: VirtualClock, state: Any) -> None:
+    device, limited = reporting(inner, clock, Readiness())
+    device.state = state
+    with pytest.raises(DeviceError, match=r"readiness\(\) did not return an isiw.Readiness"):
+        limited.deliver(Stimulus(0, 10), 1.0)
+    assert inner.delivered == []
+
+
 def test_a_hot_coil_delivers_nothing(inner: ScriptedDevice, clock: VirtualClock) -> None:
     device, limited = reporting(inner, clock, Readiness(coil_c=39.0), max_coil_c=40.0)
     limited.check(Stimulus(0, 10))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -61,6 +63,8 @@ def show_entry(heading: str, text: str) -> None:
 def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
     """Turn what isiw raises, and what the operating system refuses, into a message and an exit code.
 
+    What a lab's own code raises, or a fault of isiw, is shown with its traceback, and its message again at the end.
+
     Args:
         interrupted: what to say after Ctrl-C.
     """
@@ -75,6 +79,14 @@ def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
     except KeyboardInterrupt as error:
         show(interrupted, style="red", stderr=True)
         raise typer.Exit(INTERRUPTED) from error
+    except (typer.Exit, typer.Abort):
+        raise
+    except (Exception, SystemExit) as error:
+        show(traceback.format_exc(), stderr=True)
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(place.filename).name}, line {place.lineno}"
+        show(f"error: {type(error).__name__}: {error} ({where})", style="red", stderr=True)
+        raise typer.Exit(1) from error
 
 
 def refuse_ignored(why: str, **options: object) -> None:

@@ -128,7 +128,14 @@ class LimitedDevice:
         self._limits.require_state(state)
 
     def _readiness(self) -> Readiness:
-        return self._device.readiness() if isinstance(self._device, ReportsReadiness) else Readiness()
+        state: object = self._device.readiness() if isinstance(self._device, ReportsReadiness) else Readiness()
+        if not isinstance(state, Readiness):
+            raise DeviceError(
+                "readiness() did not return an isiw.Readiness, so nothing is delivered",
+                got=repr(state),
+                remedy='Return Readiness(), or Readiness(ready=False, reason="...").',
+            )
+        return state
 
     def describe(self) -> DeviceInfo:
         """What the guarded device is."""

@@ -66,10 +66,10 @@ def final_statement(record: SessionRecord) -> str:
     if record.end_lost:
         sentences.append(
             "The log's end is missing; go on with the number of pulses that the stimulator counted besides: "
-            f"{resuming(record)} --lost-pulses N"
+            f"{_resuming(record)}"
         )
     elif not last.stop:
-        sentences.append(f"The session is not over; go on with: {resuming(record)}")
+        sentences.append(f"The session is not over; go on with: {_resuming(record)}")
     if record.is_judged_since:
         sentences.append(
             "Trials were judged anew after this estimate; resume the session to have it with what counts now."
@@ -77,15 +77,13 @@ def final_statement(record: SessionRecord) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def resuming(record: SessionRecord) -> str:
-    """What goes on with a session: a command, or the call that a loop of the lab's own was begun with.
-
-    Args:
-        record: the session.
-    """
+def _resuming(record: SessionRecord) -> str:
+    """What goes on with a session: a command, or the call that a loop of the lab's own was begun with."""
     if record.header.device.name == OWN_LOOP:
-        return f'isiw.open_session(strategy, "{record.path}", resume=True)'
-    command = f"isiw resume {shlex.quote(str(record.path))}"
+        lost = ", lost_pulses=N" if record.end_lost else ""
+        return f'isiw.open_session(strategy, "{record.path}", resume=True{lost})'
+    lost = "--lost-pulses N " if record.end_lost else ""
+    command = f"isiw resume {lost}{shlex.quote(str(record.path))}"
     return command if RUN_KEY in record.header.config else f"{command} CONFIG"
 
 
