@@ -297,7 +297,7 @@ class TrialTable:
         excluded = sum(trial.excluded for trial in self.trials)
         return (
             f"{len(self)} delivered, {len(self.told)} told"
-            + (f", {taps} taps alone" if (taps := sum(trial.tap_alone for trial in self.trials)) else "")
+            + (f", {taps} of a tap alone" if (taps := sum(trial.tap_alone for trial in self.trials)) else "")
             + (f", {mistrials.total()} mistrials ({reasons})" if reasons else "")
             + (f", {excluded} excluded" if excluded else "")
         )

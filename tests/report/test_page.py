@@ -153,6 +153,12 @@ def test_a_page_replaces_nothing_unasked(record: SessionRecord, tmp_path: Path) 
     assert (tmp_path / "r.html").stat().st_size > 1_000_000
 
 
+def test_a_page_is_not_written_into_what_is_no_page(record: SessionRecord, tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match=r"r\.pdf.*expected a path that ends in \.html"):
+        save_report(record, tmp_path / "r.pdf")
+    assert not (tmp_path / "r.pdf").exists()
+
+
 @pytest.mark.parametrize("library", ["plotly.offline", "jinja2"])
 def test_without_its_libraries_the_extra_is_named(
     record: SessionRecord, library: str, monkeypatch: pytest.MonkeyPatch

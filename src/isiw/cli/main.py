@@ -70,7 +70,10 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
     config: Annotated[Path | None, typer.Argument(help="A configuration file (TOML).", **NO_DEFAULT)] = None,
     subject: Annotated[
         str | None,
-        typer.Option(help="simulated, or recorded: a simulated person's MEPs in recorded EMG.", **NO_DEFAULT),
+        typer.Option(
+            help="simulated, or recorded: simulated MEPs in recorded EMG. A person's code is visit.subject in CONFIG.",
+            **NO_DEFAULT,
+        ),
     ] = None,
     data: Data = None,
     strategy: Annotated[str | None, typer.Option(help="A name that isiw strategies lists.", **NO_DEFAULT)] = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -61,7 +62,7 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
         "seed": seed,
     }
     settings |= {"max_pulses": max_pulses, "min_iti_s": min_iti_s, "subject": subject}
-    with errors_reported(f"Interrupted. The log is safe; go on with: isiw threshold {log} --resume"):
+    with errors_reported(f"Interrupted. The log is safe; go on with: {_resuming(log)}"):
         if resume or show_only:
             refuse_ignored("a search keeps what its log says", **settings)
         if by_hand:
@@ -95,6 +96,10 @@ def _begun(
     return isiw.session.open_simulated(search, log, cohort=cohort, seed=seed, **options)
 
 
+def _resuming(log: Path) -> str:
+    return f"isiw threshold {shlex.quote(str(log))} --resume"
+
+
 def _run(recorder: ThresholdRecorder) -> None:
     with recorder:
         if recorder.header.device.simulated:
@@ -108,7 +113,7 @@ def _say_what_is_there(log: Path) -> None:
     search = isiw.session.search_of(record)
     decision = search.decision()
     show(f"\n{search.estimate()}", style="bold")
-    show(f"{'Ended' if decision.stop else 'Not over'}: {decision.reason}")
+    show(f"Ended: {decision.reason}" if decision.stop else f"Not over: {decision.reason} Go on with: {_resuming(log)}")
     person = isiw.session.simulated_person(record.header)
     if person is not None:
         show(f"The simulated person's true threshold is {person.rmt_pct_mso:.1f} % MSO.")

@@ -40,6 +40,7 @@ __all__ = [
     "MOST_TRIALS",
     "RUN_KEY",
     "SCHEMA_VERSION",
+    "SERVED_KEY",
     "AnyHeader",
     "Estimate",
     "Event",
@@ -83,7 +84,9 @@ class StrategyRecipe(_Record):
 
 
 RUN_KEY: Final = "isiw_run"
-"""The name under which `isiw run` keeps its configuration in `Header.config`; other software may keep its own there."""
+SERVED_KEY: Final = "isiw_serve"
+"""The names under which `isiw run` and `isiw serve` keep in `Header.config` what they were asked for; other software may
+keep its own there."""
 
 
 class Header(_Record):

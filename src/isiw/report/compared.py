@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from isiw.log.outputs import write_output
 from isiw.log.reader import SessionRecord
 from isiw.plots.comparison import comparison_figure
 from isiw.plots.inline import inline_svg
 from isiw.priors.differing import Difference
 from isiw.report.comparison import HEADINGS, comparison_rows, comparison_sentence
 from isiw.report.facts import first_facts
-from isiw.report.html import rendered
+from isiw.report.html import rendered, write_page
 from isiw.report.words import counts_sentence, finding_sentences
 
 __all__ = ["comparison_page", "save_comparison"]
@@ -36,9 +35,10 @@ def save_comparison(
 
     Raises:
         ConfigError: jinja2 is not installed.
-        InvalidValueError: ISIs that count from different events, or a file that is not to be replaced.
+        InvalidValueError: ISIs that count from different events, a path that is none of a page, or a file that is not
+            to be replaced.
     """
-    return write_output(path, comparison_page(records, differences).encode(), overwrite=overwrite)
+    return write_page(path, lambda: comparison_page(records, differences), overwrite=overwrite)
 
 
 def comparison_page(records: Sequence[SessionRecord], differences: Sequence[Difference]) -> str:

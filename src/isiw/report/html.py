@@ -5,16 +5,36 @@ from __future__ import annotations
 import base64
 import hashlib
 import importlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import resources
+from pathlib import Path
 from typing import Any, Final
 
-from isiw.errors import ConfigError
+from isiw.errors import ConfigError, InvalidValueError
+from isiw.log.outputs import check_output, write_output
 from isiw.text import plain
 
-__all__ = ["asset", "library", "rendered"]
+__all__ = ["asset", "library", "rendered", "write_page"]
 
 _ASSETS: Final = resources.files("isiw.report") / "assets"
+_SUFFIXES: Final = {".html", ".htm"}
+
+
+def write_page(path: str | Path, page: Callable[[], str], *, overwrite: bool = False) -> Path:
+    """Write a page into a file, which is checked before the page is made.
+
+    Args:
+        path: where to, .html or .htm.
+        page: makes the page.
+        overwrite: whether to replace a file that is there; a log never is.
+
+    Raises:
+        InvalidValueError: another suffix, or a file that is not to be replaced.
+    """
+    if Path(path).suffix.lower() not in _SUFFIXES:
+        raise InvalidValueError("a page is for a browser", got=str(path), expected="a path that ends in .html")
+    check_output(path, overwrite=overwrite)
+    return write_output(path, page().encode(), overwrite=overwrite)
 
 
 def rendered(template: str, scripts: Sequence[str] = (), **contents: Any) -> str:

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from isiw.log.outputs import write_output
 from isiw.log.reader import SessionRecord, require_records
 from isiw.plots.course import course_figure
 from isiw.plots.inline import inline_svg
@@ -20,7 +19,7 @@ from isiw.plots.timeline import timeline_figure
 from isiw.report.answers import answers
 from isiw.report.drawn import drawn
 from isiw.report.facts import first_facts, further_facts, settings_facts
-from isiw.report.html import asset, library, rendered
+from isiw.report.html import asset, library, rendered, write_page
 from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
 from isiw.report.words import finding_sentences, fit_sentence
 from isiw.window import Window
@@ -41,9 +40,10 @@ def save_report(
 
     Raises:
         ConfigError: plotly or jinja2 is not installed.
-        InvalidValueError: no record of a session, or there is a file that is not to be replaced.
+        InvalidValueError: no record of a session, a path that is none of a page, or there is a file that is not to be
+            replaced.
     """
-    return write_output(path, report_page(record, truth=truth).encode(), overwrite=overwrite)
+    return write_page(path, lambda: report_page(record, truth=truth), overwrite=overwrite)
 
 
 def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:

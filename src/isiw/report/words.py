@@ -7,8 +7,9 @@ import shlex
 from collections import Counter
 
 from isiw.design import DesignSpace
+from isiw.log.durable import log_of
 from isiw.log.reader import SessionRecord, require_records
-from isiw.log.schema import RUN_KEY, Estimate
+from isiw.log.schema import RUN_KEY, SERVED_KEY, Estimate
 from isiw.metrics import f1
 from isiw.report.depression import depression_sentence
 from isiw.report.evidence import contradiction, no_comparison, nothing_measured
@@ -79,6 +80,8 @@ def final_statement(record: SessionRecord) -> str:
 
 def _resuming(record: SessionRecord) -> str:
     """What goes on with a session: a command, or the call that a loop of the lab's own was begun with."""
+    if SERVED_KEY in record.header.config:
+        return f"POST /sessions/{log_of(record.path).stem}/resume, to isiw serve"
     if record.header.device.name == OWN_LOOP:
         lost = ", lost_pulses=N" if record.end_lost else ""
         return f'isiw.open_session(strategy, "{record.path}", resume=True{lost})'

@@ -14,6 +14,7 @@ from isiw.devices.limits import Limits
 from isiw.errors import IsiwError
 from isiw.log.durable import log_of, part_of
 from isiw.log.reader import SessionRecord, read_session
+from isiw.log.schema import SERVED_KEY
 from isiw.server.answers import DecisionAnswer, EstimateAnswer, SessionAnswer, SessionEntry, TrialRow
 from isiw.server.driven import DrivenSession, not_open
 from isiw.server.refusals import Refusal
@@ -23,9 +24,6 @@ from isiw.session.replay import strategy_of
 from isiw.strategy.catalogue import make_strategy
 
 __all__ = ["Sessions"]
-
-REQUEST_KEY: Final = "isiw_serve"
-"""The name under which a log keeps the request that began it."""
 
 MOST_OPEN: Final = 20
 
@@ -239,7 +237,7 @@ class Sessions:
             subject=request.visit.subject,
             visit=request.visit.noted(),
             protocol=request.protocol,
-            config={REQUEST_KEY: _kept(request)},
+            config={SERVED_KEY: _kept(request)},
             on_doubt=doubts.append,
         )
         return self._take(DrivenSession(request.id, request.visit.subject, recorder, doubts))
@@ -247,7 +245,7 @@ class Sessions:
     def _require_same_beginning(self, request: CreateRequest) -> None:
         """Raise where the session with this id is another one, or goes on already."""
         record = self.record(request.id)
-        if record.intents or record.header.config.get(REQUEST_KEY) != _kept(request):
+        if record.intents or record.header.config.get(SERVED_KEY) != _kept(request):
             raise Refusal(
                 409, "Exists", "there is a session with this id", got=request.id,
                 remedy="Choose another id, or resume it.", field="id",

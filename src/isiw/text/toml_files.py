@@ -46,7 +46,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         return parsed(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(
-            f"the configuration cannot be read: {error.strerror}", got=str(path), remedy="Check the path."
+            f"the TOML file cannot be read: {error.strerror}", got=str(path), remedy="Check the path."
         ) from error
     except (ValueError, RecursionError) as error:  # not TOML, not UTF-8, or nested without end
         raise ConfigError(f"{path} is not valid TOML: {error}", remedy="Correct the line that it names.") from error
