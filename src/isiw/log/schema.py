@@ -85,8 +85,8 @@ class StrategyRecipe(_Record):
 
 RUN_KEY: Final = "isiw_run"
 SERVED_KEY: Final = "isiw_serve"
-"""The names under which `isiw run` and `isiw serve` keep in `Header.config` what they were asked for; other software may
-keep its own there."""
+"""Where `isiw run` and `isiw serve` keep in `Header.config` what they were asked for; other software has names of its
+own."""
 
 
 class Header(_Record):
