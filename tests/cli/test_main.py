@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import signal
@@ -324,6 +325,20 @@ def test_what_the_operating_system_refuses_is_a_message(isiw: Command, log: Path
     assert result.exit_code == 1
     assert "error: " in result.output
     assert "picture.png" in result.output
+
+
+def test_a_picture_that_finds_no_room_takes_nothing_from_the_session(
+    isiw: Command, short: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_room(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("isiw.plots.save_session_plot", no_room)
+    result = isiw("run", short, "--log", "s.mcap")
+    assert result.exit_code == 0
+    assert "No space left on device" in result.output
+    assert "The log is complete; draw it later with: isiw plot s.mcap" in result.output
+    assert read_session("s.mcap").finished
 
 
 def test_a_picture_replaces_no_log_and_nothing_else_unasked(isiw: Any, log: Path, tmp_path: Path) -> None:

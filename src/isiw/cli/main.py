@@ -337,8 +337,13 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool) -> Non
     show(f"\n{isiw.report.final_statement(record)}", style="bold")
     if isiw.config.has_truth(record):
         show(isiw.report.truth_sentence(record, truth))
-    picture = isiw.plots.save_session_plot(record, _free_beside(result.log, ".png"), truth=truth)
-    show(f"log:     {result.log}\npicture: {picture}")
+    show(f"log:     {result.log}")
+    try:
+        picture = isiw.plots.save_session_plot(record, _free_beside(result.log, ".png"), truth=truth)
+        show(f"picture: {picture}")
+    except OSError as error:
+        later = f"isiw plot {shlex.quote(str(result.log))}"
+        show(f"The picture cannot be written ({error.strerror}). The log is complete; draw it later with: {later}")
     if not result.decision.stop:
         raise typer.Exit(NOT_OVER)
 
