@@ -39,9 +39,10 @@ def test_the_same_seed_gives_the_same_study() -> None:
 
 
 def test_an_unknown_source_is_a_message_with_the_presets(tmp_path: Path) -> None:
-    result = run(tmp_path / "nothing.mcap")
+    result = run("nothing")
     assert result.exit_code == 1
     assert "timing-fault" in result.output
+    assert "there is no such log" in run(tmp_path / "nothing.mcap").output
 
 
 class NoResponse:
