@@ -32,7 +32,7 @@ NEAR_THE_END_PCT_MSO: Final = 3.0
 """After so many pulses so near to the end of the range, none of which changed anything, the range is wrong."""
 
 LEAST_RATIO: Final = 1.5
-"""Answered pulses are larger than the others by more than this; in 2 of 4,800 simulated searches they are not."""
+"""Answered pulses are larger than the others by more than this; in 2 of 4,000 simulated searches they are not."""
 
 _GRID_TOLERANCE: Final = 1e-6
 
