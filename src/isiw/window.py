@@ -44,7 +44,7 @@ ENOUGH_PAIRS = 3
 TOO_FEW = "Too few trials counted to speak of a window: most of what is believed was believed beforehand."
 """What is said instead."""
 
-NO_MEP = "No MEP was seen in any trial, so nothing is known about a window."
+NO_MEP = "No MEP was seen in any trial that counts, so nothing is known about a window."
 """What is said where every amplitude was below the detection limit."""
 
 Interval: TypeAlias = tuple[float, float]

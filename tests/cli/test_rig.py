@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from isiw.cli import app
+from isiw.config.run import load_config, session_for
 from isiw.log.reader import read_session
 
 Command = Callable[..., Result]
@@ -77,6 +78,7 @@ def test_a_session_goes_on_within_the_limits_that_the_configuration_says_now(isi
     result = isiw("resume", "s.mcap", begun)
     assert result.exit_code == 0, result.output
     assert "limits.max_coil_c is not set from here on; it was 40.0." in result.output
+    assert "device.timeout_s is 7.0 from here on; it was 30.0." in result.output
     assert "signals.background_uv is 25.0 from here on; it was 10.0." in result.output
     record = read_session("s.mcap")
     assert len(record.trials) == 5
@@ -106,6 +108,8 @@ def test_what_cannot_change_on_the_way_is_refused_or_said(isiw: Command, begun: 
     refused = isiw("resume", "s.mcap", begun)
     assert refused.exit_code == 1
     assert "the design space that it began with" in refused.output
+    assert "space.high_ms = 100.0" in refused.output
+    assert "space.high_ms = 320.0" in refused.output
 
 
 def test_a_log_does_not_go_on_with_the_next_persons_configuration(isiw: Command, tmp_path: Path) -> None:
@@ -176,6 +180,32 @@ def test_what_would_be_ignored_or_is_in_the_wrong_unit_is_refused(
     result = isiw("run", "c.toml")
     assert result.exit_code == 1
     assert words in result.output
+
+
+def test_a_log_that_was_made_before_slips_were_refused_is_read_and_goes_on(
+    isiw: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("isiw.config.run._require_used", lambda _subject: None)
+    short = "[strategy.settings]\nmax_trials = 3\nparticles = 100\n"
+    (tmp_path / "c.toml").write_text(short, encoding="utf-8")
+    config = load_config(tmp_path / "c.toml")
+    slips = {"subject": config.subject.model_copy(update={"data": tmp_path}),
+             "visit": config.visit.model_copy(update={"intensity_pct_rmt": 1.2})}  # fmt: skip
+    session_for(config.model_copy(update={**slips, "log": tmp_path / "old.mcap"})).run()
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    for command in ("show", "plot", "resume"):
+        result = isiw(command, "old.mcap")
+        assert result.exit_code == 0, result.output
+
+
+def test_a_simulated_session_does_not_go_on_with_another_simulated_person(isiw: Command, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text("[strategy.settings]\nmax_trials = 2\nparticles = 100\n", encoding="utf-8")
+    isiw("run", "c.toml", "--seed", 3, "--log", "s.mcap")
+    refused = isiw("resume", "s.mcap", "c.toml")
+    assert refused.exit_code == 1
+    assert "simulates another person" in refused.output
+    assert isiw("resume", "s.mcap").exit_code == 0
 
 
 @pytest.mark.parametrize("source", ["nope.mcap", ".", "logs/P01"])

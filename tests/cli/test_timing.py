@@ -45,6 +45,14 @@ def test_an_unknown_source_is_a_message_with_the_presets(tmp_path: Path) -> None
     assert "there is no such log" in run(tmp_path / "nothing.mcap").output
 
 
+def test_a_folder_of_the_name_of_a_preset_is_none_of_its_business(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cushion").mkdir()
+    assert run("cushion", "--taps", 2).exit_code == 0
+
+
 class NoResponse:
     mep_mv = 0.0
 

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -63,10 +65,38 @@ def test_amplitudes_that_are_all_zero_are_doubted_and_find_nothing(tmp_path: Pat
     assert [event.trial for event in record.events if event.kind == "doubt"] == [9]
     assert not record.rests_on_data
     said = isiw.report.final_statement(record)
-    assert "No MEP was seen in any trial" in said
+    assert "No MEP was seen in any trial that counts" in said
     assert "The amplitudes of all 12 trials that count are 0" in said
     for confident in ("No window was found", "excluded", "expected F1", "There is no window"):
         assert confident not in said
     assert "No MEP was seen" in str(record)
     with pytest.raises(LogError, match="no MEP to learn from"):
         isiw.priors.learn([record.path])
+
+
+@pytest.mark.parametrize(("limit_mv", "silent"), [(None, True), (0.005, True), (0.05, False)])
+def test_zeros_below_a_high_detection_limit_are_a_finding(
+    tmp_path: Path, limit_mv: float | None, *, silent: bool, recwarn: pytest.WarningsRecorder
+) -> None:
+    known: dict[str, Any] = {} if limit_mv is None else {"detection_limit_mv": limit_mv}
+    strategy = isiw.make_strategy("default", particles=100, **known)
+    with isiw.open_session(strategy, tmp_path / "zeros.mcap") as session:
+        for _ in range(11):
+            session.tell(session.ask(), 0.0)
+    record = isiw.read_session(tmp_path / "zeros.mcap")
+    assert record.is_silent == silent
+    assert bool(recwarn.list) == silent
+
+
+def test_the_reason_of_a_pause_is_said_also_where_no_mep_was_seen(tmp_path: Path) -> None:
+    with isiw.open_session(scripted_strategy(4), tmp_path / "zeros.mcap") as session:
+        for _ in range(4):
+            session.tell(session.ask(), 0.0)
+    record = isiw.read_session(tmp_path / "zeros.mcap")
+    for reason, is_said in (
+        ("The session is paused: the window of the booth is open.", True),
+        ("The limit of 4 pulses is reached.", True),
+        ("There is no window, with probability 0.95.", False),
+    ):
+        last = record.estimates[-1].model_copy(update={"reason": reason})
+        assert (reason in isiw.report.final_statement(replace(record, history=(*record.history, last)))) == is_said

@@ -60,12 +60,31 @@ def shown(desk: Desk, capsys: pytest.CaptureFixture[str]) -> Iterator[list[str]]
 def test_keys_mean_the_trial_on_the_screen_not_one_delivered_since() -> None:
     session = Operated(trial(0), trial(1))
     desk = Desk(session)
+    desk.shown = 1
     session.trials = TrialTable((trial(0), trial(1), trial(2)))
     press(desk, "xj")
     assert session.done == [("exclude", 1, "Excluded by the operator."), ("reject", 1)]
     desk.shown = 2
     press(desk, "j")
     assert session.done[-1] == ("reject", 2)
+
+
+def test_where_no_row_is_shown_keys_mean_the_last_trial() -> None:
+    session = Operated(trial(0), trial(1))
+    press(Desk(session), "x")
+    assert session.done == [("exclude", 1, "Excluded by the operator.")]
+
+
+def test_in_a_pause_keys_mean_the_last_trial_and_it_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    session = Operated(trial(0), trial(1))
+    desk = Desk(session)
+    desk.shown = 0
+    desk.leave()
+    with shown(desk, capsys) as lines:
+        assert not desk.goes_on("Paused by the operator.")
+        press(desk, "x")
+    assert any("Trial 1 was delivered; its row comes when the session goes on" in line for line in lines)
+    assert session.done == [("exclude", 1, "Excluded by the operator.")]
 
 
 def test_each_key_does_what_it_stands_for(capsys: pytest.CaptureFixture[str]) -> None:

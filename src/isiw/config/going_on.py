@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
 from collections.abc import Iterator
 from typing import Any
 
-from isiw.config.run import RunConfig
+from isiw.config.run import RunConfig, config_of_log, has_truth
 from isiw.devices.limits import Limits
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord
@@ -19,17 +20,18 @@ __all__ = ["changes_on_resume", "differences_on_resume"]
 def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any]:
     """What a session goes on with, as arguments of `isiw.resume`: limits, signals and the device's time-out.
 
-    A section that the file does not have stays as it was logged last.
+    `[limits]` and `[signals]` count as wholes, as for `isiw run`; without one of them it stays as it was logged last.
 
     Args:
         config: read from a file.
         record: the session.
 
     Raises:
-        ConfigError: the file has another design space than the session.
+        ConfigError: the file has another design space, or simulates another person, than the session.
     """
     header, given = record.header, config.model_fields_set
     _require_space(config, header)
+    _require_same_simulated(config, record)
     changes: dict[str, Any] = {"limits": _limits(config, header.limits)}
     if "signals" in given:
         changes["signals"] = config.signals
@@ -41,25 +43,26 @@ def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any
 def differences_on_resume(config: RunConfig, record: SessionRecord) -> tuple[str, ...]:
     """What the file says otherwise than the log, in words: what changes, and what a session does not change on its way.
 
+    Of limits, signals and time-out, which change, and of strategy, protocol and visit, which do not.
+
     Args:
         config: read from a file.
         record: the session.
     """
-    header = record.header
-    changes = (("limits", header.limits, _limits(config, header.limits)), ("signals", header.signals, config.signals))
+    header, changes = record.header, changes_on_resume(config, record)
     changed = [
-        f"{name}.{key} is {_told(now)} from here on; it was {_told(was)}."
-        for name, before, after in changes
-        if name in config.model_fields_set
-        for key, was, now in _fields(before, after)
-        if was != now
+        *_differing("limits", header.limits, changes["limits"]),
+        *_differing("signals", header.signals, changes.get("signals", header.signals)),
+        ("device.timeout_s", header.timeout_s, changes.get("timeout_s", header.timeout_s)),
     ]
-    kept = [
-        f"{key} stays as the session began, {_told(was)}; the configuration says {_told(now)}."
-        for key, was, now in _unchangeable(config, header)
-        if was != now
-    ]
-    return (*changed, *kept)
+    return (
+        *(f"{key} is {_told(now)} from here on; it was {_told(was)}." for key, was, now in changed if was != now),
+        *(
+            f"{key} stays as the session began, {_told(was)}; the configuration says {_told(now)}."
+            for key, was, now in _unchangeable(config, header)
+            if was != now
+        ),
+    )
 
 
 def _limits(config: RunConfig, logged: Limits) -> Limits:
@@ -69,17 +72,31 @@ def _limits(config: RunConfig, logged: Limits) -> Limits:
 def _require_space(config: RunConfig, header: Header) -> None:
     if "space" not in config.model_fields_set or (space := config.space.design()) == header.space:
         return
+    differing = [(key, was, now) for key, was, now in _differing("space", header.space, space) if was != now]
     raise ConfigError(
         "a session goes on in the design space that it began with",
-        got=f"{space} in the configuration",
-        expected=f"{header.space}",
+        got=", ".join(f"{key} = {now}" for key, _, now in differing),
+        expected=", ".join(f"{key} = {was}" for key, was, _ in differing),
         remedy="Correct [space], or start a new session with isiw run.",
     )
 
 
-def _fields(before: Any, after: Any) -> Iterator[tuple[str, object, object]]:
+def _require_same_simulated(config: RunConfig, record: SessionRecord) -> None:
+    if not has_truth(record):
+        return
+    was = config_of_log(record)
+    if (was.seed, was.subject) != (config.seed, config.subject):
+        raise ConfigError(
+            "the configuration simulates another person",
+            got=f"seed {config.seed}, {config.subject}",
+            expected=f"seed {was.seed}, {was.subject}",
+            remedy=f"The log knows its simulated person: isiw resume {shlex.quote(str(record.path))}",
+        )
+
+
+def _differing(name: str, before: Any, after: Any) -> Iterator[tuple[str, object, object]]:
     for field in dataclasses.fields(before):
-        yield field.name, getattr(before, field.name), getattr(after, field.name)
+        yield f"{name}.{field.name}", getattr(before, field.name), getattr(after, field.name)
 
 
 def _unchangeable(config: RunConfig, header: Header) -> Iterator[tuple[str, object, object]]:
@@ -92,12 +109,13 @@ def _unchangeable(config: RunConfig, header: Header) -> Iterator[tuple[str, obje
                 now = strategy.recipe.settings.get(key)
                 yield f"strategy.settings.{key}", header.strategy.settings.get(key, now), now
     if "protocol" in given:
-        for key, was, now in _fields(header.protocol, config.protocol):
-            yield f"protocol.{key}", was, now
+        yield from _differing("protocol", header.protocol, config.protocol)
     noted = config.visit.noted()
     for name in config.visit.model_fields_set - {"subject"}:
         yield f"visit.{name}", getattr(header.visit, name), getattr(noted, name)
 
 
 def _told(value: object) -> object:
+    if isinstance(value, dict):
+        return "another one"
     return "not set" if value in (None, "") else value

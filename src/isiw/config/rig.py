@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -33,16 +34,16 @@ def device_from_factory(factory: str, settings: Mapping[str, Any], folder: Path 
         ConfigError: it cannot be imported, does not take the settings, or makes no device.
     """
     module_name, _, name = factory.partition(":")
-    _make_importable(folder)
-    try:
-        make = getattr(importlib.import_module(module_name), name)
-    except (ImportError, AttributeError) as error:
-        raise ConfigError(
-            f"device.factory cannot be imported: {error}",
-            got=factory,
-            expected="module:function, such as mylab.rig:make",
-            remedy=f"The module is looked for in {folder or 'the installed packages'} first.",
-        ) from error
+    with _importable(folder):
+        try:
+            make = getattr(importlib.import_module(module_name), name)
+        except (ImportError, AttributeError) as error:
+            raise ConfigError(
+                f"device.factory cannot be imported: {error}",
+                got=factory,
+                expected="module:function, such as mylab.rig:make",
+                remedy=f"The module is looked for in {folder or 'the installed packages'} first.",
+            ) from error
     try:
         device = make(**settings)
     except TypeError as error:
@@ -59,10 +60,22 @@ def device_from_factory(factory: str, settings: Mapping[str, Any], folder: Path 
     return device
 
 
-def _make_importable(folder: Path | None) -> None:
-    """Let modules of a folder be imported from here on, before others of their name; drivers often are, later."""
-    if folder is not None and sys.path[:1] != [str(folder)]:
-        sys.path.insert(0, str(folder))
+@contextmanager
+def _importable(folder: Path | None) -> Iterator[None]:
+    """Within, modules of a folder can be imported before any others of their name; later, after them.
+
+    Drivers are often imported late, and a lab's file may have the name of a module that isiw imports late.
+    """
+    if folder is None:
+        yield
+        return
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        if str(folder) not in sys.path:
+            sys.path.append(str(folder))
 
 
 def write_rig_template(folder: str | Path) -> tuple[Path, ...]:

@@ -30,7 +30,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, DeviceInfo
 from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
-from isiw.errors import ConfigError, InvalidValueError
+from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import RUN_KEY
 from isiw.models.particles.prior import Prior
@@ -84,16 +84,6 @@ class SubjectConfig(_Section):
     @classmethod
     def _known(cls, name: str) -> str:
         return str(choice("the cohort", name, COHORTS))
-
-    @model_validator(mode="after")
-    def _data_are_used(self) -> Self:
-        if self.data is not None and self.kind != "recorded":
-            raise ConfigError(
-                "recordings are for a subject of the kind recorded, and would be ignored",
-                got=str(self.data),
-                remedy='Add --subject recorded, or kind = "recorded" under [subject]; or leave the data out.',
-            )
-        return self
 
 
 class SpaceConfig(_Section):
@@ -169,18 +159,6 @@ class VisitConfig(_Section):
     intensity_pct_rmt: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     intensity_pct_mso: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     electrodes: str = ""
-
-    @field_validator("intensity_pct_rmt", "intensity_pct_mso")
-    @classmethod
-    def _in_percent(cls, intensity_pct: float | None) -> float | None:
-        if intensity_pct is not None and intensity_pct < LEAST_PCT:
-            raise InvalidValueError(
-                "an intensity is in %, and this is probably a ratio",
-                got=intensity_pct,
-                expected=f"at least {LEAST_PCT:g}",
-                remedy="Multiply it by 100: 90 for 90 %.",
-            )
-        return intensity_pct
 
     def noted(self) -> Visit:
         """What is noted about the visit."""
@@ -269,7 +247,21 @@ def load_config(path: str | Path | None = None) -> RunConfig:
     values = read_toml(path)
     if isinstance(values.get("device"), dict):  # a module of the user's own usually lies beside the file
         values["device"] = {"folder": Path(path).resolve().parent} | values["device"]
-    return _validated(values, str(path))
+    config = _validated(values, str(path))
+    _require_percent(config.visit)
+    return config
+
+
+def _require_percent(visit: VisitConfig) -> None:
+    for name in ("intensity_pct_rmt", "intensity_pct_mso"):
+        intensity_pct = getattr(visit, name)
+        if intensity_pct is not None and intensity_pct < LEAST_PCT:
+            raise ConfigError(
+                f"visit.{name} is in %, and this is probably a ratio",
+                got=intensity_pct,
+                expected=f"at least {LEAST_PCT:g}",
+                remedy="Multiply it by 100: 90 for 90 %.",
+            )
 
 
 def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
@@ -349,11 +341,12 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         on_trial: called after each trial.
 
     Raises:
-        ConfigError: no recordings, or no prior, where the configuration says; earlier sessions of another person, or
-            simulated ones where the device is real.
+        ConfigError: no recordings, or no prior, where the configuration says, or recordings that would be ignored;
+            earlier sessions of another person, or simulated ones where the device is real.
         LogError: an earlier session of the person that cannot be read, or has no accepted trial.
         StrategyError: a prior for a strategy that has none of this kind.
     """
+    _require_used(config.subject)
     space = config.space.design()
     log = config.log or fresh_log_path(config)
     device = device_for(config)
@@ -372,6 +365,15 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         visit=config.visit.noted(),
         protocol=config.protocol,
     )
+
+
+def _require_used(subject: SubjectConfig) -> None:
+    if subject.data is not None and subject.kind != "recorded":
+        raise ConfigError(
+            "recordings are for a subject of the kind recorded, and would be ignored",
+            got=str(subject.data),
+            remedy='Add --subject recorded, or kind = "recorded" under [subject]; or leave the data out.',
+        )
 
 
 def _settings_for(config: RunConfig, device: DeviceInfo) -> dict[str, Any]:

@@ -131,8 +131,8 @@ class LimitedDevice:
         state: object = self._device.readiness() if isinstance(self._device, ReportsReadiness) else Readiness()
         if not isinstance(state, Readiness):
             raise DeviceError(
-                "readiness() did not return an isiw.Readiness, so nothing is delivered",
-                got=repr(state),
+                "readiness() did not return an isiw.Readiness",
+                got=state,
                 remedy='Return Readiness(), or Readiness(ready=False, reason="...").',
             )
         return state

@@ -32,6 +32,7 @@ from isiw.log.schema import (
 from isiw.log.topics import decode
 from isiw.log.verdicts import VERDICTS, under_all
 from isiw.log.writer import CONFIGURATION
+from isiw.signals.plausibility import zeros_are_usual
 from isiw.strategy.stopping import StopDecision
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial, TrialTable
@@ -112,9 +113,10 @@ class SessionRecord:
 
     @property
     def is_silent(self) -> bool:
-        """Whether trials count, and the amplitude of each was 0, below the detection limit."""
+        """Whether enough trials count, and each amplitude was 0, where the detection limit is too low for that."""
         told = self.table.told
-        return bool(told) and all(trial.mep_mv == 0 for trial in told)
+        enough = len(told) >= ENOUGH_PAIRS and not zeros_are_usual(self.header.detection_limit_mv)
+        return enough and all(trial.mep_mv == 0 for trial in told)
 
     @property
     def is_judged_since(self) -> bool:

@@ -115,6 +115,12 @@ class Header(_Record):
     config: dict[str, Any] = Field(default_factory=dict)
     intensities: IntensityRange | None = None
 
+    @property
+    def detection_limit_mv(self) -> float | None:
+        """What an amplitude of 0 is known to be below [mV]: as the device states it, or as the strategy was told."""
+        told = self.strategy.settings.get("detection_limit_mv")
+        return self.device.detection_limit_mv if told is None else float(told)
+
 
 class Intent(_Record):
     """What is about to be delivered: a pair of stimuli, or without an ISI TMS alone or a tap alone."""

@@ -20,7 +20,7 @@ from isiw.models.particles.prior import Prior
 from isiw.priors.components import beside, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.priors.people import hyper_prior, people_of, usual_shares
 from isiw.priors.population import Law, Population, learnt
-from isiw.priors.recall import recalled
+from isiw.priors.recall import recalled, require_meps
 from isiw.types import Reference
 
 __all__ = ["LabPrior", "LearntSession", "learn"]
@@ -133,12 +133,14 @@ def learn(
         on_done: called after each session.
 
     Raises:
-        LogError: no list, no log in it, one that cannot be read or has no accepted trial, the same log or person
+        LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person
             twice, or sessions that count ISIs from different events, or of which some are simulated and others are not.
     """
     if isinstance(logs, str | Path):
         raise LogError("logs must be a list of paths", got=str(logs), remedy=f'Write ["{logs}"] for a single one.')
     records = [read_session(path) for path in logs]
+    for record in records:
+        require_meps(record)
     sessions = tuple(_learnt_session(record) for record in records)
     _require_different(records, sessions, again=again)
     prior, space = Prior(), records[0].header.space

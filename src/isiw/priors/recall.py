@@ -10,7 +10,7 @@ from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
 
-__all__ = ["recalled"]
+__all__ = ["recalled", "require_meps"]
 
 
 def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> ParticlePosterior:
@@ -25,6 +25,26 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
         LogError: it has no accepted trial, or none with an MEP.
         InvalidValueError: the prior's places count from another event than the session's ISIs.
     """
+    require_meps(record)
+    model = ParticleModel(_of_rig(prior, record), particles=particles)
+    if (limit_mv := record.header.device.detection_limit_mv) is not None:
+        model = replace(model, detection_limit_mv=limit_mv)
+    posterior = model.begin(record.header.space, seed=record.header.seed)
+    for trial in record.table.told:
+        told = Observation.of([trial.isi_ms], [trial.mep_mv], [trial.isi_sd_ms])
+        posterior = model.update(posterior, told)
+    return posterior
+
+
+def require_meps(record: SessionRecord) -> None:
+    """Check that there is something to learn from a session.
+
+    Args:
+        record: the session.
+
+    Raises:
+        LogError: it has no accepted trial, or none with an MEP.
+    """
     if not record.table.told:
         raise LogError(
             "the session has no accepted trial to learn from", got=str(record.path), remedy="Leave this log out."
@@ -35,14 +55,6 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
             got=str(record.path),
             remedy="Leave this log out.",
         )
-    model = ParticleModel(_of_rig(prior, record), particles=particles)
-    if (limit_mv := record.header.device.detection_limit_mv) is not None:
-        model = replace(model, detection_limit_mv=limit_mv)
-    posterior = model.begin(record.header.space, seed=record.header.seed)
-    for trial in record.table.told:
-        told = Observation.of([trial.isi_ms], [trial.mep_mv], [trial.isi_sd_ms])
-        posterior = model.update(posterior, told)
-    return posterior
 
 
 def _of_rig(prior: Prior, record: SessionRecord) -> Prior:

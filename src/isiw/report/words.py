@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shlex
 from collections import Counter
 
@@ -41,6 +42,9 @@ SURE = 0.95
 UNUSUAL = 0.9
 """Probability from which on a person is told to be unlike most."""
 
+_OF_THE_WINDOW = re.compile(r"^(?!The session is paused).*(window|F1|particles)")
+"""Reasons of a strategy to stop that say something about the window."""
+
 _AFTER = {"impact": "after the impact", "valve": "after the valve command"}
 
 
@@ -62,7 +66,7 @@ def final_statement(record: SessionRecord) -> str:
         counts_sentence(record),
         fit_sentence(record),
         _unstated_hit_delay(record),
-        "" if record.is_silent else last.reason,
+        "" if record.is_silent and _OF_THE_WINDOW.search(last.reason) else last.reason,
     ]
     if record.end_lost:
         sentences.append(
@@ -81,13 +85,16 @@ def final_statement(record: SessionRecord) -> str:
 def _resuming(record: SessionRecord) -> str:
     """What goes on with a session: a command, or the call that a loop of the lab's own was begun with."""
     if SERVED_KEY in record.header.config:
-        return f"POST /sessions/{log_of(record.path).stem}/resume, to isiw serve"
+        lost = ", with lost_pulses in its body" if record.end_lost else ""
+        return f"POST /sessions/{log_of(record.path).stem}/resume to isiw serve{lost}"
     if record.header.device.name == OWN_LOOP:
         lost = ", lost_pulses=N" if record.end_lost else ""
         return f'isiw.open_session(strategy, "{record.path}", resume=True{lost})'
     lost = "--lost-pulses N " if record.end_lost else ""
     command = f"isiw resume {lost}{shlex.quote(str(record.path))}"
-    return command if RUN_KEY in record.header.config else f"{command} CONFIG"
+    if RUN_KEY in record.header.config:
+        return command
+    return f"{command} CONFIG, or in your own software isiw.resume(path, device).run()"
 
 
 def finding_sentences(record: SessionRecord) -> list[str]:

@@ -59,8 +59,8 @@ class Desk:
         asking: whether a paused session goes on; others may answer, too.
 
     Attributes:
-        shown: the trial whose row the operator saw last, which is what the keys mean; a later one may have been
-            delivered.
+        shown: the trial whose row the operator saw last, which is what the keys mean, since a later one may have been
+            delivered; None where no row was shown.
         away: is entered while the keys are not heard.
     """
 
@@ -69,7 +69,7 @@ class Desk:
         self._note: str | None = None
         self._left_alone = False
         self._counted: int | None = None
-        self.shown = session.trials[-1].index if session.trials else None
+        self.shown: int | None = None
         self.away: Callable[[], AbstractContextManager[None]] = nullcontext
 
     @contextmanager
@@ -91,6 +91,9 @@ class Desk:
             reason: why it has paused.
         """
         self.screen.say(f"{reason} The device is disarmed. r goes on, q ends the session, which can be resumed later.")
+        if self.shown is not None and self.shown != (last := self._session.trials[-1].index):
+            self.shown = last
+            self.screen.say(f"Trial {last} was delivered; its row comes when the session goes on. x, a and j mean it.")
         if self._note is not None:
             self.screen.say("First finish the note with Enter, or drop it with Esc.")
         return self._asking.wait(lambda: self._left_alone)
@@ -163,9 +166,9 @@ class Desk:
         self.screen.say(f"Trial {number} {outcome}.")
 
     def _last(self) -> int:
-        if self.shown is None:
+        if not self._session.trials:
             raise InvalidValueError("there is no trial yet")
-        return self.shown
+        return self._session.trials[-1].index if self.shown is None else self.shown
 
     def _exclude(self) -> None:
         self._judge(

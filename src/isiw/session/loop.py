@@ -130,7 +130,8 @@ class Session(Judging):
 
     def _steps_with(self, strategy: Strategy) -> Steps:
         header, rig, journal, pausing = self._header, self._rig, self._journal, self._pausing
-        watch = Watch(header.space, header.signals, header.limits.max_consecutive_mistrials)
+        max_in_a_row = header.limits.max_consecutive_mistrials
+        watch = Watch(header.space, header.signals, max_in_a_row, header.detection_limit_mv)
         delivery = Delivery(rig, journal, pausing, watch, header.space, header.signals, header.timeout_s)
         return Steps(strategy, rig, journal, pausing, delivery, header, self._safeguards.backoffs_s)
 

@@ -28,7 +28,7 @@ from isiw.session.replay import replay, warn_where_differing
 from isiw.session.resume import ages_s, continued, require_as_real, resumption, with_lost_pulses
 from isiw.signals.faults import remedy_for
 from isiw.signals.judgement import SignalLimits
-from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
+from isiw.signals.plausibility import doubt_of, doubts_of, require_plausible
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
@@ -195,7 +195,12 @@ class Recorder(Judging):
         now_s = clock.now_s()
         self._made_s = now_s
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
-        self._doubted: set[DoubtKind] = set()
+        self._detection_limit_mv = header.detection_limit_mv
+        self._doubted = set(doubts_of(self._meps_mv, self._detection_limit_mv))
+
+    @property
+    def _meps_mv(self) -> list[float]:
+        return [trial.mep_mv for trial in self.trials.told if trial.mep_mv is not None]
 
     @property
     def asked(self) -> Stimulus | None:
@@ -287,7 +292,7 @@ class Recorder(Judging):
         trial = Trial(asked.trial, Status.ACCEPTED, asked.isi_ms, isi_ms=isi_ms, mep_mv=mep_mv,
                       isi_sd_ms=isi_sd_ms, background_rms_uv=background_rms_uv)  # fmt: skip
         self._conclude(trial)
-        doubt = doubt or doubt_of([known.mep_mv for known in self.trials.told if known.mep_mv is not None])
+        doubt = doubt or doubt_of(self._meps_mv, self._detection_limit_mv)
         if doubt is not None and doubt.kind not in self._doubted:
             self._doubted.add(doubt.kind)
             self._warn(doubt.text)

@@ -8,7 +8,7 @@ from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer
 from isiw.signals.faults import likely_fault, too_early_by_chance
 from isiw.signals.judgement import SignalLimits
-from isiw.signals.plausibility import DoubtKind, doubt_of
+from isiw.signals.plausibility import DoubtKind, doubt_of, doubts_of
 from isiw.trials import Trial, TrialTable
 
 __all__ = ["Watch"]
@@ -22,6 +22,7 @@ class Watch:
         space: the session's design space.
         signals: what its sweeps are judged by.
         max_in_a_row: how many trials in a row may be rejected, or show a faulty rig.
+        detection_limit_mv: what an amplitude of 0 is known to be below [mV]; None where nobody has said.
         in_a_row: how many there have been.
         meps_mv: the amplitudes told [mV].
         settled: doubts that a person has seen.
@@ -31,6 +32,7 @@ class Watch:
     space: DesignSpace
     signals: SignalLimits
     max_in_a_row: int
+    detection_limit_mv: float | None = None
     in_a_row: int = 0
     meps_mv: tuple[float, ...] = ()
     settled: frozenset[DoubtKind] = frozenset()
@@ -39,8 +41,7 @@ class Watch:
     def resumed(self, trials: TrialTable) -> Watch:
         """The same after earlier trials, whose doubts whoever resumes the session has seen."""
         meps_mv = tuple(trial.mep_mv for trial in trials.told if trial.mep_mv is not None)
-        doubts = (doubt_of(meps_mv[: n + 1]) for n in range(len(meps_mv)))
-        return replace(self, meps_mv=meps_mv, settled=frozenset(doubt.kind for doubt in doubts if doubt))
+        return replace(self, meps_mv=meps_mv, settled=doubts_of(meps_mv, self.detection_limit_mv))
 
     def seen(self) -> Watch:
         """The same after a person has seen the reason and went on."""
@@ -67,7 +68,7 @@ class Watch:
 
 def _with_amplitude(watch: Watch, mep_mv: float) -> Watch:
     meps_mv = (*watch.meps_mv, mep_mv)
-    doubt = doubt_of(meps_mv)
+    doubt = doubt_of(meps_mv, watch.detection_limit_mv)
     if doubt is None or doubt.kind in watch.settled:
         return replace(watch, meps_mv=meps_mv)
     return replace(watch, meps_mv=meps_mv, settled=watch.settled | {doubt.kind}, reason=watch.reason or doubt.text)

@@ -19,10 +19,12 @@ __all__ = [
     "Doubt",
     "DoubtKind",
     "doubt_of",
+    "doubts_of",
     "implausible_amplitude",
     "implausible_scale",
     "off_by",
     "require_plausible",
+    "zeros_are_usual",
 ]
 
 SMALLEST_MV = 2e-4
@@ -43,6 +45,9 @@ JUMP = 300.0
 IN_A_ROW = 3
 EQUAL_IN_A_ROW = 4
 SILENT_FROM_THE_START = 10
+
+MANY_BELOW_MV = 0.02
+"""Of a detection limit from here on, amplitudes of 0 are usual: most pulses below the threshold evoke less."""
 
 
 class DoubtKind(StrEnum):
@@ -158,22 +163,43 @@ def _require_in_place(isi_ms: float, mep_mv: float | None, asked_ms: float, spac
         )
 
 
-def doubt_of(meps_mv: Sequence[float]) -> Doubt | None:
+def doubt_of(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> Doubt | None:
     """What is odd about the last amplitudes of a person; None where nothing is.
 
     Args:
         meps_mv: all amplitudes told so far [mV], in order; 0 is below the detection limit.
+        detection_limit_mv: what an amplitude of 0 is known to be below [mV]; None where nobody has said.
     """
     last = list(meps_mv[-EQUAL_IN_A_ROW:])
     if len(last) == EQUAL_IN_A_ROW and len(set(last)) == 1 and last[0] > 0:
         text = f"The last {EQUAL_IN_A_ROW} amplitudes are exactly equal ({last[0]:g} mV). Is the EMG still recorded?"
         return Doubt(DoubtKind.EQUAL, text)
     seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
-    if len(meps_mv) >= SILENT_FROM_THE_START and not seen:
-        text = f"None of the first {SILENT_FROM_THE_START} pulses gave an MEP: every amplitude is 0."
+    if len(meps_mv) >= SILENT_FROM_THE_START and not seen and not zeros_are_usual(detection_limit_mv):
+        text = f"None of the first {len(meps_mv)} pulses gave an MEP: every amplitude is 0."
         ask = "Does the stimulator fire, is the EMG recorded, is the intensity enough?"
         return Doubt(DoubtKind.SILENT, f"{text} {ask}")
     return _doubt_of_scale(seen[:-IN_A_ROW], seen[-IN_A_ROW:]) if len(seen) >= IN_A_ROW else None
+
+
+def doubts_of(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> frozenset[DoubtKind]:
+    """What was odd about amplitudes on their way; whoever goes on with them has seen it.
+
+    Args:
+        meps_mv: as for `doubt_of`.
+        detection_limit_mv: as for `doubt_of`.
+    """
+    doubts = (doubt_of(meps_mv[: n + 1], detection_limit_mv) for n in range(len(meps_mv)))
+    return frozenset(doubt.kind for doubt in doubts if doubt)
+
+
+def zeros_are_usual(detection_limit_mv: float | None) -> bool:
+    """Whether amplitudes of 0 say little, since much is below the detection limit.
+
+    Args:
+        detection_limit_mv: the limit [mV]; None where nobody has said.
+    """
+    return detection_limit_mv is not None and detection_limit_mv >= MANY_BELOW_MV
 
 
 def _doubt_of_scale(earlier: Sequence[float], last: Sequence[float]) -> Doubt | None:

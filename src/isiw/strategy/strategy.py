@@ -241,7 +241,7 @@ class Strategy:
         asked_ms = None if self._choice is None else self._choice.isi_ms
         doubt = require_plausible(plain_ms, plain_mv, asked_ms, self.space)
         self.learn(isi_ms, mep_mv, response=response, isi_sd_ms=isi_sd_ms)
-        doubt = doubt or doubt_of(self._meps_mv)
+        doubt = doubt or doubt_of(self._meps_mv, self.recipe.settings.get("detection_limit_mv"))
         if doubt is not None and doubt.kind not in self._doubted:
             self._doubted.add(doubt.kind)
             warnings.warn(doubt.text, ImplausibleDataWarning, stacklevel=2)
