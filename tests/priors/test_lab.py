@@ -10,11 +10,13 @@ from typing import Any
 import pytest
 import torch
 
+import isiw
 from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import ConfigError, InvalidValueError, LogError, StrategyError
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.prior import Prior
+from isiw.priors.recall import recalled
 from isiw.strategy.catalogue import make_strategy
 from known import instance
 from priors.logged import gaussian_person, write_log
@@ -190,3 +192,11 @@ def test_the_next_person_may_still_be_anyone(lab: Any) -> None:
     latents = usual.sample(1, 500, torch.Generator().manual_seed(1), VALVE_SPACE)
     ratio = joined.log_density(latents.values, VALVE_SPACE) - usual.log_density(latents.values, VALVE_SPACE)
     assert ratio.min() > 4 * torch.log(torch.tensor(0.1))  # four blocks have laws
+
+
+def test_zeros_are_recalled_as_below_the_limit_that_the_strategy_was_told(tmp_path: Path) -> None:
+    strategy = make_strategy("default", particles=100, detection_limit_mv=0.05)
+    with isiw.open_session(strategy, tmp_path / "s.mcap") as session:
+        session.tell(session.ask(), 0.0)
+    recall = recalled(isiw.read_session(tmp_path / "s.mcap"), Prior(), particles=100)
+    assert recall.model.detection_limit_mv == 0.05

@@ -19,13 +19,21 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from isiw.checks import choice
 from isiw.config.rig import device_from_factory
-from isiw.design import DesignSpace
+from isiw.config.sections import (
+    TIMEOUT_S,
+    DeviceConfig,
+    LimitsConfig,
+    Section,
+    SpaceConfig,
+    StrategyConfig,
+    SubjectConfig,
+    VisitConfig,
+)
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, DeviceInfo
 from isiw.devices.recorded import RecordedPerson, load_recordings
@@ -38,12 +46,11 @@ from isiw.priors import after, read_lab_prior
 from isiw.session.loop import Session
 from isiw.session.updates import SessionUpdate
 from isiw.signals.judgement import SignalLimits
-from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
-from isiw.subjects.cohorts import COHORTS, cohort
+from isiw.strategy.catalogue import known_settings, make_strategy
+from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
 from isiw.text.toml_files import checked, read_toml
-from isiw.types import Reference
-from isiw.visit import Visit, VisitProtocol
+from isiw.visit import VisitProtocol
 from isiw.window import Window
 
 __all__ = [
@@ -62,110 +69,11 @@ __all__ = [
 SESSIONS = Path("isiw-sessions")
 """The folder for logs of sessions without a path."""
 
-TIMEOUT_S = 30.0
-
 LEAST_PCT = 3.0
 """Nobody stimulates with so low an intensity; 1.2 is meant as 120 %."""
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class SubjectConfig(_Section):
-    """Who is stimulated: a simulated person, whose MEPs may be put into recorded EMG."""
-
-    kind: Literal["simulated", "recorded"] = "simulated"
-    cohort: str = "recruitment"
-    number: int = Field(default=0, ge=0, lt=10_000)
-    data: Path | None = None
-
-    @field_validator("cohort")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        return str(choice("the cohort", name, COHORTS))
-
-
-class SpaceConfig(_Section):
-    """The design space, as in `isiw.DesignSpace`."""
-
-    low_ms: float = 0.0
-    high_ms: float = 500.0
-    step_ms: float = 1.0
-    reference: Reference = "valve"
-    tolerance_ms: float = 10.0
-
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
-        self.design()
-        return self
-
-    def design(self) -> DesignSpace:
-        """The design space."""
-        return DesignSpace(**self.model_dump())
-
-
-class StrategyConfig(_Section):
-    """The strategy: a name from `isiw.list_strategies()`, and its settings by key."""
-
-    name: str = "default"
-    settings: dict[str, Any] = Field(default_factory=dict)
-
-    @field_validator("name")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        return str(choice("the strategy", name, list_strategies()))
-
-    @field_validator("settings")
-    @classmethod
-    def _possible(cls, settings: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
-        if "name" in info.data:
-            settings_for(info.data["name"], **settings)
-        return settings
-
-
-class LimitsConfig(_Section):
-    """The limits, as in `isiw.Limits`; the ISI is limited to the grid of the design space."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-    min_iti_s: float = Field(default=5.0, ge=0.0)
-    max_pulses: int = Field(default=200, ge=1)
-    max_block_pulses: int | None = Field(default=None, ge=1)
-    rest_s: float = Field(default=120.0, gt=0.0)
-    max_period_pulses: int | None = Field(default=None, ge=1)
-    period_s: float = Field(default=3600.0, gt=0.0)
-    max_coil_c: float | None = None
-    intensity_pct_mso: float | None = Field(default=None, ge=0.0)
-    max_consecutive_mistrials: int = Field(default=3, ge=1)
-
-
-class DeviceConfig(_Section):
-    """A lab's own rig: what makes it, with which settings; a log never names it."""
-
-    factory: str = Field(pattern=r"^[\w.]+:\w+$")
-    settings: dict[str, Any] = Field(default_factory=dict)
-    folder: Path | None = None
-    timeout_s: float = Field(default=TIMEOUT_S, gt=0.0, allow_inf_nan=False)
-
-
-class VisitConfig(_Section):
-    """Who is examined, and what is noted about it, as in `isiw.Visit`."""
-
-    subject: str = ""
-    day: int | None = Field(default=None, ge=1)
-    operator: str = ""
-    muscle: str = ""
-    intensity_pct_rmt: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
-    intensity_pct_mso: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
-    electrodes: str = ""
-
-    def noted(self) -> Visit:
-        """What is noted about the visit."""
-        return Visit(**self.model_dump(exclude={"subject"}))
-
-
-class RunConfig(_Section):
+class RunConfig(Section):
     """The whole configuration of `isiw run`; with a device, nobody is simulated."""
 
     seed: int = Field(default=0, ge=0)

@@ -27,7 +27,7 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
     """
     require_meps(record)
     model = ParticleModel(_of_rig(prior, record), particles=particles)
-    if (limit_mv := record.header.device.detection_limit_mv) is not None:
+    if (limit_mv := record.header.detection_limit_mv) is not None:
         model = replace(model, detection_limit_mv=limit_mv)
     posterior = model.begin(record.header.space, seed=record.header.seed)
     for trial in record.table.told:

@@ -60,7 +60,7 @@ def final_statement(record: SessionRecord) -> str:
     require_records((record,))
     if not record.estimates:
         return "No trial has been completed."
-    last = record.estimates[-1]
+    last, way_on = record.estimates[-1], _resuming(record)
     sentences = [
         *finding_sentences(record),
         counts_sentence(record),
@@ -70,11 +70,10 @@ def final_statement(record: SessionRecord) -> str:
     ]
     if record.end_lost:
         sentences.append(
-            "The log's end is missing; go on with the number of pulses that the stimulator counted besides: "
-            f"{_resuming(record)}"
+            f"The log's end is missing; go on with the number of pulses that the stimulator counted besides: {way_on}"
         )
     elif not last.stop:
-        sentences.append(f"The session is not over; go on with: {_resuming(record)}")
+        sentences.append(f"The session is not over; go on with: {way_on}")
     if record.is_judged_since:
         sentences.append(
             "Trials were judged anew after this estimate; resume the session to have it with what counts now."

@@ -11,7 +11,7 @@ from fastapi import Request
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from isiw.config.run import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig
+from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig
 from isiw.errors import IsiwError
 from isiw.log.schema import MOST_TRIALS
 from isiw.server.refusals import Refusal

@@ -1,0 +1,128 @@
+"""The sections of a configuration file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+
+from isiw.checks import choice
+from isiw.design import DesignSpace
+from isiw.strategy.catalogue import list_strategies, settings_for
+from isiw.subjects.cohorts import COHORTS
+from isiw.types import Reference
+from isiw.visit import Visit
+
+__all__ = [
+    "TIMEOUT_S",
+    "DeviceConfig",
+    "LimitsConfig",
+    "Section",
+    "SpaceConfig",
+    "StrategyConfig",
+    "SubjectConfig",
+    "VisitConfig",
+]
+
+TIMEOUT_S = 30.0
+"""How long a device may take for one delivery [s], where the file does not say."""
+
+
+class Section(BaseModel):
+    """A section of a configuration file; it has no other keys than these."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class SubjectConfig(Section):
+    """Who is stimulated: a simulated person, whose MEPs may be put into recorded EMG."""
+
+    kind: Literal["simulated", "recorded"] = "simulated"
+    cohort: str = "recruitment"
+    number: int = Field(default=0, ge=0, lt=10_000)
+    data: Path | None = None
+
+    @field_validator("cohort")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return str(choice("the cohort", name, COHORTS))
+
+
+class SpaceConfig(Section):
+    """The design space, as in `isiw.DesignSpace`."""
+
+    low_ms: float = 0.0
+    high_ms: float = 500.0
+    step_ms: float = 1.0
+    reference: Reference = "valve"
+    tolerance_ms: float = 10.0
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        self.design()
+        return self
+
+    def design(self) -> DesignSpace:
+        """The design space."""
+        return DesignSpace(**self.model_dump())
+
+
+class StrategyConfig(Section):
+    """The strategy: a name from `isiw.list_strategies()`, and its settings by key."""
+
+    name: str = "default"
+    settings: dict[str, Any] = Field(default_factory=dict)
+
+    @field_validator("name")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return str(choice("the strategy", name, list_strategies()))
+
+    @field_validator("settings")
+    @classmethod
+    def _possible(cls, settings: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        if "name" in info.data:
+            settings_for(info.data["name"], **settings)
+        return settings
+
+
+class LimitsConfig(Section):
+    """The limits, as in `isiw.Limits`; the ISI is limited to the grid of the design space."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    min_iti_s: float = Field(default=5.0, ge=0.0)
+    max_pulses: int = Field(default=200, ge=1)
+    max_block_pulses: int | None = Field(default=None, ge=1)
+    rest_s: float = Field(default=120.0, gt=0.0)
+    max_period_pulses: int | None = Field(default=None, ge=1)
+    period_s: float = Field(default=3600.0, gt=0.0)
+    max_coil_c: float | None = None
+    intensity_pct_mso: float | None = Field(default=None, ge=0.0)
+    max_consecutive_mistrials: int = Field(default=3, ge=1)
+
+
+class DeviceConfig(Section):
+    """A lab's own rig: what makes it, with which settings; a log never names it."""
+
+    factory: str = Field(pattern=r"^[\w.]+:\w+$")
+    settings: dict[str, Any] = Field(default_factory=dict)
+    folder: Path | None = None
+    timeout_s: float = Field(default=TIMEOUT_S, gt=0.0, allow_inf_nan=False)
+
+
+class VisitConfig(Section):
+    """Who is examined, and what is noted about it, as in `isiw.Visit`."""
+
+    subject: str = ""
+    day: int | None = Field(default=None, ge=1)
+    operator: str = ""
+    muscle: str = ""
+    intensity_pct_rmt: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
+    intensity_pct_mso: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
+    electrodes: str = ""
+
+    def noted(self) -> Visit:
+        """What is noted about the visit."""
+        return Visit(**self.model_dump(exclude={"subject"}))
