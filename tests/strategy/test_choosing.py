@@ -13,6 +13,7 @@ import torch
 from isiw.acquisition.fixed import EvenSpacing, RandomIsi
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.models.dissertation.bootstrap import BootstrapPosterior
+from isiw.models.particles import ParticlePosterior
 from isiw.models.protocol import Observation, Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choosing import Choice, Course, Method, best_choices, candidate_isis, evenly_spaced
@@ -98,6 +99,22 @@ def test_where_the_acquisition_function_draws_each_person_has_one_of_their_own()
     alone = [course("even", 1, acquisitions=(RandomIsi(seed),)).choices[0] for seed in range(3)]
     assert list(several.choices) == alone
     assert len(set(alone)) > 1
+
+
+def test_isis_are_chosen_as_usual_and_windows_estimated_as_believed() -> None:
+    scored = list[Posterior]()
+
+    class Recording(EvenSpacing):
+        def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+            scored.append(posterior)
+            return super().__call__(posterior, isi_ms)
+
+    going = told(course("default", people=1, acquisitions=(Recording(),)))
+    assert going.choices
+    posterior = instance(ParticlePosterior, going.posterior)
+    assert scored == [posterior.as_usual]
+    assert not torch.equal(posterior.as_usual.swarm.log_weights, posterior.swarm.log_weights)
+    assert going.estimate().probability == posterior.estimate().probability
 
 
 def test_a_rule_remembers_as_much_as_it_looks_back_on() -> None:

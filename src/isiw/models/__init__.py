@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from isiw.models.protocol import (
     Conditions,
+    ExpectsTheUsual,
     HasBotorchModel,
     HasEvidence,
     Observation,
@@ -20,6 +21,7 @@ from isiw.models.protocol import (
 
 __all__ = [
     "Conditions",
+    "ExpectsTheUsual",
     "HasBotorchModel",
     "HasEvidence",
     "Observation",

@@ -23,6 +23,7 @@ from isiw.window import Window, WindowEstimate
 
 __all__ = [
     "Conditions",
+    "ExpectsTheUsual",
     "HasBotorchModel",
     "HasEvidence",
     "Observation",
@@ -201,6 +202,15 @@ class ProposesIsi(Protocol):
 
     def proposed_isis_ms(self) -> Tensor:
         """The ISIs [ms] that it wants for each person, in order, before it learns anything, shape (b, k)."""
+
+
+@runtime_checkable
+class ExpectsTheUsual(Protocol):
+    """Capability: a belief that allows for more than is worth a trial, so that ISIs are chosen with another."""
+
+    @property
+    def as_usual(self) -> Posterior:
+        """The same trials under a prior that holds the unusual for less probable; ISIs are chosen with it."""
 
 
 @runtime_checkable

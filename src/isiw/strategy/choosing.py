@@ -17,7 +17,7 @@ import torch
 from isiw.acquisition.fixed import golden_index
 from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
 from isiw.design import DesignSpace
-from isiw.models.protocol import Observation, Posterior, ProposesIsi, ResponseModel, Tensor
+from isiw.models.protocol import ExpectsTheUsual, Observation, Posterior, ProposesIsi, ResponseModel, Tensor
 from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
 from isiw.window import WindowEstimate
 
@@ -198,6 +198,8 @@ class Course:
         Args:
             posterior: what is believed, or imagined.
         """
+        if isinstance(posterior, ExpectsTheUsual):
+            posterior = posterior.as_usual
         first, *others = self.method.acquisitions
         best = self._best(posterior, first)
         return best if not others else (best[0], *(self._best(posterior, a)[1 + i] for i, a in enumerate(others)))

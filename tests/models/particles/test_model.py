@@ -351,3 +351,33 @@ def test_mutual_information_agrees_with_brute_force_within_its_error(isi_ms: flo
     error = information.std().item() / math.sqrt(len(information))
     score = mutual_information(posterior, torch.tensor([isi_ms])).item()
     assert score == pytest.approx(information.mean().item(), abs=3 * error)
+
+
+def test_isis_are_chosen_with_the_usual_more_probable_and_the_rest_is_believed_as_ever() -> None:
+    model = ParticleModel(particles=20_000, thinned=20_000, unusual_kept=0.1)
+    posterior = model.begin(VALVE_SPACE, 1)
+    asking = posterior.as_usual
+    usual = replace(model, prior=model.prior_where_asking).begin(VALVE_SPACE, 1)
+    late = GRID > 400.0
+    believed, expected, reached = (
+        float(p.window_masks(GRID).mean((0, 1))[late].sum()) for p in (posterior, usual, asking)
+    )
+    assert expected < 0.6 * believed
+    assert reached == pytest.approx(expected, rel=0.1)
+    assert (asking.trials, asking.swarm.latents) == (posterior.trials, posterior.swarm.latents)
+    torch.testing.assert_close(asking.swarm.log_weights.exp().sum(), torch.tensor(1.0))
+
+
+def test_a_window_that_trials_show_to_be_late_is_asked_about_all_the_same() -> None:
+    trials = [(isi_ms, 0.3 if 300 <= isi_ms <= 400 else 0.008) for isi_ms in range(0, 500, 25)]
+    posterior = after(ParticleModel(), [(float(isi_ms), mep_mv) for isi_ms, mep_mv in trials])
+    weights = posterior.as_usual.swarm.log_weights.exp()
+    start_ms = posterior.swarm.latents.values[..., LATENTS.index("start_ms")]
+    assert (weights * (start_ms - 300.0).abs()).sum() < 40.0
+
+
+def test_where_everything_is_kept_isis_are_chosen_with_what_is_believed() -> None:
+    posterior = after(ParticleModel(unusual_kept=1.0), [(250.0, 0.1), (100.0, 0.01)])
+    torch.testing.assert_close(posterior.as_usual.swarm.log_weights, posterior.swarm.log_weights)
+    with pytest.raises(InvalidValueError, match="unusual_kept"):
+        ParticleModel(unusual_kept=1.5)

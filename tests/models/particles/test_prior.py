@@ -189,3 +189,14 @@ def test_a_usual_start_is_usual_with_whatever_rig_where_none_is_stated() -> None
     values = latents.values.clone()
     values[..., LATENTS.index("start_ms")] = 100.0  # too early for the robot
     assert prior.unusual(latents._replace(values=values), VALVE_SPACE)["the start of the window"] < 0.5
+
+
+@pytest.mark.parametrize("hit_delay_ms", [None, (180.0, 6.2)])
+def test_as_usual_unusual_windows_keep_a_part_of_their_probability(hit_delay_ms: Any) -> None:
+    profile = ProfilePrior(start=StartPrior(hit_delay_ms=hit_delay_ms))
+    usual = profile.as_usual(1 / 3)
+    assert [span.share for span in usual.start.spans] == pytest.approx([0.9, 0.1])
+    assert [width.share for width in usual.widths] == pytest.approx([0.9, 0.1])
+    assert usual.start.p_anywhere == pytest.approx(0.04 / 3)
+    assert (usual.p_window, usual.start.hit_delay_ms) == (profile.p_window, hit_delay_ms)
+    assert profile.as_usual(1.0) == profile

@@ -6,7 +6,7 @@ The first of several laws is what is usual, the others say what else may be.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Final
 
 from isiw.checks import check_numbers, check_probabilities
@@ -142,6 +142,17 @@ class ProfilePrior:
     def p_place(self) -> float:
         """Probability that a window is where earlier sessions say."""
         return math.fsum(place.share for place in self.places)
+
+    def as_usual(self, kept: float) -> ProfilePrior:
+        """The same with less probability of unusual starts and widths.
+
+        Args:
+            kept: the part of their probability that they keep.
+        """
+        first, *others = self.widths
+        less = tuple(replace(width, share=kept * width.share) for width in others)
+        usual = replace(first, share=1.0 - math.fsum(width.share for width in less))
+        return replace(self, start=self.start.as_usual(kept), widths=(usual, *less))
 
     def require_space(self, space: DesignSpace) -> None:
         """Check that the places mean something in a space.

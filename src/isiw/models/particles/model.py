@@ -8,7 +8,7 @@ from functools import cached_property
 
 import torch
 
-from isiw.checks import MOST_OF_A_KIND, check_numbers, check_wholes
+from isiw.checks import MOST_OF_A_KIND, check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
@@ -42,6 +42,8 @@ class ParticleModel:
         moves: how often particles move, and when they are resampled.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a told response is known to be above [mV].
+        unusual_kept: the part of their probability that unusual starts and widths of the window keep where the next ISI
+            is chosen; what is believed and reported keeps all of it.
         device: torch device.
 
     Raises:
@@ -54,12 +56,19 @@ class ParticleModel:
     moves: Moving = field(default_factory=Moving)
     detection_limit_mv: float = 0.005
     response_threshold_mv: float = 0.02
+    unusual_kept: float = 1 / 3
     device: str = "cpu"
 
     def __post_init__(self) -> None:
         check_wholes(self, "particles", least=2, most=MOST_OF_A_KIND)  # half of them move at a time
         check_wholes(self, "thinned", least=1, most=MOST_OF_A_KIND)
         check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
+        check_probabilities(self, "unusual_kept")
+
+    @cached_property
+    def prior_where_asking(self) -> Prior:
+        """The prior that ISIs are chosen with."""
+        return replace(self.prior, profile=self.prior.profile.as_usual(self.unusual_kept))
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
         """The posterior before the first trial.
@@ -137,6 +146,13 @@ class ParticlePosterior:
     def person(self) -> Person:
         """What the particles mean."""
         return self.model.prior.person(self.swarm.latents)
+
+    @cached_property
+    def as_usual(self) -> ParticlePosterior:
+        """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
+        latents, usual = self.swarm.latents, self.model.prior_where_asking
+        ratio = usual.log_place(latents.values, self.space) - self.model.prior.log_place(latents.values, self.space)
+        return replace(self, swarm=self.swarm.times(torch.where(latents.present, ratio, 0.0)))
 
     @cached_property
     def _thinned(self) -> PersonSample:

@@ -157,7 +157,7 @@ class Prior:
         """
         if not self.profile.p_place:
             return self.profile.start.log_density(values[..., 0], space) + self._joint.log_density(values[..., 1:])
-        return torch.logsumexp(self.log_places(values, space), dim=-1) + self._beside_place.log_density(values[..., 2:])
+        return self.log_place(values, space) + self._beside_place.log_density(values[..., 2:])
 
     def log_densities(self, values: Tensor, space: DesignSpace) -> dict[str, Tensor]:
         """Log density of the latents of each block, shape (b, p); start and width are one: `"place"`.
@@ -169,7 +169,7 @@ class Prior:
         sizes = [len(names) for names in BLOCKS.values()]
         parts = dict(zip(BLOCKS, torch.split(values, sizes, dim=-1), strict=True))
         others = {name: mixture for name, mixture in self.mixtures.items() if name != "width"}
-        place = {"place": torch.logsumexp(self.log_places(values, space), dim=-1)}
+        place = {"place": self.log_place(values, space)}
         return place | {name: mixture.log_density(parts[name]) for name, mixture in others.items()}
 
     def log_places(self, values: Tensor, space: DesignSpace) -> Tensor:
@@ -186,6 +186,16 @@ class Prior:
             return anywhere
         places = math.log(share) + self._places.log_parts(values[..., :2])
         return torch.cat([math.log1p(-share) + anywhere, places], dim=-1)
+
+    def log_place(self, values: Tensor, space: DesignSpace) -> Tensor:
+        """Log density of start and width, shape (b, p).
+
+        Args:
+            values: latents, shape (b, p, d).
+            space: the design space that the window is in.
+        """
+        density: Tensor = torch.logsumexp(self.log_places(values, space), dim=-1)
+        return density
 
     @cached_property
     def _places(self) -> Mixture:

@@ -98,6 +98,14 @@ class Swarm(Generic[L]):
         """What is wrong with the particles; see `isiw.models.protocol.ReportsTrouble`."""
         return None if self.health is None else trouble_of(self.health)
 
+    def times(self, log_ratio: Tensor) -> Swarm[L]:
+        """The same particles under another prior.
+
+        Args:
+            log_ratio: log of its density over that of the prior so far, shape (b, p).
+        """
+        return replace(self, log_weights=torch.log_softmax(self.log_weights + log_ratio, dim=-1))
+
     def told(self, trial: History, person: Person) -> Swarm[L]:
         """The same particles, weighted by one more trial as well.
 

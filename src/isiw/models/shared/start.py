@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -137,6 +137,17 @@ class StartPrior:
         usual = spans[:: len(self.spans)].sum(0)  # the first of all spans is there once for each kind of rig
         even = self.p_anywhere / (space.high_ms - space.low_ms + BEFORE_MS)
         return (1.0 - self.p_anywhere) * usual / ((1.0 - self.p_anywhere) * spans.sum(0) + even)
+
+    def as_usual(self, kept: float) -> StartPrior:
+        """The same with less probability of all but the usual span.
+
+        Args:
+            kept: the part of their probability that the others keep.
+        """
+        first, *others = self.spans
+        less = tuple(replace(span, share=kept * span.share) for span in others)
+        usual = replace(first, share=1.0 - math.fsum(span.share for span in less))
+        return replace(self, spans=(usual, *less), p_anywhere=kept * self.p_anywhere)
 
     def in_space(self, space: DesignSpace) -> tuple[Span, ...]:
         """The spans on the clock of a space."""
