@@ -113,6 +113,14 @@ def test_what_a_strategys_name_stands_for_is_not_kept_with_another(config_file: 
     assert config.with_overrides(strategy="nr").strategy.settings == {}
 
 
+@pytest.mark.parametrize(("section", "block"), [("protocol", "block_trials"), ("limits", "max_block_pulses")])
+def test_a_length_of_rests_needs_blocks(config_file: WriteFile, section: str, block: str) -> None:
+    with pytest.raises(ConfigError, match=rf"{section}.rest_s does nothing.*Set {section}.{block}"):
+        load_config(config_file(f"[{section}]\nrest_s = 300.0\n"))
+    config = load_config(config_file(f"[{section}]\nrest_s = 300.0\n{block} = 10\n"))
+    assert getattr(config, section).rest_s == 300.0
+
+
 def test_the_same_seed_makes_the_same_person() -> None:
     assert subject_for(RunConfig(seed=3)) == subject_for(RunConfig(seed=3))
     assert subject_for(RunConfig(seed=3)) != subject_for(RunConfig(seed=4))

@@ -157,6 +157,7 @@ def load_config(path: str | Path | None = None) -> RunConfig:
         values["device"] = {"folder": Path(path).resolve().parent} | values["device"]
     config = _validated(values, str(path))
     _require_percent(config.visit)
+    _require_blocks(config)
     return config
 
 
@@ -169,6 +170,18 @@ def _require_percent(visit: VisitConfig) -> None:
                 got=intensity_pct,
                 expected=f"at least {LEAST_PCT:g}",
                 remedy="Multiply it by 100: 90 for 90 %.",
+            )
+
+
+def _require_blocks(config: RunConfig) -> None:
+    for section, block in (("protocol", "block_trials"), ("limits", "max_block_pulses")):
+        part = getattr(config, section)
+        if part.rest_s != type(part)().rest_s and getattr(part, block) is None:
+            raise ConfigError(
+                f"{section}.rest_s does nothing without {section}.{block}",
+                got=part.rest_s,
+                expected="the length of the rests between blocks [s], and after how many trials they come",
+                remedy=f"Set {section}.{block}, or remove {section}.rest_s.",
             )
 
 
