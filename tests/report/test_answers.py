@@ -23,7 +23,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
 
 
 def with_history(record: SessionRecord, history: Sequence[Record]) -> SessionRecord:
-    return replace(record, history=tuple(history))
+    return replace(record, history=tuple(history), delivered=0)
 
 
 def trial(index: int, **values: Any) -> Trial:

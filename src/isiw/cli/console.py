@@ -82,6 +82,8 @@ def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
     except (typer.Exit, typer.Abort):
         raise
     except (Exception, SystemExit) as error:
+        if isinstance(error.__context__, BrokenPipeError):  # whoever read the output has enough of it
+            raise typer.Exit(1) from error
         show(traceback.format_exc(), stderr=True)
         place = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(place.filename).name}, line {place.lineno}"

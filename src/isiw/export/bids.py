@@ -97,7 +97,7 @@ def _write_person(parts: Sequence[Part], folder: Path) -> dict[str, Any]:
     """Write what a person's sessions are, and return what the person is."""
     label = _label(parts[0])
     rows = [{"session_id": f"ses-{part.session}", **session_facts(part.record)} for part in parts]
-    _tsv(folder / f"sub-{label}" / f"sub-{label}_sessions.tsv", pd.DataFrame(rows))
+    _tsv(folder / f"sub-{label}" / f"sub-{label}_sessions.tsv", pd.DataFrame(rows).astype({"day": "Int64"}))
     simulated = all(part.record.header.device.simulated for part in parts)
     return {"participant_id": f"sub-{label}", "subject": parts[0].subject, "simulated": simulated}
 

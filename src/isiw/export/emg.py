@@ -145,11 +145,12 @@ def runs(record: SessionRecord) -> tuple[list[Run], list[str]]:
     """
     trials = {trial.index: trial for trial in record.table}
     of_layout: dict[Layout, list[tuple[Trial, Mapping[str, Channel]]]] = {}
-    left_out: dict[str, list[int]] = {}
+    left_out: dict[tuple[str, bool], list[int]] = {}
     for number in sorted({number for number, _ in record.waveforms}):
-        channels, others = _side_by_side(record.sweep(number))
+        sweep = record.sweep(number)
+        channels, others = _side_by_side(sweep)
         for name in others:
-            left_out.setdefault(name, []).append(number)
+            left_out.setdefault((name, EMG in sweep), []).append(number)
         if channels:
             trial = trials.get(number) or _lost(record, number)
             of_layout.setdefault(_layout(channels), []).append((trial, channels))
@@ -192,11 +193,13 @@ def _run(layout: Layout, sweeps: Sequence[tuple[Trial, Mapping[str, Channel]]]) 
     return Run(layout, tuple(trial for trial, _ in sweeps), starts_ms, tuple(values))
 
 
-def _sentences(left_out: Mapping[str, Sequence[int]]) -> list[str]:
+def _sentences(left_out: Mapping[tuple[str, bool], Sequence[int]]) -> list[str]:
+    """What is left out: the numbers of the trials by the channel, and whether the trial has EMG."""
+    unlike = "it is not finite or too large, or has not the EMG's rate, begin and length"
     return [
-        f"The channel {name} is not in the EMG file in {len(numbers)} trials (first {numbers[0]}): it is not "
-        "finite or too large, or has not the EMG's rate, begin and length."
-        for name, numbers in left_out.items()
+        f"The channel {name} is not in the EMG file in {len(numbers)} trials (first {numbers[0]}): "
+        f"{unlike if has_emg else 'there is no EMG'}."
+        for (name, has_emg), numbers in left_out.items()
     ]
 
 

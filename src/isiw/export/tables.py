@@ -44,14 +44,15 @@ SESSION_COLUMNS: Final[Columns] = {
     "delivered": ("", "stimuli that were given, or may have been"),
     "told": ("", "trials that the strategy learnt from"),
     "mistrials": ("", "trials that were judged to be mistrials"),
-    "p_window": ("", "probability that there is a window, at the end"),
-    "window": ("", "the window that was reported, its segments; none where none was"),
+    "p_window": ("", "probability that there is a window, at the end; empty, as what was found, if little was told"),
+    "window": ("", "the window that was reported, its segments; empty where none was"),
     "start_low_ms": ("ms", "lower end of the 90 % interval of its start; infinite beyond the range"),
     "start_high_ms": ("ms", "upper end of the 90 % interval of its start"),
     "end_low_ms": ("ms", "lower end of the 90 % interval of its end"),
     "end_high_ms": ("ms", "upper end of the 90 % interval of its end"),
     "stopped": ("", "whether the strategy had stopped"),
     "why": ("", "why it stopped, or went on"),
+    "judged_since": ("", "whether trials were judged anew after what was found, which does not know of it"),
     "lacks": ("", "what the log lacks; empty where it is whole"),
 }
 """Unit and meaning of what is said about a session."""
@@ -124,7 +125,7 @@ def _led_by(part: Part, frame: pd.DataFrame) -> pd.DataFrame:
 
 def _sessions(parts: Iterable[Part]) -> pd.DataFrame:
     rows = [part.whose | session_facts(part.record) for part in parts]
-    return pd.DataFrame(rows, columns=[*_WHOSE, *SESSION_COLUMNS])
+    return pd.DataFrame(rows, columns=[*_WHOSE, *SESSION_COLUMNS]).astype({"day": "Int64"})
 
 
 def _events(parts: Iterable[Part]) -> pd.DataFrame:
@@ -171,11 +172,9 @@ def _what_came_of_it(record: SessionRecord) -> dict[str, Any]:
     if not record.estimates:
         return counts
     last = record.estimates[-1]
+    ended = {"stopped": last.stop, "why": last.reason, "judged_since": record.is_judged_since}
+    if not record.rests_on_data:
+        return counts | ended
     edges = ("start_low_ms", "start_high_ms", "end_low_ms", "end_high_ms")
-    return counts | {
-        "p_window": last.probability,
-        "window": "" if last.window is None or not record.rests_on_data else str(last.window),
-        **{name: getattr(last, name) for name in edges},
-        "stopped": last.stop,
-        "why": last.reason,
-    }
+    found = {"p_window": last.probability, "window": "" if last.window is None else str(last.window)}
+    return counts | found | {name: getattr(last, name) for name in edges} | ended

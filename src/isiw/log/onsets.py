@@ -44,6 +44,12 @@ class Onsets:
         self._clock_s = intent.t_s
         self.by_trial[intent.trial] = self._last
 
+    def refused(self) -> None:
+        """Take note that the last stimulus was not given: where nothing was given before, the next is the first one."""
+        if len(self.by_trial) == 1:
+            self.by_trial.clear()
+            self._last = None
+
     def resumed(self) -> None:
         """Take note that the session was resumed."""
         self._clock_s = None

@@ -322,6 +322,8 @@ class Records:
             self.onsets.take(record, at_ns)
         elif isinstance(record, Event) and record.kind == "resume":
             self.onsets.resumed()
+        elif isinstance(record, Event) and record.kind == "refused":
+            self.onsets.refused()
 
 
 def _concluded(record: Record) -> int | None:

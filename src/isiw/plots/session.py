@@ -156,7 +156,8 @@ def _title(record: SessionRecord) -> str:
     if not record.rests_on_data:
         return f"Too little was measured ({len(record.table.told)} count)"
     window = record.estimates[-1].window if record.estimates else None
-    return "No window" if window is None else f"Window {window}"
+    since = ", before trials were judged anew," if record.is_judged_since else ""
+    return f"{'No window' if window is None else f'Window {window}'}{since}"
 
 
 def _draw_edges(axes: Axes, record: SessionRecord, truth: Window | None) -> None:
@@ -182,7 +183,8 @@ def _draw_probability(axes: Axes, record: SessionRecord) -> None:
     axes.plot([e.trial for e in estimates], _column(estimates, "probability"), color=INK, lw=1.6)
     lost = [trial.index for trial in record.table if trial.reason is not None]
     axes.plot(lost, [0.08] * len(lost), "x", ms=4, color=RED)
-    axes.set_xlim(-0.5, max(len(record.table) - 0.5, 0.5))
+    numbers = [trial.index for trial in record.table] + [estimate.trial for estimate in record.estimates]
+    axes.set_xlim(-0.5, max(numbers, default=0) + 0.5)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylim(0, 1.03)
     axes.set_yticks((0, 0.5, 1))

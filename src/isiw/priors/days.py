@@ -64,6 +64,7 @@ class DayToDay:
 
     def __post_init__(self) -> None:
         check_probabilities(self, "p_stays", "p_other")
+        check_numbers(self, "p_stays", below=1)  # else nothing would be left for whoever's window has moved
         check_numbers(self, "shift_sd_ms", "amplitude_log_sd", "x50_sd_pct", "floor_log_sd", above=0)
 
     def added_sd(self) -> dict[str, float]:
@@ -91,6 +92,8 @@ def after(*records: SessionRecord, prior: Prior | None = None, law: DayToDay | N
             that count ISIs from different events.
     """
     _require_days_of_one_person(records)
+    if not isinstance(prior, Prior | None):
+        raise InvalidValueError("this is no prior", got=prior, expected="what isiw.priors.load(path) reads")
     prior, law = prior or Prior(), law or DayToDay()
     for record in records:
         prior = _another_day(recalled(record, prior), law)

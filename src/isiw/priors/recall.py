@@ -58,6 +58,7 @@ def require_meps(record: SessionRecord) -> None:
 
 
 def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
-    start = prior.profile.start
-    stated = start.hit_delay_ms or record.header.device.hit_delay_ms
+    """The prior, told when the tap hits: as it says itself, or as the session's strategy or device says."""
+    start, settings = prior.profile.start, record.header.strategy.settings
+    stated = start.hit_delay_ms or settings.get("hit_delay_ms") or record.header.device.hit_delay_ms
     return replace(prior, profile=replace(prior.profile, start=replace(start, hit_delay_ms=stated)))

@@ -42,10 +42,15 @@ def answers(record: SessionRecord) -> list[Answer]:
 
 
 def _lost(record: SessionRecord) -> Answer:
-    given, lost = len(record.table) + len(record.unknown), [str(number) for number, *_ in lost_rows(record)]
+    given, lost = _given(record), [str(number) for number, *_ in lost_rows(record)]
     named = ", ".join(lost[:MOST_NAMED]) + (f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else "")
     answer = f"{len(lost)} of {given}: {'trial' if len(lost) == 1 else 'trials'} {named}" if lost else "none"
     return Answer("Which trials were lost, and why?", answer, counts_sentence(record))
+
+
+def _given(record: SessionRecord) -> int:
+    """How many stimuli were given, or may have been."""
+    return len(record.table) + len(record.unknown)
 
 
 def _timing(record: SessionRecord) -> Answer:
@@ -61,7 +66,8 @@ def _timing(record: SessionRecord) -> Answer:
         )
     if not any(errors_ms) and not is_timed:
         detail = "It reports every ISI as it was wanted, and no time of a pulse or a hit to check that by."
-        return Answer(question, "as the device says", f"{detail} {_listed(rejected)}")
+        answer = _verdict(record, len(rejected), 0) if rejected else "as the device says"
+        return Answer(question, answer, f"{detail} {_listed(rejected)}")
     tolerance_ms = record.header.signals.tolerance_ms(record.header.space)
     sizes = f"{statistics.median(errors_ms):.1f} ms (median), at most {max(errors_ms):.1f} ms"
     detail = f"Trials that count are off by {sizes}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
@@ -92,7 +98,7 @@ def _rejected_for(record: SessionRecord, reasons: frozenset[MistrialReason]) -> 
 
 def _verdict(record: SessionRecord, wrong: int, known: int) -> str:
     """Whether it was right in all trials, as far as is known."""
-    given = len(record.table)
+    given = _given(record)
     if wrong:
         return f"not in {wrong} of {given} trials"
     if not known:

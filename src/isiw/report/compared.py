@@ -13,7 +13,7 @@ from isiw.priors.differing import Difference
 from isiw.report.comparison import HEADINGS, comparison_rows, comparison_sentence
 from isiw.report.facts import first_facts
 from isiw.report.html import rendered, write_page
-from isiw.report.words import counts_sentence, finding_sentences
+from isiw.report.words import JUDGED_SINCE, counts_sentence, finding_sentences
 
 __all__ = ["comparison_page", "save_comparison"]
 
@@ -68,7 +68,7 @@ def _session(record: SessionRecord) -> dict[str, Any]:
     return {
         "subject": record.header.subject or "an unnamed subject",
         "log": record.path.name,
-        "findings": finding_sentences(record),
+        "findings": [*finding_sentences(record), *([JUDGED_SINCE] if record.is_judged_since else [])],
         "counts": counts_sentence(record),
         "facts": first_facts(record),
     }

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.priors.differing import Difference
+from isiw.report.words import JUDGED_SINCE
 from isiw.text import one_line
 
 __all__ = ["HEADINGS", "comparison_rows", "comparison_sentence", "comparison_table"]
@@ -24,7 +25,9 @@ def comparison_table(records: Sequence[SessionRecord]) -> str:
     """
     rows = [HEADINGS, *comparison_rows(records)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
+    lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+    since = [f"{_whose(r)}: {JUDGED_SINCE}" for r in records if r.estimates and r.is_judged_since]
+    return "\n".join([*lines, *since])
 
 
 def comparison_rows(records: Sequence[SessionRecord]) -> list[tuple[str, ...]]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
 from isiw.session.progress import asked, outcome
-from isiw.trials import Trial
+from isiw.trials import MistrialReason, Trial
 
 __all__ = ["Counted", "TrialRow", "counted_rows", "event_rows", "lost_rows", "trial_row"]
 
@@ -93,12 +93,14 @@ def counted_rows(record: SessionRecord) -> list[Counted]:
         record: the session.
     """
     limits, kinds = record.header.limits, Counter(event.kind for event in record.events)
-    isis = [trial.commanded_isi_ms for trial in record.table if trial.commanded_isi_ms is not None]
-    asked_ms = f"{min(isis):g}–{max(isis):g} ms" if isis else "–"
+    wanted_ms = [trial.commanded_isi_ms for trial in record.table] + [intent.isi_ms for intent in record.unknown]
+    isis_ms = [isi_ms for isi_ms in wanted_ms if isi_ms is not None]
+    asked_ms = f"{min(isis_ms):g}–{max(isis_ms):g} ms" if isis_ms else "–"
+    unknown = sum(trial.reason is MistrialReason.OUTCOME_UNKNOWN for trial in record.table) + len(record.unknown)
     shortest_s = _shortest_s(record)
     return [
         Counted("stimuli delivered", f"{len(record.table) + len(record.unknown)}", f"at most {limits.max_pulses}"),
-        Counted("of them with an unknown outcome", f"{len(record.unknown)}", ""),
+        Counted("of them with an unknown outcome", f"{unknown}", ""),
         Counted("shortest time between two stimuli", "not known" if shortest_s is None else f"{shortest_s:.2f} s",
                 f"at least {limits.min_iti_s:g} s"),
         Counted("ISIs asked", asked_ms, f"{limits.low_ms:g}–{limits.high_ms:g} ms"),

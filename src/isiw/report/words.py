@@ -17,9 +17,11 @@ from isiw.report.evidence import contradiction, no_comparison, nothing_measured
 from isiw.session.progress import asked, outcome
 from isiw.session.recorder import OWN_LOOP
 from isiw.strategy.catalogue import known_settings, list_strategies
+from isiw.trials import Stimulus, Trial
 from isiw.window import Window
 
 __all__ = [
+    "JUDGED_SINCE",
     "TRIAL_HEADINGS",
     "counts_sentence",
     "final_statement",
@@ -44,6 +46,9 @@ UNUSUAL = 0.9
 
 _OF_THE_WINDOW = re.compile(r"^(?!The session is paused).*(window|F1|particles)")
 """Reasons of a strategy to stop that say something about the window."""
+
+JUDGED_SINCE = "Trials were judged anew after this estimate; resume the session to have it with what counts now."
+"""What is said where `SessionRecord.is_judged_since`."""
 
 _AFTER = {"impact": "after the impact", "valve": "after the valve command"}
 
@@ -75,9 +80,7 @@ def final_statement(record: SessionRecord) -> str:
     elif not last.stop:
         sentences.append(f"The session is not over; go on with: {way_on}")
     if record.is_judged_since:
-        sentences.append(
-            "Trials were judged anew after this estimate; resume the session to have it with what counts now."
-        )
+        sentences.append(JUDGED_SINCE)
     return " ".join(sentence for sentence in sentences if sentence)
 
 
@@ -266,12 +269,14 @@ def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
 
 
 def trial_rows(record: SessionRecord) -> list[tuple[str, ...]]:
-    """All trials, as in `TRIAL_HEADINGS`.
+    """All trials, as in `TRIAL_HEADINGS`; stimuli whose outcome the log does not have, too.
 
     Args:
         record: the session.
     """
-    return [(str(t.index), asked(t), outcome(t), _isi(t.isi_ms)) for t in record.table]
+    unknown = [Trial.unknown(Stimulus(intent.trial, intent.isi_ms, intent.tap_alone)) for intent in record.unknown]
+    trials = sorted([*record.table, *unknown], key=lambda trial: trial.index)
+    return [(str(t.index), asked(t), outcome(t), _isi(t.isi_ms)) for t in trials]
 
 
 def _isi(isi_ms: float | None) -> str:

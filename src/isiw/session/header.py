@@ -54,12 +54,14 @@ def header_of(strategy: Strategy, **details: Any) -> Header:
         strategy: the session's.
         **details: the other fields of `Header`.
     """
-    recipe = strategy.recipe
+    recipe, limit_mv = strategy.recipe, strategy.detection_limit_mv
+    # Of a user's own objects nothing else is known; what is learnt from the log later needs to know it.
+    known = {} if recipe.name or limit_mv is None else {"detection_limit_mv": limit_mv}
     return Header(
         isiw_version=isiw.__version__,
         created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
         seed=recipe.seed,
-        strategy=StrategyRecipe(name=recipe.name, seed=recipe.seed, settings=dict(recipe.settings)),
+        strategy=StrategyRecipe(name=recipe.name, seed=recipe.seed, settings={**recipe.settings, **known}),
         space=strategy.space,
         versions={name: version for name, version in versions().items() if name != "isiw"},
         **details,

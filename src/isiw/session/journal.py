@@ -30,6 +30,8 @@ def learn(strategy: Strategy, trial: Trial) -> None:
         strategy.learn(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
     elif trial.is_control:
         strategy.count_control()
+    elif trial.excluded and trial.reason is None:
+        strategy.count_excluded()
     else:
         strategy.count_mistrial()
 
@@ -95,22 +97,27 @@ class Journal:
         """The number of the last trial; None before the first."""
         return len(self.trials) - 1 if self.trials else None
 
-    def event(self, kind: EventKind, text: str) -> None:
+    def event(self, kind: EventKind, text: str, trial: int | None = None) -> None:
         """Write that something happened, behind the last trial.
 
         Args:
             kind: what kind of thing.
             text: what, in words.
+            trial: which one it is about; None for the last one.
         """
-        self.log.append(Event(kind=kind, trial=self.last, text=text))
+        self.log.append(Event(kind=kind, trial=self.last if trial is None else trial, text=text))
 
-    def note(self, text: str) -> None:
+    def note(self, text: str, trial: int | None = None) -> None:
         """Put a remark on disk.
+
+        Args:
+            text: anything.
+            trial: which one it is about; None for the last one.
 
         Raises:
             InvalidValueError: it is no text.
         """
-        self.event("note", checks.text("a note", text))
+        self.event("note", checks.text("a note", text), trial)
         self.log.sync()
 
     def judge(self, verdict: Callable[[TrialTable], Event]) -> Event:

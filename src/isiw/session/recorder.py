@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import threading
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -18,14 +19,14 @@ from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.log.durable import part_of
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, EventKind, Header
+from isiw.log.schema import Event, Header
 from isiw.log.writer import LogWriter
 from isiw.session.believed import believed
 from isiw.session.header import header_of, require_parts
 from isiw.session.journal import Journal, learn, relearned
 from isiw.session.judging import Judging
 from isiw.session.replay import replay, warn_where_differing
-from isiw.session.resume import ages_s, continued, require_as_real, resumption, with_lost_pulses
+from isiw.session.resume import ages_s, continued, require_same_person, resumption, with_lost_pulses
 from isiw.signals.faults import remedy_for
 from isiw.signals.judgement import SignalLimits
 from isiw.signals.plausibility import doubt_of, doubts_of, require_plausible
@@ -116,7 +117,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
-    _require_same_person(header, record.header)
+    require_same_person(header, record.header)
     record = with_lost_pulses(record, lost_pulses)
     replayed = replay(record, strategy)
     warn_where_differing(replayed, record.header)
@@ -138,18 +139,6 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         writer.append(believed(strategy, len(replayed.trials) - 1, strategy.decision(), None))
     writer.sync()
     return Recorder(replayed.strategy, writer, header, clock, replayed.trials, ages, on_doubt)
-
-
-def _require_same_person(header: Header, logged: Header) -> None:
-    """Raise where the log's trials are another person's, or nobody's."""
-    require_as_real(header.device, logged.device)
-    if header.subject and logged.subject and header.subject != logged.subject:
-        raise InvalidValueError(
-            "the log is another person's",
-            got=header.subject,
-            expected=logged.subject,
-            remedy="Begin a log of its own for each person: isiw.open_session(strategy, log=NEW_PATH, subject=...).",
-        )
 
 
 def _without_controls(protocol: VisitProtocol) -> VisitProtocol:
@@ -192,6 +181,7 @@ class Recorder(Judging):
         self._open = ExitStack()
         self._open.enter_context(self._journal.writing(log))
         self._asked: Stimulus | None = None
+        self._lock = threading.RLock()
         now_s = clock.now_s()
         self._made_s = now_s
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
@@ -223,23 +213,38 @@ class Recorder(Judging):
             LimitExceededError: a limit is reached; deliver nothing.
             LogError: the log cannot be written, or is no longer at its path; deliver nothing.
         """
-        if self._asked is None or self._asked.isi_ms is None:
+        with self._lock:
+            if self._asked is not None and self._asked.isi_ms is not None:
+                return self._asked.isi_ms
+            if self._asked is not None:  # TMS alone that was given, and never told
+                self._conclude(Trial.unknown(self._asked))
+        self._wait()
+        with self._lock:
+            self._catch_up()
             isi_ms = self.strategy.ask(deadline_s)
+            self._limits.require_isi(isi_ms)
             self._begin(isi_ms, self.strategy.fallback_reason)
             return isi_ms
-        return self._asked.isi_ms
+
+    def _wait(self) -> None:
+        """Wait until limits and protocol allow the next stimulus; meanwhile trials can be judged."""
+        self._limits.require_left(len(self.trials))
+        self._limits.require_state(Readiness())
+        self._clock.sleep_s(self._earliest_s(len(self.trials)) - self._clock.now_s())
 
     def _begin(self, isi_ms: float | None, fallback: str | None = None) -> None:
-        """Put on disk what is about to be delivered, once the limits allow it."""
+        """Put on disk what is about to be delivered."""
         stimulus = Stimulus(len(self.trials), isi_ms)
-        self._limits.require_left(stimulus.trial)
-        if isi_ms is not None:
-            self._limits.require_isi(isi_ms)
-        self._limits.require_state(Readiness())
-        self._clock.sleep_s(self._earliest_s(stimulus.trial) - self._clock.now_s())
         self._journal.intent(stimulus, self._clock.now_s(), fallback)
         self._journal.log.require_in_place()
         self._asked = stimulus
+
+    def _catch_up(self) -> None:
+        """Learn all trials anew where one was judged since, or learning one was interrupted."""
+        if self._journal.overruled or self.strategy.delivered < len(self.trials):
+            self.strategy, self._journal.overruled = relearned(self.strategy, self.trials), False
+            if self._journal.is_open:
+                self._log_estimate(len(self.trials) - 1)
 
     def _earliest_s(self, trial: int) -> float:
         """When limits and protocol allow a trial, by the clock [s]."""
@@ -267,18 +272,25 @@ class Recorder(Judging):
             background_rms_uv: EMG before the pulse [µV RMS], where known.
 
         Raises:
-            InvalidValueError: nothing was asked, a value that cannot be, or a slip of unit or order; nothing is logged,
-                and the right value can be told.
+            InvalidValueError: nothing was asked, a value that cannot be, or a slip of unit or order; the outcome is not
+                logged, and the right value can be told. TMS alone counts as given from the first try on.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             LogError: the log cannot be written.
 
         Warns:
             ImplausibleDataWarning: what looks like a slip of unit; it is told and logged all the same.
         """
-        mep_mv = number("mep_mv", mep_mv, least=0)
-        isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
+        if isi_ms is None and self._asked is None:
+            self._wait()
+        with self._lock:
+            self._tell(isi_ms, mep_mv, isi_sd_ms, background_rms_uv)
+
+    def _tell(self, isi_ms: float | None, mep_mv: float, isi_sd_ms: float, background_rms_uv: float | None) -> None:
+        self._catch_up()
         if isi_ms is None and self._asked is None:
             self._begin(None)
+        mep_mv = number("mep_mv", mep_mv, least=0)
+        isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         asked = self._require_asked()
         doubt = require_plausible(isi_ms, mep_mv, asked.isi_ms, self.strategy.space)
         isi_ms = None if isi_ms is None else self.strategy.space.check_realised(isi_ms)
@@ -310,27 +322,33 @@ class Recorder(Judging):
         Warns:
             ImplausibleDataWarning: as many mistrials in a row as pause a session.
         """
-        asked = self._require_asked()
         known = next((each for each in MistrialReason if each == reason), MistrialReason.REJECTED)
-        if known != reason:
-            self.note(str(reason))
-        self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known))
+        with self._lock:
+            self._catch_up()
+            asked = self._require_asked()
+            if known != reason:
+                self._journal.note(str(reason), trial=asked.trial)
+            self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known))
         lost = len(list(itertools.takewhile(lambda trial: trial.reason is not None, reversed(self.trials.trials))))
         if lost == self._limits.max_consecutive_mistrials:
             self._warn(f"{lost} trials in a row were lost: {known}. {remedy_for(known)}")
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
-        self._journal.judge(verdict)
-        self.strategy, self._journal.overruled = relearned(self.strategy, self.trials), False
-        self._log_estimate(len(self.trials) - 1)
+        with self._lock:
+            self._journal.judge(verdict)
+            self._catch_up()
 
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""
-        return self.strategy.estimate()
+        with self._lock:
+            self._catch_up()
+            return self.strategy.estimate()
 
     def decision(self) -> StopDecision:
         """Whether to stop now, and why."""
-        return self.strategy.decision()
+        with self._lock:
+            self._catch_up()
+            return self.strategy.decision()
 
     def close(self) -> None:
         """Close the log; calling it again is harmless."""
@@ -349,10 +367,6 @@ class Recorder(Judging):
                 self._log.sync()
         finally:
             self.close()
-
-    def _event(self, kind: EventKind, text: str) -> None:
-        self._journal.event(kind, text)
-        self._log.sync()
 
     def _require_asked(self) -> Stimulus:
         if self._asked is None:
@@ -373,11 +387,12 @@ class Recorder(Judging):
         self._log_estimate(trial.index)
 
     def _log_estimate(self, trial: int) -> None:
-        self._log.append(believed(self.strategy, trial, self.decision(), None))
+        self._log.append(believed(self.strategy, trial, self.strategy.decision(), None))
         self._log.sync()
 
     def _warn(self, text: str) -> None:
-        self._event("doubt", text)
+        self._journal.event("doubt", text)
+        self._log.sync()
         if self._on_doubt is not None:
             self._on_doubt(text)
         else:

@@ -247,3 +247,24 @@ def require_as_real(info: DeviceInfo, was: DeviceInfo) -> None:
             remedy="Start a session of its own: isiw.Session(device, strategy, log=NEW_PATH), or "
             "isiw.open_session(strategy, log=NEW_PATH).",
         )
+
+
+def require_same_person(header: Header, logged: Header) -> None:
+    """Raise where a log's trials are another person's, or nobody's.
+
+    Args:
+        header: of the session that would go on.
+        logged: of the log.
+
+    Raises:
+        DeviceError: one of them is simulated, and the other is not.
+        InvalidValueError: the log is another person's.
+    """
+    require_as_real(header.device, logged.device)
+    if header.subject and logged.subject and header.subject != logged.subject:
+        raise InvalidValueError(
+            "the log is another person's",
+            got=header.subject,
+            expected=logged.subject,
+            remedy="Begin a log of its own for each person: isiw.open_session(strategy, log=NEW_PATH, subject=...).",
+        )

@@ -187,7 +187,7 @@ def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtoc
         waveform_topic(name)
     if "emg" in info.channels:  # an acceleration is not read where the device itself knows the time of the hit
         require_unit("emg", info.channels["emg"], EMG_UNITS_MV)
-    limit_mv, assumed_mv = info.detection_limit_mv, strategy.recipe.settings.get("detection_limit_mv")
+    limit_mv, assumed_mv = info.detection_limit_mv, strategy.detection_limit_mv
     if limit_mv is not None and assumed_mv is not None and not math.isclose(limit_mv, assumed_mv):
         raise DeviceError(
             "the device and the strategy have different detection limits, so an MEP of 0 would be misunderstood",

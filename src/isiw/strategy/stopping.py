@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import statistics
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 from isiw.checks import check_choice, check_numbers, check_probabilities, check_wholes
 from isiw.errors import InvalidValueError
@@ -19,6 +19,8 @@ __all__ = [
     "CredibleWidth",
     "EdgeVariance",
     "ExpectedF1",
+    "HasBudget",
+    "LooksBack",
     "NoWindow",
     "ParticleSpread",
     "Progress",
@@ -58,10 +60,27 @@ class Progress:
 
 
 class StoppingRule(Protocol):
-    """A rule: from progress to a decision."""
+    """A rule: from progress to a decision. One that needs `Progress.past` or sets a budget says so by what follows."""
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
+
+
+@runtime_checkable
+class LooksBack(Protocol):
+    """Capability: a rule that needs past estimates."""
+
+    @property
+    def looks_back(self) -> int:
+        """How many."""
+
+
+@runtime_checkable
+class HasBudget(Protocol):
+    """Capability: a rule that stops after so many stimuli at the latest."""
+
+    def stimuli_left(self, delivered: int) -> int | None:
+        """How many it still allows after so many; None where it sets no budget after all."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +98,10 @@ class Budget:
 
     def __post_init__(self) -> None:
         check_wholes(self, "max_trials", least=1)
+
+    def stimuli_left(self, delivered: int) -> int:
+        """How many stimuli are left after so many; see `HasBudget`."""
+        return max(0, self.max_trials - delivered)
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
@@ -209,6 +232,11 @@ class SmallGain:
         check_probabilities(self, "gain", "min_probability")
         check_wholes(self, "last", "min_told", least=1)
 
+    @property
+    def looks_back(self) -> int:
+        """How many past estimates it needs."""
+        return self.last + 1
+
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
         now, earlier = progress.estimate, progress.past[-self.last - 1 :]
@@ -245,6 +273,11 @@ class EdgeVariance:
         check_numbers(self, "variance_ms2", above=0)
         check_wholes(self, "last", least=2)
         check_choice(self, "edges", ("both", "either"))
+
+    @property
+    def looks_back(self) -> int:
+        """How many past estimates it needs."""
+        return self.last
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
@@ -333,6 +366,15 @@ class AnyOf:
         if not self.rules:
             raise InvalidValueError("AnyOf needs at least one rule", got=self.rules)
 
+    @property
+    def looks_back(self) -> int:
+        """How many past estimates its rules need."""
+        return max(looks_back(rule) for rule in self.rules)
+
+    def stimuli_left(self, delivered: int) -> int | None:
+        """How many stimuli the least budget of its rules leaves; see `HasBudget`."""
+        return min((left for r in self.rules if (left := stimuli_left(r, delivered)) is not None), default=None)
+
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
         decisions = [rule(progress) for rule in self.rules]
@@ -343,17 +385,8 @@ class AnyOf:
 
 
 def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:
-    """How many stimuli a rule's budget still allows; None where it sets none.
-
-    Args:
-        rule: the stopping rule.
-        delivered: stimuli delivered so far.
-    """
-    if isinstance(rule, Budget):
-        return max(0, rule.max_trials - delivered)
-    if isinstance(rule, AnyOf):
-        return min((left for r in rule.rules if (left := stimuli_left(r, delivered)) is not None), default=None)
-    return None
+    """How many stimuli a rule's budget still allows after so many; None where it sets none."""
+    return rule.stimuli_left(delivered) if isinstance(rule, HasBudget) else None
 
 
 def looks_back(rule: StoppingRule) -> int:
@@ -362,8 +395,4 @@ def looks_back(rule: StoppingRule) -> int:
     Args:
         rule: the stopping rule.
     """
-    if isinstance(rule, AnyOf):
-        return max(looks_back(r) for r in rule.rules)
-    if isinstance(rule, SmallGain):
-        return rule.last + 1
-    return rule.last if isinstance(rule, EdgeVariance) else 0
+    return rule.looks_back if isinstance(rule, LooksBack) else 0

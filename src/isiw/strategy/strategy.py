@@ -145,6 +145,12 @@ class Strategy:
         """How many stimuli its budget counts: pairs, mistrials among them, but no control trials."""
         return self._course.paired_trials + self._mistrials
 
+    @property
+    def detection_limit_mv(self) -> float | None:
+        """What it takes an amplitude of 0 to be below [mV]; None where neither setting nor model says."""
+        told: float | None = self.recipe.settings.get("detection_limit_mv")
+        return getattr(self.model, "detection_limit_mv", None) if told is None else told
+
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], on the grid; the same until the next `tell`, or until its trial was lost three times.
 
@@ -187,7 +193,7 @@ class Strategy:
         """
         n = whole("the size of a batch", n, least=1, most=MOST_OF_A_BATCH)
         own = map(self.space.snap, own_plan(self.posterior, self.acquisition))
-        chosen = ([*self._course.initial_left, *own] or [self.ask()])[:n]
+        chosen = [self.ask(), *[*self._course.initial_left, *own][1:]][:n]
         return greedy_batch(self.posterior, self.acquisition, chosen, n, self._next_of_batch)
 
     def _next_of_batch(self, posterior: Posterior) -> float:
@@ -241,7 +247,7 @@ class Strategy:
         asked_ms = None if self._choice is None else self._choice.isi_ms
         doubt = require_plausible(plain_ms, plain_mv, asked_ms, self.space)
         self.learn(isi_ms, mep_mv, response=response, isi_sd_ms=isi_sd_ms)
-        doubt = doubt or doubt_of(self._meps_mv, self.recipe.settings.get("detection_limit_mv"))
+        doubt = doubt or doubt_of(self._meps_mv, self.detection_limit_mv)
         if doubt is not None and doubt.kind not in self._doubted:
             self._doubted.add(doubt.kind)
             warnings.warn(doubt.text, ImplausibleDataWarning, stacklevel=2)
@@ -289,6 +295,11 @@ class Strategy:
             reason = f"The trial was lost {self._lost} times in a row: an evenly spaced ISI instead."
             isi_ms = evenly_spaced(self.space, self._course.told + self._mistrials)
             self._choice, self._fallback_reason, self._lost = Choice(isi_ms, reason, by="fallback"), reason, 0
+
+    def count_excluded(self) -> None:
+        """Count a delivered stimulus whose outcome an operator excluded: it uses up budget, and was not lost."""
+        self._mistrials += 1
+        self._lost = 0
 
     def count_control(self) -> None:
         """Count a control trial from which nothing is learnt: a tap alone, or TMS alone that was lost."""

@@ -1,6 +1,6 @@
 """The folder of a study: its configuration, and a part for each unit of work that is finished.
 
-    study.toml                   the study, and the versions that it was made with
+    study.toml                   the study, its checksum, and the versions that it was made with
     parts/KEY.CHECKSUM.parquet   the rows of a unit
     errors/KEY.CHECKSUM.parquet  what became of a unit that failed, one row a person
 
@@ -14,11 +14,11 @@ from __future__ import annotations
 
 import platform
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -135,7 +135,8 @@ def begin_store(study: Study, folder: str | Path) -> Store:
     store = Store(study, Path(folder))
     if (store.folder / "study.toml").exists():
         return _same(store, open_store(folder))
-    text = tomli_w.dumps(study_values(study) | {"versions": _versions()})
+    values = study_values(study)
+    text = tomli_w.dumps(values | {"checksum": _state(values), "versions": _versions()})
     with _disk_errors(store.folder):
         for kind in ("parts", "errors"):
             (store.folder / kind).mkdir(parents=True, exist_ok=True)
@@ -151,10 +152,11 @@ def open_store(folder: str | Path) -> Store:
 
     Raises:
         ConfigError: its configuration cannot be read.
-        StudyError: it was made with another version of isiw.
+        StudyError: it was made with another version of isiw, or its study was changed since.
     """
     path = Path(folder) / "study.toml"
     values = read_toml(path)
+    checksum = values.pop("checksum", None)
     made_with = values.pop("versions", {}).get("isiw")
     if made_with != isiw.__version__:
         raise StudyError(
@@ -163,7 +165,18 @@ def open_store(folder: str | Path) -> Store:
             expected=isiw.__version__,
             remedy="Use that version, or begin in another folder.",
         )
-    return Store(study_from(values, str(path)), Path(folder))
+    study = study_from(values, str(path))
+    if checksum not in {None, _state(study_values(study))}:
+        raise StudyError(
+            f"{path} was changed since its sessions were run",
+            remedy="Undo the change, or run the changed study in another folder.",
+        )
+    return Store(study, Path(folder))
+
+
+def _state(values: Mapping[str, Any]) -> str:
+    """The checksum of a study's values."""
+    return _checksum(tomli_w.dumps(values).encode())
 
 
 def _same(store: Store, kept: Store) -> Store:

@@ -34,7 +34,7 @@
     const fallback = next && session.fallbacks[next.number];
     const told = element("told-next");
     if (!belief) told.textContent = "";
-    else if (belief.stop) told.textContent = "Nothing was asked after it: the session stopped.";
+    else if (belief.stop && !next) told.textContent = "Nothing was asked after it: the session stopped.";
     else if (belief.nextMs !== null) told.textContent = `Asked next: ${ms(belief.nextMs)}${fallback ? `, by a fallback: ${fallback}` : why(belief)}`;
     else told.textContent = next ? `Next came trial ${next.number}: ${next.asked}.` : "No ISI was asked after it.";
   }
