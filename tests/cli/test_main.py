@@ -434,3 +434,16 @@ def test_a_protocol_is_kept_and_its_controls_are_told_from_pairs(isiw: Command, 
         assert kind in shown
     assert "stimuli were delivered, " in result.output
     assert sum(trial.commanded_isi_ms is not None for trial in record.table) == 3
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX pipes")
+def test_a_reader_who_has_enough_of_the_output_is_no_fault(tmp_path: Path) -> None:
+    Session(ScriptedDevice(), scripted_strategy(6), log=tmp_path / "s.mcap").run()
+    read, write = os.pipe()
+    os.close(read)
+    ended = subprocess.run(  # noqa: S603
+        [*COMMAND, "show", "s.mcap"], cwd=tmp_path, stdout=write, stderr=subprocess.PIPE, text=True, check=False
+    )
+    os.close(write)
+    assert "Traceback" not in ended.stderr
+    assert "SystemExit" not in ended.stderr

@@ -171,6 +171,12 @@ def test_a_channel_that_does_not_go_with_the_emg_is_left_out_and_said_to_be(tmp_
     assert "The channel force" in (tmp_path / "out" / "README").read_text("utf-8")
 
 
+def test_channels_of_a_trial_without_emg_are_said_to_have_none_beside_them(tmp_path: Path) -> None:
+    log = write_sweeps(tmp_path / "s.mcap", {0: sweep(0), 1: {"force": sweep(1)["acceleration"]}})
+    (said, *_) = export_logs(log, tmp_path / "out", "bids").lacking
+    assert said.endswith("The channel force is not in the EMG file in 1 trials (first 1): there is no EMG.")
+
+
 def test_a_channel_that_never_changes_and_one_with_a_long_name_are_written(tmp_path: Path) -> None:
     name = "the force beneath the hammer"
     flat = Channel(np.full(SAMPLES, 5.0), 3000.0, "N", -50.0)

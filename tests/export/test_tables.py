@@ -13,9 +13,12 @@ import pytest
 from export.recorded import note, sweep, write_sweeps
 from isiw.errors import InvalidValueError, LogError
 from isiw.export import export_logs
+from isiw.export.tables import session_facts
 from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
+from isiw.session.resume import exclude
+from isiw.visit import Visit
 from logs import cut_after
 from scripted import ScriptedDevice, scripted_strategy
 
@@ -138,3 +141,20 @@ def test_texts_are_on_one_line_and_hold_nothing_that_a_terminal_obeys(tmp_path: 
     export_logs(tmp_path / "s.mcap", tmp_path / "out")
     (text,) = pd.read_csv(tmp_path / "out" / "events.csv").text
     assert text == 'a cough then, a "laugh"'
+
+
+def test_where_little_was_told_nothing_is_given_as_found(tmp_path: Path) -> None:
+    Session(ScriptedDevice(), scripted_strategy(2), log=tmp_path / "two.mcap").run()
+    row = session_facts(read_session(tmp_path / "two.mcap"))
+    assert not {"p_window", "window", "start_low_ms"} & set(row)
+    assert (row["told"], row["stopped"]) == (2, True)
+
+
+def test_what_was_judged_since_is_said_and_days_are_whole_numbers(log: Path, tmp_path: Path) -> None:
+    write_sweeps(tmp_path / "logs" / "other.mcap", {0: {}}, subject="P08", visit=Visit(day=None))
+    write_sweeps(tmp_path / "logs" / "third.mcap", {0: {}}, subject="P09", visit=Visit(day=3))
+    exclude(log, 2, "cough")
+    export_logs(tmp_path / "logs", tmp_path / "out")
+    lines = pd.read_csv(tmp_path / "out" / "sessions.csv", dtype=str).set_index("subject")
+    assert lines.judged_since.to_dict()["P07"] == "True"
+    assert lines.day.fillna("").to_dict() == {"P07": "", "P08": "", "P09": "3"}

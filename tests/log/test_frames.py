@@ -44,6 +44,16 @@ def test_where_the_clock_stood_still_or_ran_backwards_the_log_says_how_long_it_w
     assert onsets_s((90.0, 7.0), (3.0, 12.0), (9.0, 12.5)) == [0.0, 5.0, 11.0]
 
 
+def test_a_stimulus_that_was_refused_is_not_the_first() -> None:
+    onsets = Onsets()
+    for t_s in (100.0, 101.0):
+        onsets.take(Intent(trial=0, isi_ms=5.0, t_s=t_s), int(1e9 * t_s))
+        onsets.refused()
+    for trial, t_s in enumerate((102.0, 107.0)):
+        onsets.take(Intent(trial=trial, isi_ms=5.0, t_s=t_s), int(1e9 * t_s))
+    assert [onset.onset_s for onset in onsets.by_trial.values()] == [0.0, 5.0]
+
+
 def test_a_computers_clock_that_was_set_back_makes_no_onset_smaller() -> None:
     assert onsets_s((0.0, 12.0), (0.0, 7.0)) == [0.0, 0.0]
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from isiw.plots.session import save_session_plot, session_figure
 from isiw.session.loop import Session
 from isiw.session.resume import exclude
 from isiw.strategy.catalogue import make_strategy
-from isiw.trials import Measurement
+from isiw.trials import Measurement, Trial
 from isiw.window import Window
 from known import known
 from scripted import SPACE, ScriptedDevice, scripted_strategy
@@ -120,3 +121,11 @@ def test_where_nothing_counts_the_panels_say_so(record: SessionRecord) -> None:
 def test_a_session_without_trials_is_drawn(record: SessionRecord, tmp_path: Path) -> None:
     empty = type(record)(record.path, record.header, (), {}, (), False)
     assert save_session_plot(empty, tmp_path / "empty.png").stat().st_size > 1000
+
+
+def test_trials_behind_a_gap_are_in_the_picture(record: SessionRecord) -> None:
+    last = record.estimates[-1].trial
+    kept = [e for e in record.history if not (isinstance(e, Trial) and e.index in range(1, last))]
+    (low, high) = session_figure(replace(record, history=tuple(kept))).axes[-1].get_xlim()
+    assert low < 0
+    assert high > last

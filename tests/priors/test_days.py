@@ -133,3 +133,14 @@ def test_days_on_different_clocks_are_refused(first: Any, folder: Path) -> None:
 def test_an_impossible_law_of_days_is_refused(wrong: Any) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
         priors.DayToDay(**wrong)
+
+
+def test_a_law_of_days_leaves_something_to_windows_that_moved() -> None:
+    with pytest.raises(InvalidValueError, match="p_stays"):
+        priors.DayToDay(p_stays=1.0)
+
+
+def test_a_path_is_no_prior(first: Any) -> None:
+    wrong: Any = "lab.toml"
+    with pytest.raises(InvalidValueError, match=r"isiw.priors.load"):
+        priors.after(first, prior=wrong)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import Estimate, Event, Record
+from isiw.log.schema import Estimate, Event, Intent, Record
 from isiw.report.answers import Answer, answers
 from isiw.session.loop import Session
 from isiw.trials import MistrialReason, Status, Trial
@@ -130,3 +130,17 @@ def test_nothing_at_all_has_answers_too(record: SessionRecord) -> None:
 
 def test_a_log_in_a_folder_is_not_named_with_its_path(record: SessionRecord) -> None:
     assert str(Path(record.path).parent) not in " ".join(answer.detail for answer in answers(record))
+
+
+def test_what_is_not_known_of_some_stimuli_is_not_told_of_all(record: SessionRecord) -> None:
+    trials = [trial(0, isi_ms=51.0, background_rms_uv=2.0), trial(1, isi_ms=48.0, background_rms_uv=2.0)]
+    lost = with_history(record, [*trials, Intent(trial=2, isi_ms=50.0)])
+    for question in ("timing", "at rest"):
+        assert answer(lost, question).answer == "yes, where it is known (2 of 3 trials)"
+
+
+def test_a_device_that_repeats_what_was_wanted_hides_no_trial_that_was_lost_for_its_timing(
+    record: SessionRecord,
+) -> None:
+    lost = trial(1, isi_ms=None, mep_mv=None, reason=MistrialReason.NO_IMPACT)
+    assert answer(with_history(record, [trial(0), lost]), "timing").answer == "not in 1 of 2 trials"

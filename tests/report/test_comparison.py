@@ -5,9 +5,13 @@ from pathlib import Path
 import pytest
 
 from isiw.log.reader import SessionRecord, read_session
+from isiw.plots.session import session_figure
 from isiw.priors import Difference
+from isiw.report.compared import comparison_page
 from isiw.report.comparison import comparison_sentence, comparison_table
+from isiw.report.words import JUDGED_SINCE
 from isiw.session.loop import Session
+from isiw.session.resume import exclude
 from scripted import ScriptedDevice, scripted_strategy
 
 
@@ -44,3 +48,13 @@ def test_where_nothing_can_be_said_it_is_said_why(record: SessionRecord) -> None
     assert comparison_sentence(difference) == (
         "P07 (s.mcap) against P07 (s.mcap), two people, or not known to be one: There is probably no window: s.mcap."
     )
+
+
+def test_a_session_whose_trials_were_judged_anew_says_so(record: SessionRecord) -> None:
+    exclude(record.path, 1, "cough")
+    judged = read_session(record.path)
+    *lines, said = comparison_table([judged]).splitlines()
+    assert len(lines) == 2
+    assert said == f"P07 (s.mcap): {JUDGED_SINCE}"
+    assert JUDGED_SINCE in comparison_page([judged], [])
+    assert "before trials were judged anew" in session_figure(judged).axes[0].get_title(loc="left")

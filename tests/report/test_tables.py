@@ -74,3 +74,12 @@ def test_times_are_not_compared_across_a_resumption_nor_with_what_was_refused(re
 def test_a_log_without_times_says_so(record: SessionRecord) -> None:
     still = [entry.model_copy(update={"t_s": 0.0}) if isinstance(entry, Intent) else entry for entry in record.history]
     assert counted(replace(record, history=tuple(still)))["shortest time between two stimuli"][0] == "not known"
+
+
+def test_stimuli_of_unknown_outcome_are_counted_whether_there_is_a_trial_of_them_or_not(record: SessionRecord) -> None:
+    unknown = Trial(6, Status.MISTRIAL, 190.0, MistrialReason.OUTCOME_UNKNOWN)
+    history = (*record.history, Intent(trial=6, isi_ms=190.0), unknown, Intent(trial=7, isi_ms=10.0))
+    said = counted(replace(record, history=history))
+    assert said["stimuli delivered"][0] == "8"
+    assert said["of them with an unknown outcome"][0] == "2"
+    assert said["ISIs asked"][0] == "10–190 ms"

@@ -10,7 +10,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import Estimate, Event, StrategyRecipe
+from isiw.log.schema import Estimate, Event, Intent, StrategyRecipe
 from isiw.report.words import TRIAL_HEADINGS, final_statement, trial_rows, truth_sentence
 from isiw.session.loop import Session
 from isiw.session.resume import exclude
@@ -192,3 +192,9 @@ def test_a_person_unlike_most_is_told_so(record: SessionRecord) -> None:
     statement = final_statement(with_estimate(record, unusual=shares))
     assert "This person is unlike most in the width of the window (probability 0.97)." in statement
     assert "EMG floor" not in statement
+
+
+def test_a_stimulus_without_an_outcome_has_a_row_too(record: SessionRecord) -> None:
+    last = len(record.table)
+    rows = trial_rows(replace(record, history=(*record.history, Intent(trial=last, isi_ms=70.0))))
+    assert rows[-1] == (str(last), "70 ms", "mistrial: outcome unknown", "–")

@@ -17,6 +17,7 @@ from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate, Intent
+from isiw.models.particles import ParticleModel
 from isiw.session.loop import Session
 from isiw.session.updates import SessionUpdate
 from isiw.signals import SignalLimits
@@ -125,6 +126,14 @@ def test_another_detection_limit_than_the_strategys_is_refused(log: Path) -> Non
     with pytest.raises(DeviceError, match=r"0.05 mV.*0.005 mV.*make_strategy\(..., detection_limit_mv=0.05\)"):
         session_with_detection_limits(ScriptedDevice(), scripted_strategy(), log, device_mv=0.05, strategy_mv=0.005)
     assert not log.exists()
+
+
+def test_another_detection_limit_than_that_of_a_model_of_ones_own_is_refused(log: Path) -> None:
+    default, device = make_strategy("default", particles=50), ScriptedDevice()
+    device.info = dataclasses.replace(device.info, reference="valve", detection_limit_mv=0.05)
+    strategy = Strategy(default.space, ParticleModel(particles=50), default.acquisition, default.stopping)
+    with pytest.raises(DeviceError, match=r"0.05 mV.*0.005 mV"):
+        Session(device, strategy, log=log)
 
 
 @pytest.mark.parametrize(("device_mv", "strategy_mv"), [(0.05, 0.05), (None, 0.005), (0.05, None)])

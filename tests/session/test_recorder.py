@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
+import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +29,14 @@ from isiw.errors import (
 from isiw.log.reader import read_session
 from isiw.log.schema import Estimate, Intent
 from isiw.report import final_statement
+from isiw.session import recorder
+from isiw.session.journal import relearned
 from isiw.session.loop import Session
 from isiw.session.recorder import Recorder, open_session
 from isiw.session.resume import exclude, resume
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
-from isiw.trials import MistrialReason, Trial
+from isiw.trials import MistrialReason, Trial, TrialTable
 from isiw.types import Reference
 from known import known
 from logs import cut_after
@@ -400,3 +405,96 @@ def test_a_killed_loop_loses_nothing(log: Path) -> None:
         assert [trial.told for trial in session.trials] == [True, True, True, False]
         assert len(told_to(session.strategy)) == 3
     assert [event.kind for event in read_session(log).events] == ["note", "resume"]
+
+
+def interrupted_once(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """The next call of a function of the recorder ends in Ctrl-C."""
+    called = getattr(recorder, name)
+
+    def stopped(*_: object) -> None:
+        monkeypatch.setattr(recorder, name, called)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(recorder, name, stopped)
+
+
+@pytest.mark.parametrize("name", ["relearned", "learn"])
+def test_what_was_interrupted_while_it_learnt_is_learnt_before_the_next_isi(
+    log: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    with open_session(scripted_strategy(20), log) as session:
+        run(session, 5)
+        interrupted_once(monkeypatch, name)
+        step = partial(session.exclude, 2) if name == "relearned" else partial(run, session, 1)
+        with pytest.raises(KeyboardInterrupt):
+            step()
+        run(session, 3)
+        trials = session.trials
+        assert [told[0] for told in told_to(session.strategy)] == [trial.isi_ms for trial in trials.told]
+    record = read_session(log)
+    assert [intent.trial for intent in record.intents] == list(range(len(trials)))
+    assert len(record.table) == (8 if name == "relearned" else 9)
+    with open_session(scripted_strategy(20), log, resume=True) as session:
+        assert len(told_to(session.strategy)) == len(trials.told)
+
+
+def test_an_interrupted_trial_is_in_the_next_estimate(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_session(scripted_strategy(20), log) as session:
+        run(session, 2)
+        interrupted_once(monkeypatch, "learn")
+        with pytest.raises(KeyboardInterrupt):
+            session.tell(session.ask(), 0.1)
+    assert session.estimate().pairs == 3
+
+
+def test_trials_are_judged_in_another_thread_without_losing_any(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    learns, told = threading.Event(), relearned
+
+    def slowly(strategy: Strategy, trials: TrialTable) -> Strategy:
+        learns.set()
+        time.sleep(0.2)  # long enough for several trials of the loop
+        return told(strategy, trials)
+
+    monkeypatch.setattr(recorder, "relearned", slowly)
+    with open_session(scripted_strategy(30), log) as session:
+        run(session, 4)
+        judging = threading.Thread(target=session.exclude, args=(2,))
+        judging.start()
+        assert learns.wait(10.0)
+        run(session, 8)
+        judging.join()
+        trials = session.trials
+        assert [told[0] for told in told_to(session.strategy)] == [trial.isi_ms for trial in trials.told]
+    record = read_session(log)
+    assert [intent.trial for intent in record.intents] == list(range(12))
+    with open_session(scripted_strategy(30), log, resume=True) as session:
+        assert len(session.trials.told) == 11
+
+
+def test_tms_alone_counts_also_where_what_was_told_of_it_was_refused(log: Path, space: DesignSpace) -> None:
+    with open_session(scripted_strategy(9), log, limits=Limits.of_space(space, min_iti_s=0.0, max_pulses=2)) as session:
+        with pytest.raises(InvalidValueError, match="mV"):
+            session.tell(None, 60.0)
+        run(session, 1)
+        with pytest.raises(LimitExceededError):
+            session.ask()
+    table = read_session(log).table
+    assert [trial.reason for trial in table] == [MistrialReason.OUTCOME_UNKNOWN, None]
+    assert table[0].commanded_isi_ms is None
+
+
+def test_tms_alone_that_was_refused_can_be_told_rightly(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        with pytest.raises(InvalidValueError, match="mV"):
+            session.tell(None, 60.0)
+        session.tell(None, 0.06)
+        run(session, 1)
+    assert [trial.mep_mv for trial in read_session(log).table][:1] == [0.06]
+
+
+def test_a_reason_in_own_words_is_noted_under_its_trial(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        session.ask()
+        session.mistrial("the coil slipped")
+    (note,) = read_session(log).events
+    assert (note.kind, note.trial, note.text) == ("note", 0, "the coil slipped")

@@ -24,6 +24,7 @@ from isiw.session.recorder import open_session
 from isiw.session.resume import exclude, include, resume
 from isiw.session.safeguards import Safeguards
 from isiw.session.updates import SessionUpdate
+from isiw.strategy.catalogue import make_strategy
 from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Sweep
 from scripted import ScriptedDevice, scripted_strategy, told_to
 
@@ -278,3 +279,14 @@ def test_a_loop_of_ones_own_can_do_all_of_it(log: Path) -> None:
     assert len(read_session(log).estimates) == 10
     with isiw.open_session(scripted_strategy(9), log, resume=True) as recorder:
         assert [trial.told for trial in recorder.trials] == [True, True, False, True, False, False]
+
+
+def test_excluded_trials_are_not_told_as_lost(log: Path) -> None:
+    with open_session(make_strategy("particles-mi", particles=50), log) as session:
+        for trial in range(6):
+            session.tell(session.ask(), 0.1 + trial / 1e3)
+        for trial in (3, 4, 5):
+            session.exclude(trial)
+        session.ask()
+        assert session.strategy.fallback_reason is None
+        assert session.strategy.spent == 6

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
+from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.stopping import (
     AnyOf,
     Budget,
@@ -25,6 +26,7 @@ from isiw.strategy.stopping import (
     looks_back,
     stimuli_left,
 )
+from isiw.strategy.strategy import Strategy
 from isiw.window import Window, WindowEstimate
 
 
@@ -300,3 +302,28 @@ def test_a_sweep_without_a_window_goes_on() -> None:
 def test_an_invalid_rule_is_refused(rule: type, settings: dict[str, object]) -> None:
     with pytest.raises(InvalidValueError):
         rule(**settings)
+
+
+class OneInTwo:
+    """A rule of a user's own that needs past estimates and sets a budget."""
+
+    looks_back = 4
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        return StopDecision(stop=len(progress.past) == self.looks_back, reason="As many as are needed.")
+
+    def stimuli_left(self, delivered: int) -> int:
+        return 9 - delivered
+
+
+def test_a_rule_of_ones_own_says_what_it_needs() -> None:
+    for rule in (OneInTwo(), AnyOf((Budget(40), OneInTwo(), EdgeVariance(last=3)))):
+        assert looks_back(rule) == 4
+        assert stimuli_left(rule, 2) == 7
+    strategy = make_strategy("nr")
+    own = Strategy(strategy.space, strategy.model, strategy.acquisition, stopping=OneInTwo())
+    stopped = []
+    for trial in range(6):
+        own.tell(own.ask(), 0.1 + trial / 1e3)
+        stopped.append(own.decision().stop)
+    assert stopped == [False, False, False, True, True, True]

@@ -354,3 +354,11 @@ def test_what_was_judged_before_is_learnt_as_it_is() -> None:
     strategy.ask()
     strategy.learn(100.0, 50.0)
     assert strategy.delivered == 1
+
+
+def test_a_batch_begins_with_what_is_asked_also_where_trials_were_lost() -> None:
+    strategy = make_strategy("nr")
+    strategy.ask()
+    for _ in range(3):
+        strategy.count_mistrial()
+    assert strategy.ask_batch(2)[0] == strategy.ask()

@@ -104,3 +104,8 @@ def test_from_python_invalid_values_are_refused_as_well() -> None:
 def test_a_study_that_could_not_even_be_listed_is_refused(changed: Any) -> None:
     with pytest.raises(InvalidValueError, match=r"at most|whole number from 1 to"):
         tiny(**changed)
+
+
+def test_a_setting_that_is_none_by_default_may_be_named_so() -> None:
+    assert StudyStrategy("default", {"hit_delay_ms": None}) == StudyStrategy("default")
+    assert StudyStrategy("nr", {"max_trials": None, "segments": "all"}).settings == {"segments": "all"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pandas as pd
@@ -75,3 +76,21 @@ def test_a_write_that_was_cut_off_is_no_part(store: Store) -> None:
     assert unit in store.left()
     store.keep(unit, rows_of(unit))
     assert unit not in store.left()
+
+
+def test_a_study_that_was_changed_in_its_folder_is_refused(store: Store) -> None:
+    file = store.folder / "study.toml"
+    text = file.read_text()
+    changed = re.sub(r"(?m)^seed = .*$", "seed = 77", text)
+    assert changed != text
+    file.write_text(changed)
+    with pytest.raises(StudyError, match="was changed since its sessions were run"):
+        open_store(store.folder)
+    file.write_text("# a remark\n" + text)
+    assert open_store(store.folder).study == store.study
+
+
+def test_a_folder_of_before_there_was_a_checksum_can_be_opened(store: Store) -> None:
+    file = store.folder / "study.toml"
+    file.write_text(re.sub(r"(?m)^checksum = .*$", "", file.read_text()))
+    assert open_store(store.folder).study == store.study

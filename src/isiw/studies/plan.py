@@ -78,10 +78,8 @@ class StudyStrategy:
 
     def __post_init__(self) -> None:
         chosen = settings_values(settings_for(self.name, **self.settings))
-        kept = {key: chosen[key] for key in self.settings if key in chosen}  # what is None by default is not named
-        if settings_values(settings_for(self.name, **kept)) != chosen:
-            nothing = sorted(set(self.settings) - set(chosen))
-            raise InvalidValueError("a study cannot name a setting that is None", got=nothing)
+        # What is None by default has no value to be kept.
+        kept = {key: chosen[key] for key in self.settings if key in chosen}
         object.__setattr__(self, "settings", kept)
         object.__setattr__(self, "label", self.label or self.name)
         if not re.fullmatch(r"[\w.+-]+", self.label):
