@@ -28,6 +28,7 @@ from isiw.errors import (
 )
 from isiw.log.reader import read_session
 from isiw.log.schema import Estimate, Intent
+from isiw.log.writer import LogWriter
 from isiw.report import final_statement
 from isiw.session import recorder
 from isiw.session.journal import relearned
@@ -498,3 +499,23 @@ def test_a_reason_in_own_words_is_noted_under_its_trial(log: Path) -> None:
         session.mistrial("the coil slipped")
     (note,) = read_session(log).events
     assert (note.kind, note.trial, note.text) == ("note", 0, "the coil slipped")
+
+
+def test_a_trial_whose_writing_was_interrupted_once_it_was_in_the_log_is_not_asked_again(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_session(scripted_strategy(20), log) as session:
+        isi_ms = session.ask()
+
+        def stopped(_: LogWriter) -> None:
+            monkeypatch.undo()
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(LogWriter, "sync", stopped)
+        with pytest.raises(KeyboardInterrupt):
+            session.tell(isi_ms, 0.1)
+        assert session.asked is None
+        run(session, 2)
+    record = read_session(log)
+    assert [intent.trial for intent in record.intents] == [trial.index for trial in record.table] == [0, 1, 2]
+    assert record.estimates[-1].trial == 2

@@ -195,11 +195,11 @@ class Recorder(Judging):
     @property
     def asked(self) -> Stimulus | None:
         """What was asked and has no outcome yet; None where nothing is open."""
-        return self._asked
+        return self._asked if self._asked is not None and self._asked.trial == len(self.trials) else None
 
     def wait_s(self) -> float:
         """How long `ask` would wait now until limits and protocol allow the next stimulus [s]."""
-        if self._asked is not None:
+        if self.asked is not None:
             return 0.0
         return max(0.0, self._earliest_s(len(self.trials)) - self._clock.now_s())
 
@@ -214,10 +214,10 @@ class Recorder(Judging):
             LogError: the log cannot be written, or is no longer at its path; deliver nothing.
         """
         with self._lock:
-            if self._asked is not None and self._asked.isi_ms is not None:
-                return self._asked.isi_ms
-            if self._asked is not None:  # TMS alone that was given, and never told
-                self._conclude(Trial.unknown(self._asked))
+            if self.asked is not None and self.asked.isi_ms is not None:
+                return self.asked.isi_ms
+            if self.asked is not None:  # TMS alone that was given, and never told
+                self._conclude(Trial.unknown(self.asked))
         self._wait()
         with self._lock:
             self._catch_up()
@@ -280,14 +280,14 @@ class Recorder(Judging):
         Warns:
             ImplausibleDataWarning: what looks like a slip of unit; it is told and logged all the same.
         """
-        if isi_ms is None and self._asked is None:
+        if isi_ms is None and self.asked is None:
             self._wait()
         with self._lock:
             self._tell(isi_ms, mep_mv, isi_sd_ms, background_rms_uv)
 
     def _tell(self, isi_ms: float | None, mep_mv: float, isi_sd_ms: float, background_rms_uv: float | None) -> None:
         self._catch_up()
-        if isi_ms is None and self._asked is None:
+        if isi_ms is None and self.asked is None:
             self._begin(None)
         mep_mv = number("mep_mv", mep_mv, least=0)
         isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
@@ -369,18 +369,17 @@ class Recorder(Judging):
             self.close()
 
     def _require_asked(self) -> Stimulus:
-        if self._asked is None:
+        if self.asked is None:
             raise InvalidValueError(
                 "nothing was asked whose outcome this could be", remedy="Call ask() first, then deliver, then tell()."
             )
-        return self._asked
+        return self.asked
 
     def _conclude(self, trial: Trial) -> None:
         """Put a trial on disk, then learn it, then put on disk what is believed."""
+        self._times_s.append(self._clock.now_s())
         self._journal.trial(trial)
         self._log.sync()
-        self._asked = None
-        self._times_s.append(self._clock.now_s())
         learn(self.strategy, trial)
         if trial.told and self.strategy.trouble is not None:
             self._log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
