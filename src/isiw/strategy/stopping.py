@@ -385,14 +385,15 @@ class AnyOf:
 
 
 def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:
-    """How many stimuli a rule's budget still allows after so many; None where it sets none."""
+    """How many stimuli a rule's budget still allows; None where it sets none.
+
+    Args:
+        rule: the stopping rule.
+        delivered: stimuli delivered so far.
+    """
     return rule.stimuli_left(delivered) if isinstance(rule, HasBudget) else None
 
 
 def looks_back(rule: StoppingRule) -> int:
-    """How many past estimates a rule needs.
-
-    Args:
-        rule: the stopping rule.
-    """
+    """How many past estimates a rule needs."""
     return rule.looks_back if isinstance(rule, LooksBack) else 0
