@@ -212,9 +212,10 @@ def test_zeros_are_recalled_as_a_model_of_a_users_own_took_them(tmp_path: Path) 
     assert recalled(record, Prior(), particles=100).model.detection_limit_mv == 0.05
 
 
-def test_a_session_is_recalled_with_the_hit_delay_that_its_strategy_was_told(tmp_path: Path) -> None:
-    strategy = make_strategy("default", particles=100, hit_delay_ms=(60.0, 4.0))
+def test_a_session_is_recalled_with_what_its_strategy_was_told_of_rig_and_muscle(tmp_path: Path) -> None:
+    strategy = make_strategy("default", particles=100, hit_delay_ms=(60.0, 4.0), muscle="hand")
     with isiw.open_session(strategy, tmp_path / "s.mcap") as session:
         session.tell(session.ask(), 0.05)
     recall = recalled(isiw.read_session(tmp_path / "s.mcap"), Prior(), particles=100)
     assert recall.model.prior.profile.start.hit_delay_ms == (60.0, 4.0)
+    assert recall.model.prior.muscle == "hand"

@@ -58,7 +58,9 @@ def require_meps(record: SessionRecord) -> None:
 
 
 def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
-    """The prior, told when the tap hits: as it says itself, or as the session's strategy or device says."""
+    """The prior, told when the tap hits and whose MEPs these are, as far as prior, strategy or device say."""
     start, settings = prior.profile.start, record.header.strategy.settings
     stated = start.hit_delay_ms or settings.get("hit_delay_ms") or record.header.device.hit_delay_ms
-    return replace(prior, profile=replace(prior.profile, start=replace(start, hit_delay_ms=stated)))
+    profile = replace(prior.profile, start=replace(start, hit_delay_ms=stated))
+    told = {settings.get("muscle")} & {muscle.name for muscle in prior.muscles}
+    return replace(prior, profile=profile, muscle=prior.muscle or next(iter(told), None))
