@@ -16,11 +16,13 @@ import pytest
 from playwright.sync_api import Page, ViewportSize
 
 from browsing import IN_CHROMIUM, broken_rules, chromium, screenshots
-from isiw.log.reader import SessionRecord
+from isiw.log.reader import SessionRecord, read_session
 from isiw.priors import Difference
 from isiw.report.compared import save_comparison
 from isiw.report.page import save_report
+from isiw.session.recorder import open_session
 from report.sessions import HOSTILE, tapped
+from scripted import scripted_strategy
 
 SIZE: ViewportSize = {"width": 1000, "height": 900}
 pytestmark = IN_CHROMIUM
@@ -245,6 +247,22 @@ def test_sessions_beside_each_other_are_a_page_for_everybody(
     assert broken_rules(page) == []
     page.screenshot(path=pictures / "compared.png", full_page=True)
     assert (opened.said, len(opened.asked)) == ([], 1)
+    page.close()
+
+
+def test_after_a_trial_that_others_followed_nothing_is_said_to_have_stopped(browser: Any, tmp_path: Path) -> None:
+    with open_session(scripted_strategy(2), tmp_path / "s.mcap") as session:
+        for _ in range(2):
+            session.tell(session.ask(), 0.05)
+        session.tell(None, 0.01)
+        session.tell(None, 0.02)
+    page = browser.new_page()
+    page.goto(save_report(read_session(tmp_path / "s.mcap"), tmp_path / "s.html").as_uri())
+    page.locator("#belief .main-svg").first.wait_for()
+    next_said = page.locator("#told-next")
+    assert next_said.inner_text() == "Nothing was asked after it: the session stopped."
+    page.locator("input[type=range]").first.press("ArrowLeft")
+    assert next_said.inner_text() == "Next came trial 3: TMS alone."
     page.close()
 
 
