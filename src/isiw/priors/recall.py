@@ -62,5 +62,6 @@ def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
     start, settings = prior.profile.start, record.header.strategy.settings
     stated = start.hit_delay_ms or settings.get("hit_delay_ms") or record.header.device.hit_delay_ms
     profile = replace(prior.profile, start=replace(start, hit_delay_ms=stated))
-    told = {settings.get("muscle")} & {muscle.name for muscle in prior.muscles}
-    return replace(prior, profile=profile, muscle=prior.muscle or next(iter(told), None))
+    told = settings.get("muscle")
+    known = told if told in {muscle.name for muscle in prior.muscles} else None
+    return replace(prior, profile=profile, muscle=prior.muscle or known)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Trial, TrialTable
-from isiw.window import NO_MEP, WindowEstimate
+from isiw.window import WindowEstimate
 
 __all__ = ["SessionResult", "SessionUpdate"]
 
@@ -42,15 +42,12 @@ class SessionResult:
         decision: why it ended.
         trials: all its trials.
         log: its log.
-        is_silent: whether every amplitude was 0, so that the estimate is no finding.
     """
 
     estimate: WindowEstimate
     decision: StopDecision
     trials: TrialTable
     log: Path
-    is_silent: bool = False
 
     def __str__(self) -> str:
-        found = NO_MEP if self.is_silent else self.estimate
-        return f"{found}\nTrials: {self.trials}\nEnded: {self.decision.reason}\nLog: {self.log}"
+        return f"{self.estimate}\nTrials: {self.trials}\nEnded: {self.decision.reason}\nLog: {self.log}"

@@ -60,7 +60,7 @@ class Progress:
 
 
 class StoppingRule(Protocol):
-    """A rule: from progress to a decision. One that needs `Progress.past` or sets a budget says so by what follows."""
+    """A rule: from progress to a decision. `LooksBack` and `HasBudget` are what it may say of itself besides."""
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
