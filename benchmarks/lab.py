@@ -63,7 +63,7 @@ def told(law: Lab) -> Prior:
         sessions=(),
         p_window=0.98,
         shapes=ShapeShares(0.97, 0.01, 0.01, 0.01),
-        noise=NoiseShares(0.02, 0.01, 0.96, 0.01),
+        noise=NoiseShares(0.02, 0.01, 0.96, 0.01, 0.0),
         place=Place(
             TOLD_SHARE, Scale(start_ms, math.hypot(law.start_ms[1], law.hit_delay_ms[1])), Scale(*law.width_ms)
         ),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import replace
+import tomllib
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+import tomli_w
 import torch
 
 import isiw
@@ -15,6 +17,7 @@ from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import ConfigError, InvalidValueError, LogError, StrategyError
 from isiw.models.particles import ParticleModel
+from isiw.models.particles.laws import NoiseShares
 from isiw.models.particles.prior import Prior
 from isiw.priors.recall import recalled
 from isiw.strategy.catalogue import make_strategy
@@ -159,14 +162,27 @@ def test_a_strategy_with_another_model_does_not_take_a_lab_prior(path: Path) -> 
 @pytest.mark.parametrize(
     ("line", "wrong", "message"),
     [
-        ("schema_version = 1", "schema_version = 99", "newer isiw"),
-        ("schema_version = 1", "schema_version = 1\nrun = 'rm'", "run is unknown"),
+        ("schema_version = 2", "schema_version = 99", "newer isiw"),
+        ("schema_version = 2", "schema_version = 2\nrun = 'rm'", "run is unknown"),
         ("p_window = ", "p_window = 1e3 #", "p_window"),
     ],
 )
 def test_a_file_that_is_no_lab_prior_is_refused(path: Path, line: Any, wrong: Any, message: Any) -> None:
     path.write_text(path.read_text().replace(line, wrong, 1))
     with pytest.raises(ConfigError, match=message):
+        priors.load(path)
+
+
+def test_a_file_that_knew_no_curves_with_a_threshold_gives_them_their_usual_share(path: Path, lab: Any) -> None:
+    own = lab.noise.rectified
+    others = {name: share / (1.0 - own) for name, share in asdict(lab.noise).items() if name != "rectified"}
+    old = tomllib.loads(path.read_text()) | {"schema_version": 1, "noise": others}
+    path.write_text(tomli_w.dumps(old))
+    noise, usual = priors.load(path).noise, NoiseShares().rectified
+    assert noise.rectified == usual
+    assert noise.recruitment == pytest.approx((1.0 - usual) * others["recruitment"])
+    path.write_text(tomli_w.dumps(old | {"noise": others | {"recruitment": "most"}}))
+    with pytest.raises(ConfigError, match=r"noise\.recruitment"):
         priors.load(path)
 
 

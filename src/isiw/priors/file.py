@@ -10,6 +10,7 @@ import tomli_w
 
 from isiw.errors import ConfigError
 from isiw.log.outputs import write_output
+from isiw.models.particles.laws import NoiseShares
 from isiw.models.particles.prior import Prior
 from isiw.priors.lab import SCHEMA_VERSION, LabPrior
 from isiw.text.toml_files import checked, read_toml
@@ -49,7 +50,7 @@ def read_lab_prior(path: str | Path) -> LabPrior:
             expected=f"{SCHEMA_VERSION} or older",
             remedy="Upgrade isiw, or learn it again from the logs.",
         )
-    return checked(LabPrior, values, str(path))
+    return checked(LabPrior, _upgraded(values), str(path))
 
 
 def load(path: str | Path) -> Prior:
@@ -62,6 +63,16 @@ def load(path: str | Path) -> Prior:
         ConfigError: as from `read_lab_prior`.
     """
     return read_lab_prior(path).joined()
+
+
+def _upgraded(values: dict[str, Any]) -> dict[str, Any]:
+    """A file of schema version 1, which knew no curves that start at a threshold: they get their usual share."""
+    noise = values.get("noise")
+    if values.get("schema_version") != 1 or not isinstance(noise, dict):
+        return values
+    share = NoiseShares().rectified
+    learnt = {name: (1.0 - share) * value for name, value in noise.items() if isinstance(value, int | float)}
+    return values | {"schema_version": SCHEMA_VERSION, "noise": noise | learnt | {"rectified": share}}
 
 
 def _plain(value: Any) -> Any:

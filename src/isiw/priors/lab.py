@@ -27,7 +27,7 @@ __all__ = ["LabPrior", "LearntSession", "learn"]
 
 _T = TypeVar("_T")
 
-SCHEMA_VERSION: Final = 1
+SCHEMA_VERSION: Final = 2
 
 LEAST_USUAL: Final = 0.1
 """The share that the built-in prior keeps however many people were learnt from, so that an odd one is still found."""

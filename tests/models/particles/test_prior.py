@@ -18,6 +18,7 @@ from isiw.models.particles.laws import (
     Muscle,
     NoiseShares,
     ProfilePrior,
+    RectifiedPrior,
     SessionPrior,
     ShapeShares,
     SwitchPrior,
@@ -31,7 +32,8 @@ from isiw.models.shared.start import StartPrior
 from isiw.priors.components import beside
 
 MANY = 20_000
-ONLY_CURVES = NoiseShares(0.0, 0.0, 1.0, 0.0)
+ONLY_CURVES = NoiseShares(0.0, 0.0, 1.0, 0.0, 0.0)
+ONLY_RECTIFIED = NoiseShares(0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def people(prior: Prior) -> Person:
@@ -56,6 +58,8 @@ def test_kinds_come_as_often_as_the_prior_says() -> None:
         (Width, {"share": 1.5}),
         (Gain, {"cv": Scale(0.0, 0.3)}),
         (SwitchPrior, {"reliability": Scale(0.0, -1.0)}),
+        (RectifiedPrior, {"onset": Scale(-0.1, 0.5)}),
+        (RectifiedPrior, {"rest_pct": Scale(-6.0, 0.0)}),
         (Floor, {"median_mv": Scale(0.009, 0.0)}),
         (SessionPrior, {"drift_sd": -0.1}),
         (SessionPrior, {"startup": Scale(0.5, -0.5)}),
@@ -117,6 +121,23 @@ def test_a_muscles_curves_are_as_it_says(muscle: Muscle) -> None:
         assert far == pytest.approx(0.674 * scale.sd, rel=0.05)
     assert response.rest.median().item() == pytest.approx(slope * muscle.rest_pct.median, rel=0.05)
     assert response.boost.median().item() == pytest.approx(slope * muscle.boost_pct.median, rel=0.05)
+
+
+def test_curves_that_start_at_a_threshold_are_as_their_law_says() -> None:
+    prior = Prior(noise=ONLY_RECTIFIED)
+    law, response = prior.rectified, people(prior).response
+    slope = law.slope_per_pct.median
+    assert response.log_ratio.exp().median().item() == pytest.approx(law.ratio.median, rel=0.06)
+    assert response.onset.median().item() == pytest.approx(law.onset.median, rel=0.05)
+    assert 0.0 < response.onset.min().item() < response.onset.max().item() <= 0.9
+    assert response.boost.median().item() == pytest.approx(slope * law.boost_pct.median, rel=0.05)
+    below_threshold = torch.logit(response.onset) - response.rest
+    assert below_threshold.median().item() == pytest.approx(-slope * law.rest_pct.median, rel=0.05)
+
+
+def test_no_other_curve_has_a_threshold() -> None:
+    response = people(Prior()).response
+    assert bool(((response.onset > 0) == (response.kind == NoiseKind.RECTIFIED)).all())
 
 
 def test_hands_reach_from_small_meps_to_large_ones_below_and_above_threshold() -> None:

@@ -11,7 +11,12 @@ import torch
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.protocol import Tensor
 
-__all__ = ["BLOCKS", "LATENTS", "PROFILE_BLOCKS", "RESPONSE_BLOCKS", "Latents", "latents_of", "used_by"]
+__all__ = ["BLOCKS", "LATENTS", "PROFILE_BLOCKS", "RECTIFIED", "RESPONSE_BLOCKS", "Latents", "latents_of", "used_by"]
+
+_CURVE: Final = ("log_ceiling", "log_slope", "log_input_sd", "log_sigma_y", "log_boost", "rest")
+
+RECTIFIED: Final = {name: f"rectified_{name}" for name in _CURVE}
+"""What the latents of a recruitment curve are called where it starts at a threshold."""
 
 BLOCKS: Final = {
     "start": ("start_ms",),
@@ -21,8 +26,9 @@ BLOCKS: Final = {
     "session": ("drift", "startup"),
     "gain": ("log_gain", "log_cv"),
     "reliability": ("reliability",),
-    "switch": ("switched_on", "switched_off"),
-    "recruitment": ("log_ceiling", "log_slope", "log_input_sd", "log_sigma_y", "log_boost", "rest"),
+    "switch": ("switched_on", "switched_off", "log_size", "log_size_cv"),
+    "recruitment": _CURVE,
+    "rectified": (*RECTIFIED.values(), "log_onset"),
 }
 """The latents by what they are about."""
 
@@ -30,14 +36,15 @@ LATENTS: Final = tuple(name for names in BLOCKS.values() for name in names)
 """Names of the latents, in order."""
 
 PROFILE_BLOCKS: Final = ("start", "width", "form")
-RESPONSE_BLOCKS: Final = ("gain", "reliability", "switch", "recruitment")
+RESPONSE_BLOCKS: Final = ("gain", "reliability", "switch", "recruitment", "rectified")
 
 _COMMON: Final = ("floor", "session")
 _USED: Final = {
     NoiseKind.CONSTANT_CV: ("gain",),
     NoiseKind.MISSING: ("gain", "reliability"),
     NoiseKind.RECRUITMENT: ("recruitment",),
-    NoiseKind.ALL_OR_NONE: ("gain", "switch"),
+    NoiseKind.ALL_OR_NONE: ("switch",),
+    NoiseKind.RECTIFIED: ("rectified",),
 }
 
 

@@ -25,6 +25,7 @@ __all__ = [
     "Muscle",
     "NoiseShares",
     "ProfilePrior",
+    "RectifiedPrior",
     "SessionPrior",
     "ShapeShares",
     "SwitchPrior",
@@ -74,15 +75,17 @@ class NoiseShares:
         missing: of the same with missing responses.
         recruitment: of a recruitment curve with noise on its input.
         all_or_none: of responses that are all or none: those of a very steep curve.
+        rectified: of a recruitment curve that starts at a threshold.
 
     Raises:
         InvalidValueError: probabilities that do not sum to 1.
     """
 
-    constant_cv: float = 0.37
+    constant_cv: float = 0.36
     missing: float = 0.11
-    recruitment: float = 0.44
+    recruitment: float = 0.43
     all_or_none: float = 0.08
+    rectified: float = 0.02
 
     def __post_init__(self) -> None:
         _check_shares(self)
@@ -237,6 +240,40 @@ OTHER_MUSCLE: Final = Muscle(
 
 
 @dataclass(frozen=True)
+class RectifiedPrior:
+    """Of recruitment curves that start at a threshold [Tyagi2024]: what the logistic curve is above its value there.
+
+    Such a curve is flat at rest, rises within a few % RMT, and then grows in proportion to the input; a logistic curve
+    through its middle makes windows too wide. The forearm whose whole curve was recorded is one (decision 19).
+
+    Args:
+        ratio: the largest MEP over the floor, A.
+        slope_per_pct: k of the logistic curve [1 / % RMT].
+        input_sd: SD of the noise on the input, k sigma_x.
+        sigma_y: SD of the noise on the output, natural log.
+        boost_pct: shift of the input at the best ISI [% RMT].
+        rest_pct: the input without a tap, intensity − threshold [% RMT].
+        onset: the logistic curve at the threshold, as a share of its largest value.
+
+    Raises:
+        InvalidValueError: an invalid scale.
+    """
+
+    ratio: Scale = Scale(200.0, 1.2)
+    slope_per_pct: Scale = Scale(0.10, 0.35)
+    input_sd: Scale = Scale(0.7, 0.4)
+    sigma_y: Scale = Scale(0.2, 0.6)
+    boost_pct: Scale = Scale(18.0, 0.5)
+    rest_pct: Scale = Scale(-6.0, 5.0)
+    onset: Scale = Scale(0.1, 0.5)
+
+    def __post_init__(self) -> None:
+        positive = ("ratio", "slope_per_pct", "input_sd", "sigma_y", "boost_pct", "onset")
+        check_scales(self, *positive, tailed=False)
+        check_scales(self, "rest_pct", positive=False, tailed=False)
+
+
+@dataclass(frozen=True)
 class Gain:
     """A law of responses in proportion to the facilitation, with noise of a constant CV.
 
@@ -260,7 +297,7 @@ class Gain:
 
 @dataclass(frozen=True)
 class SwitchPrior:
-    """Of the probabilities with which responses come, where they may be missing or are all or none; in logits.
+    """Of how often responses come that may be missing or are all or none, in logits, and of the size of the latter.
 
     Args:
         reliability: of a response at the best ISI where responses may be missing; often about one half (dissertation,
@@ -268,6 +305,7 @@ class SwitchPrior:
         switched_on: of a response at the best ISI where responses are all or none.
         switched_off: of such a response without a tap; 0.05–0.25 of the trials at 90 % RMT are above 50 µV in the hand,
             next to none in the forearm.
+        sizes: of responses that are all or none: of a forearm, or of a hand; their ratio is that of an expected one.
 
     Raises:
         InvalidValueError: an invalid scale.
@@ -276,6 +314,10 @@ class SwitchPrior:
     reliability: Scale = Scale(0.2, 0.7)
     switched_on: Scale = Scale(1.2, 0.9)
     switched_off: Scale = Scale(-3.3, 1.0)
+    sizes: tuple[Gain, ...] = (
+        Gain(0.6, Scale(8.0, 0.8), Scale(0.62, 0.3)),
+        Gain(0.4, Scale(60.0, 0.9), Scale(0.62, 0.45)),
+    )
 
     def __post_init__(self) -> None:
         check_scales(self, "reliability", "switched_on", "switched_off", positive=False, tailed=False)

@@ -210,7 +210,8 @@ class ParticlePosterior:
 
     def _with_shift(self, excluded: Enhancement | None, latents: Latents) -> Enhancement | None:
         """The same, with the shift of the input that recruitment curves exclude."""
-        shift_pct_rmt = self.model.prior.shift_pct_rmt(latents)[latents.noise == NoiseKind.RECRUITMENT]
+        recruits = (latents.noise == NoiseKind.RECRUITMENT) | (latents.noise == NoiseKind.RECTIFIED)
+        shift_pct_rmt = self.model.prior.shift_pct_rmt(latents)[recruits]
         if excluded is None or len(shift_pct_rmt) < LEAST_SAMPLES:
             return excluded
         return excluded._replace(shift_pct_rmt=float(torch.quantile(shift_pct_rmt, EXCLUDED_AT)))

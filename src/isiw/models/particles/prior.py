@@ -16,7 +16,7 @@ import torch
 
 from isiw.checks import choice
 from isiw.design import DesignSpace
-from isiw.models.particles.latents import BLOCKS, LATENTS, Latents, latents_of
+from isiw.models.particles.latents import BLOCKS, LATENTS, RECTIFIED, Latents, latents_of
 from isiw.models.particles.laws import (
     FOREARM,
     HAND,
@@ -26,6 +26,7 @@ from isiw.models.particles.laws import (
     Muscle,
     NoiseShares,
     ProfilePrior,
+    RectifiedPrior,
     SessionPrior,
     SwitchPrior,
 )
@@ -38,10 +39,14 @@ from isiw.models.shared.scales import Scale
 
 __all__ = ["Depression", "Person", "Prior"]
 
-_WITHOUT_CURVE: Final = {
+MOST_ONSET: Final = 0.9
+"""A threshold further up a recruitment curve would leave nothing of it."""
+
+_WITHOUT_MUSCLE: Final = {
     NoiseKind.CONSTANT_CV: "constant-CV noise",
     NoiseKind.MISSING: "missing responses",
     NoiseKind.ALL_OR_NONE: "all-or-none responses",
+    NoiseKind.RECTIFIED: "recruitment curve with a threshold",
 }
 
 
@@ -75,6 +80,7 @@ class Prior:
         gains: of responses with noise of a constant CV.
         switch: of how often responses come.
         muscles: of recruitment curves.
+        rectified: of recruitment curves that start at a threshold.
         floors: of the EMG floor.
         session: of what changes within a session.
         muscle: the name of the muscle, where it is known: the others that have a name are left out then.
@@ -91,6 +97,7 @@ class Prior:
     )
     switch: SwitchPrior = field(default_factory=SwitchPrior)
     muscles: tuple[Muscle, ...] = (FOREARM, HAND, OTHER_MUSCLE)
+    rectified: RectifiedPrior = field(default_factory=RectifiedPrior)
     floors: tuple[Floor, ...] = (
         Floor(0.85, Scale(0.009, 0.38), Scale(0.22, 0.4)),
         Floor(0.15, Scale(0.009, 1.2), Scale(0.22, 0.5)),
@@ -106,15 +113,17 @@ class Prior:
     def mixtures(self) -> dict[str, Mixture]:
         """What is believed of each block but the start, places aside."""
         switch, session = self.switch, self.session
+        often = [_plain(switch.switched_on), _plain(switch.switched_off)]
         return {
             "width": _mixture([(w.share, [_log(w.width_ms)]) for w in self.profile.widths]),
             "form": _mixture([(1.0, [(0.0, 1.0)])]),
             "floor": _mixture([(f.share, [_log(f.median_mv), _log(f.log_sd)]) for f in self.floors]),
             "session": _mixture([(1.0, [(0.0, session.drift_sd), _plain(session.startup)])]),
-            "gain": _mixture([(g.share, [_log(g.ratio), _log(g.cv)]) for g in self.gains]),
+            "gain": _mixture([(g.share, _of_gain(g)) for g in self.gains]),
             "reliability": _mixture([(1.0, [_plain(switch.reliability)])]),
-            "switch": _mixture([(1.0, [_plain(switch.switched_on), _plain(switch.switched_off)])]),
-            "recruitment": _mixture([(m.share, _of_muscle(m)) for m in self.possible_muscles]),
+            "switch": _mixture([(size.share, [*often, *_of_gain(size)]) for size in switch.sizes]),
+            "recruitment": _mixture([(m.share, _of_curve(m)) for m in self.possible_muscles]),
+            "rectified": _mixture([(1.0, [*_of_curve(self.rectified), _log(self.rectified.onset)])]),
         }
 
     @cached_property
@@ -219,15 +228,15 @@ class Prior:
     def hypotheses(self) -> tuple[str, ...]:
         """What the kinds of responses are called: kinds of noise, and muscles."""
         names = dict.fromkeys(f"recruitment curve, {muscle.name}" for muscle in self.possible_muscles)
-        return (*_WITHOUT_CURVE.values(), *names)
+        return (*_WITHOUT_MUSCLE.values(), *names)
 
     def hypothesis(self, latents: Latents) -> Tensor:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
         recruitment = latents.values[..., latents_of("recruitment", device=latents.values.device)]
         names = [muscle.name for muscle in self.possible_muscles]
         numbers = torch.tensor([list(dict.fromkeys(names)).index(name) for name in names], device=recruitment.device)
-        kind = len(_WITHOUT_CURVE) + numbers[self.mixtures["recruitment"].component(recruitment)]
-        for number, noise in enumerate(_WITHOUT_CURVE):
+        kind = len(_WITHOUT_MUSCLE) + numbers[self.mixtures["recruitment"].component(recruitment)]
+        for number, noise in enumerate(_WITHOUT_MUSCLE):
             kind = torch.where(latents.noise == noise, number, kind)
         return kind
 
@@ -253,7 +262,9 @@ class Prior:
 
     def shift_pct_rmt(self, latents: Latents) -> Tensor:
         """Shift of the recruitment curve's input at the best ISI [% RMT], 0 without facilitation, shape (b, p)."""
-        return torch.where(latents.present, latents.values[..., LATENTS.index("log_boost")].exp(), 0.0)
+        own, rectified = (latents.values[..., LATENTS.index(name)] for name in ("log_boost", RECTIFIED["log_boost"]))
+        boost = torch.where(latents.noise == NoiseKind.RECTIFIED, rectified, own)
+        return torch.where(latents.present, boost.exp(), 0.0)
 
     def person(self, latents: Latents) -> Person:
         """What particles mean."""
@@ -262,17 +273,21 @@ class Prior:
         return Person(shape, self._response(z, latents.noise), latents.present)
 
     def _response(self, z: dict[str, Tensor], noise: Tensor) -> Response:
-        recruits, switches = noise == NoiseKind.RECRUITMENT, noise == NoiseKind.ALL_OR_NONE
-        slope = z["log_slope"].exp()
+        switches, rectified = noise == NoiseKind.ALL_OR_NONE, noise == NoiseKind.RECTIFIED
+        recruits = rectified | (noise == NoiseKind.RECRUITMENT)
+        z |= {name: torch.where(rectified, z[own], z[name]) for name, own in RECTIFIED.items()}
+        onset = torch.where(rectified, z["log_onset"].exp().clamp_max(MOST_ONSET), 0.0)
+        slope, cv = z["log_slope"].exp(), torch.where(switches, z["log_size_cv"], z["log_cv"])
         return Response(
             kind=noise,
             log_floor=z["log_floor_mv"],
             floor_log_sd=z["log_floor_sd"].exp(),
-            log_ratio=torch.where(recruits, z["log_ceiling"], z["log_gain"]),
-            spread=torch.where(recruits, z["log_input_sd"], z["log_cv"]).exp(),
+            log_ratio=torch.where(recruits, z["log_ceiling"], torch.where(switches, z["log_size"], z["log_gain"])),
+            spread=torch.where(recruits, z["log_input_sd"], cv).exp(),
             output_log_sd=z["log_sigma_y"].exp(),
             boost=slope * z["log_boost"].exp(),
-            rest=slope * z["rest"],
+            rest=slope * z["rest"] + torch.where(rectified, torch.logit(onset), 0.0),
+            onset=onset,
             max_probability=torch.sigmoid(torch.where(switches, z["switched_on"], z["reliability"])),
             rest_probability=torch.sigmoid(z["switched_off"]),
             drift=z["drift"],
@@ -288,9 +303,13 @@ def _log(scale: Scale) -> tuple[float, float]:
     return math.log(scale.median), scale.sd
 
 
-def _of_muscle(muscle: Muscle) -> list[tuple[float, float]]:
-    scales = (muscle.ratio, muscle.slope_per_pct, muscle.input_sd, muscle.sigma_y, muscle.boost_pct)
-    return [*map(_log, scales), _plain(muscle.rest_pct)]
+def _of_gain(law: Gain) -> list[tuple[float, float]]:
+    return [_log(law.ratio), _log(law.cv)]
+
+
+def _of_curve(law: Muscle | RectifiedPrior) -> list[tuple[float, float]]:
+    scales = (law.ratio, law.slope_per_pct, law.input_sd, law.sigma_y, law.boost_pct)
+    return [*map(_log, scales), _plain(law.rest_pct)]
 
 
 def _mixture(components: list[tuple[float, list[tuple[float, float]]]]) -> Mixture:

@@ -270,6 +270,7 @@ def _response(z: dict[str, Tensor]) -> Response:
         output_log_sd=z["log_sigma_y"].exp(),
         boost=slope * z["log_shift"].exp(),
         rest=slope * z["rest"],
+        onset=nothing,
         max_probability=nothing + 1.0,
         rest_probability=nothing,
         drift=z["drift"],
