@@ -131,6 +131,9 @@ def test_curves_that_start_at_a_threshold_are_as_their_law_says() -> None:
     assert response.onset.median().item() == pytest.approx(law.onset.median, rel=0.05)
     assert 0.0 < response.onset.min().item() < response.onset.max().item() <= 0.9
     assert response.boost.median().item() == pytest.approx(slope * law.boost_pct.median, rel=0.05)
+    latents = prior.sample(1, MANY, torch.Generator().manual_seed(1), VALVE_SPACE)
+    shift_pct_rmt = prior.shift_pct_rmt(latents)[latents.present]
+    assert shift_pct_rmt.median().item() == pytest.approx(law.boost_pct.median, rel=0.05)
     below_threshold = torch.logit(response.onset) - response.rest
     assert below_threshold.median().item() == pytest.approx(-slope * law.rest_pct.median, rel=0.05)
 
