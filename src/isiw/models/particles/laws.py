@@ -305,7 +305,7 @@ class SwitchPrior:
         switched_on: of a response at the best ISI where responses are all or none.
         switched_off: of such a response without a tap; 0.05–0.25 of the trials at 90 % RMT are above 50 µV in the hand,
             next to none in the forearm.
-        sizes: of responses that are all or none: of a forearm, or of a hand; their ratio is that of an expected one.
+        sizes: of responses that are all or none, a forearm's or a hand's; their ratio is that of the mean response.
 
     Raises:
         InvalidValueError: an invalid scale.

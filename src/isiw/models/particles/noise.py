@@ -75,7 +75,7 @@ class Response(NamedTuple):
     """Response parameters of many particles; all fields have the particles' shape (..., p).
 
     Args:
-        kind: one of `NoiseKind`; a rectified curve is a recruitment curve here, but for its threshold.
+        kind: one of `NoiseKind`; what is of recruitment curves here is of rectified ones too.
         log_floor: natural log of the median EMG floor [mV].
         floor_log_sd: SD of the floor from trial to trial, natural log.
         log_ratio: natural log of the largest evoked MEP over the floor (recruitment), or of the expected evoked MEP at
