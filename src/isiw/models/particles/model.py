@@ -13,7 +13,7 @@ from isiw.design import DesignSpace
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import levels
-from isiw.models.particles.noise import NoiseKind, Response, draw_log_mep, log_gain
+from isiw.models.particles.noise import Response, draw_log_mep, log_gain, recruits
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Person, Prior
 from isiw.models.particles.shapes import Shape
@@ -210,8 +210,7 @@ class ParticlePosterior:
 
     def _with_shift(self, excluded: Enhancement | None, latents: Latents) -> Enhancement | None:
         """The same, with the shift of the input that recruitment curves exclude."""
-        recruits = (latents.noise == NoiseKind.RECRUITMENT) | (latents.noise == NoiseKind.RECTIFIED)
-        shift_pct_rmt = self.model.prior.shift_pct_rmt(latents)[recruits]
+        shift_pct_rmt = self.model.prior.shift_pct_rmt(latents)[recruits(latents.noise)]
         if excluded is None or len(shift_pct_rmt) < LEAST_SAMPLES:
             return excluded
         return excluded._replace(shift_pct_rmt=float(torch.quantile(shift_pct_rmt, EXCLUDED_AT)))

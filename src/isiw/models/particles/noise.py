@@ -32,6 +32,7 @@ __all__ = [
     "log_gain",
     "log_likelihood",
     "outcome_density",
+    "recruits",
 ]
 
 NODES = 8
@@ -69,6 +70,15 @@ class NoiseKind(IntEnum):
     RECRUITMENT = 2
     ALL_OR_NONE = 3
     RECTIFIED = 4
+
+
+def recruits(kind: Tensor) -> Tensor:
+    """Which particles have a recruitment curve, with a threshold or without, same shape.
+
+    Args:
+        kind: one of `NoiseKind`, any shape.
+    """
+    return (kind == NoiseKind.RECRUITMENT) | (kind == NoiseKind.RECTIFIED)
 
 
 class Response(NamedTuple):
@@ -187,8 +197,8 @@ def _is(response: Response, kind: NoiseKind) -> Tensor:
 
 
 def _recruits(response: Response) -> Tensor:
-    """Which particles have a recruitment curve, with a threshold or without, shape (..., p, 1)."""
-    return _is(response, NoiseKind.RECRUITMENT) | _is(response, NoiseKind.RECTIFIED)
+    """Which particles have a recruitment curve, shape (..., p, 1)."""
+    return recruits(response.kind).unsqueeze(-1)
 
 
 def _size(response: Response, level: Tensor) -> Tensor:

@@ -31,7 +31,7 @@ from isiw.models.particles.laws import (
     SwitchPrior,
 )
 from isiw.models.particles.mixture import JointMixture, Mixture, drawn
-from isiw.models.particles.noise import NoiseKind, Response
+from isiw.models.particles.noise import NoiseKind, Response, recruits
 from isiw.models.particles.places import mixture_of
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
@@ -273,8 +273,7 @@ class Prior:
         return Person(shape, self._response(z, latents.noise), latents.present)
 
     def _response(self, z: dict[str, Tensor], noise: Tensor) -> Response:
-        switches, rectified = noise == NoiseKind.ALL_OR_NONE, noise == NoiseKind.RECTIFIED
-        recruits = rectified | (noise == NoiseKind.RECRUITMENT)
+        curved, switches, rectified = recruits(noise), noise == NoiseKind.ALL_OR_NONE, noise == NoiseKind.RECTIFIED
         z |= {name: torch.where(rectified, z[own], z[name]) for name, own in RECTIFIED.items()}
         onset = torch.where(rectified, z["log_onset"].exp().clamp_max(MOST_ONSET), 0.0)
         slope, cv = z["log_slope"].exp(), torch.where(switches, z["log_size_cv"], z["log_cv"])
@@ -282,8 +281,8 @@ class Prior:
             kind=noise,
             log_floor=z["log_floor_mv"],
             floor_log_sd=z["log_floor_sd"].exp(),
-            log_ratio=torch.where(recruits, z["log_ceiling"], torch.where(switches, z["log_size"], z["log_gain"])),
-            spread=torch.where(recruits, z["log_input_sd"], cv).exp(),
+            log_ratio=torch.where(curved, z["log_ceiling"], torch.where(switches, z["log_size"], z["log_gain"])),
+            spread=torch.where(curved, z["log_input_sd"], cv).exp(),
             output_log_sd=z["log_sigma_y"].exp(),
             boost=slope * z["log_boost"].exp(),
             rest=slope * z["rest"] + torch.where(rectified, torch.logit(onset), 0.0),
