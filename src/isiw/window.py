@@ -202,6 +202,7 @@ class WindowEstimate:
         largest_excluded: an enhancement that, with 90 % probability, is larger than the largest at any ISI.
         unusual: how probable it is that parts of this person are of another law than the usual one, by their names.
         pairs: how many pairs of stimuli it rests on; None where that is not known.
+        silent: whether no trial that it rests on showed an MEP, so that nothing is known about a window.
         depressed: the ISIs that depress the MEP, as far as they are reported; None where there are none, or where
             nobody looked for them.
         depressed_probability: probability that there are any; None where nobody looked for them.
@@ -227,6 +228,7 @@ class WindowEstimate:
     largest_excluded: Enhancement | None = None
     unusual: Mapping[str, float] = field(default_factory=dict, repr=False)
     pairs: int | None = None
+    silent: bool = False
     depressed: Window | None = None
     depressed_probability: float | None = None
 
@@ -268,7 +270,7 @@ class WindowEstimate:
 
     def __str__(self) -> str:
         if not self.rests_on_data:
-            return TOO_FEW
+            return NO_MEP if self.silent else TOO_FEW
         start, end = self.interval(0.9) or ((None, None), (None, None))
         depressed = self.depressed, self.depressed_probability
         return finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end), depressed)
@@ -276,7 +278,7 @@ class WindowEstimate:
     @property
     def rests_on_data(self) -> bool:
         """Whether enough was measured to speak of a window; with less it is what was believed beforehand."""
-        return self.pairs is None or self.pairs >= ENOUGH_PAIRS
+        return not self.silent and (self.pairs is None or self.pairs >= ENOUGH_PAIRS)
 
     def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:
         """Credible intervals of start and end, given that there is a window [ms].

@@ -10,8 +10,9 @@ import pytest
 import isiw
 from isiw.errors import LogError
 from isiw.report.evidence import contradiction, no_comparison
+from isiw.strategy.stopping import StopDecision
 from isiw.trials import Status, Trial
-from isiw.window import Window
+from isiw.window import NO_MEP, Window
 from scripted import scripted_strategy
 
 
@@ -84,8 +85,20 @@ def test_zeros_below_a_high_detection_limit_are_a_finding(
         for _ in range(11):
             session.tell(session.ask(), 0.0)
     record = isiw.read_session(tmp_path / "zeros.mcap")
-    assert record.is_silent == silent
+    assert record.is_silent == strategy.estimate().silent == silent
+    assert (str(strategy.estimate()) == NO_MEP) == (NO_MEP in str(record)) == silent
     assert bool(recwarn.list) == silent
+
+
+def test_a_strategy_finds_nothing_without_an_mep_and_goes_on() -> None:
+    strategy = isiw.make_strategy("default", particles=200)
+    for _ in range(70):
+        strategy.learn(strategy.ask(), 0.0)
+    assert (strategy.estimate().probability or 1.0) < 0.1
+    assert str(strategy.estimate()) == NO_MEP
+    assert strategy.decision() == StopDecision(stop=False, reason=NO_MEP)
+    strategy.learn(strategy.ask(), 0.2)
+    assert strategy.estimate().rests_on_data
 
 
 def test_the_reason_of_a_pause_is_said_also_where_no_mep_was_seen(tmp_path: Path) -> None:

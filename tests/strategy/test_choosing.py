@@ -17,7 +17,8 @@ from isiw.models.particles import ParticlePosterior
 from isiw.models.protocol import Observation, Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choosing import Choice, Course, Method, best_choices, candidate_isis, evenly_spaced
-from isiw.strategy.stopping import Budget, EdgeVariance
+from isiw.strategy.settling import EdgeVariance
+from isiw.strategy.stopping import Budget
 from known import instance
 
 FIVE = DesignSpace(0, 4)

@@ -16,7 +16,8 @@ from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, OutOfSpaceError, StrategyError
 from isiw.models.protocol import Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.stopping import Budget, EdgeVariance
+from isiw.strategy.settling import EdgeVariance
+from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Recipe, Strategy
 from known import known
 from scripted import scripted_strategy

@@ -13,7 +13,7 @@ import pytest
 import torch
 
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.stopping import EdgeVariance
+from isiw.strategy.settling import EdgeVariance
 from isiw.strategy.strategy import Strategy
 from isiw.studies import SimulatedSession, simulate
 from isiw.studies.batch import simulate_batch

@@ -32,7 +32,7 @@ from isiw.log.schema import (
 from isiw.log.topics import decode
 from isiw.log.verdicts import VERDICTS, under_all
 from isiw.log.writer import CONFIGURATION
-from isiw.signals.plausibility import zeros_are_usual
+from isiw.signals.plausibility import is_silent
 from isiw.strategy.stopping import StopDecision
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial, TrialTable
@@ -114,9 +114,8 @@ class SessionRecord:
     @property
     def is_silent(self) -> bool:
         """Whether enough trials count, and each amplitude was 0, where the detection limit is too low for that."""
-        told = self.table.told
-        enough = len(told) >= ENOUGH_PAIRS and not zeros_are_usual(self.header.detection_limit_mv)
-        return enough and all(trial.mep_mv == 0 for trial in told)
+        meps_mv = [trial.mep_mv for trial in self.table.told if trial.mep_mv is not None]
+        return is_silent(meps_mv, self.header.detection_limit_mv)
 
     @property
     def is_judged_since(self) -> bool:

@@ -14,6 +14,7 @@ from enum import StrEnum
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.window import ENOUGH_PAIRS
 
 __all__ = [
     "Doubt",
@@ -22,9 +23,9 @@ __all__ = [
     "doubts_of",
     "implausible_amplitude",
     "implausible_scale",
+    "is_silent",
     "off_by",
     "require_plausible",
-    "zeros_are_usual",
 ]
 
 SMALLEST_MV = 2e-4
@@ -175,7 +176,7 @@ def doubt_of(meps_mv: Sequence[float], detection_limit_mv: float | None = None) 
         text = f"The last {EQUAL_IN_A_ROW} amplitudes are exactly equal ({last[0]:g} mV). Is the EMG still recorded?"
         return Doubt(DoubtKind.EQUAL, text)
     seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
-    if len(meps_mv) >= SILENT_FROM_THE_START and not seen and not zeros_are_usual(detection_limit_mv):
+    if len(meps_mv) >= SILENT_FROM_THE_START and is_silent(meps_mv, detection_limit_mv):
         text = f"None of the first {len(meps_mv)} pulses gave an MEP: every amplitude is 0."
         ask = "Does the stimulator fire, is the EMG recorded, is the intensity enough?"
         return Doubt(DoubtKind.SILENT, f"{text} {ask}")
@@ -193,12 +194,19 @@ def doubts_of(meps_mv: Sequence[float], detection_limit_mv: float | None = None)
     return frozenset(doubt.kind for doubt in doubts if doubt)
 
 
-def zeros_are_usual(detection_limit_mv: float | None) -> bool:
-    """Whether amplitudes of 0 say little, since much is below the detection limit.
+def is_silent(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> bool:
+    """Whether enough amplitudes were told, and each is 0, where the detection limit is too low for that.
 
     Args:
-        detection_limit_mv: the limit [mV]; None where nobody has said.
+        meps_mv: as for `doubt_of`.
+        detection_limit_mv: as for `doubt_of`.
     """
+    enough = len(meps_mv) >= ENOUGH_PAIRS and not _zeros_are_usual(detection_limit_mv)
+    return enough and not any(meps_mv)
+
+
+def _zeros_are_usual(detection_limit_mv: float | None) -> bool:
+    """Whether amplitudes of 0 say little, since much is below the detection limit."""
     return detection_limit_mv is not None and detection_limit_mv >= MANY_BELOW_MV
 
 

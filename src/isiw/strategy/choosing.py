@@ -213,15 +213,17 @@ class Course:
         """What is believed about the window of one person."""
         return self.belief.estimate(person)
 
-    def decision(self, person: int = 0, mistrials: int = 0) -> StopDecision:
+    def decision(self, person: int = 0, mistrials: int = 0, *, silent: bool = False) -> StopDecision:
         """Whether to stop with one person, and why.
 
         Args:
             person: which.
             mistrials: pairs of stimuli that were delivered to the person and not told.
+            silent: whether no trial of the person showed an MEP; see `WindowEstimate.silent`.
         """
         past = tuple(belief.estimate(person) for belief in self.past)
-        progress = Progress(self.paired_trials + mistrials, self.told, self.estimate(person), past=past)
+        estimate = replace(self.estimate(person), silent=silent)
+        progress = Progress(self.paired_trials + mistrials, self.told, estimate, past=past)
         return self.method.stopping(progress)
 
 

@@ -18,11 +18,11 @@ from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
-from isiw.signals.plausibility import DoubtKind, doubt_of, require_plausible
+from isiw.signals.plausibility import DoubtKind, doubt_of, is_silent, require_plausible
 from isiw.strategy.choosing import Choice, Cost, Method, evenly_spaced
 from isiw.strategy.stopping import StopDecision, StoppingRule
 from isiw.types import FloatArray
-from isiw.window import WindowEstimate
+from isiw.window import NO_MEP, WindowEstimate
 
 __all__ = ["Recipe", "Strategy"]
 
@@ -307,7 +307,8 @@ class Strategy:
 
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""
-        return self._course.estimate()
+        estimate = self._course.estimate()
+        return replace(estimate, silent=True) if self._is_silent else estimate
 
     def prediction_mv(self) -> tuple[FloatArray, FloatArray] | None:
         """The band of nine of ten next MEPs [mV], at the ISIs of the estimate; None where the model predicts none."""
@@ -315,4 +316,9 @@ class Strategy:
 
     def decision(self) -> StopDecision:
         """Whether to stop now, and why."""
-        return self._course.decision(mistrials=self._mistrials)
+        decision = self._course.decision(mistrials=self._mistrials, silent=self._is_silent)
+        return StopDecision(stop=False, reason=NO_MEP) if self._is_silent and not decision.stop else decision
+
+    @property
+    def _is_silent(self) -> bool:
+        return is_silent(self._meps_mv, self.detection_limit_mv)

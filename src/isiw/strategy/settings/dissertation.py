@@ -18,7 +18,8 @@ from isiw.models.dissertation.incremental import SweepModel
 from isiw.models.dissertation.nonlinear import NonlinearRegression
 from isiw.models.dissertation.regression import RegressionModel
 from isiw.models.dissertation.svr import SupportVectorRegression
-from isiw.strategy.stopping import AnyOf, Budget, EdgeVariance, ParticleSpread, StoppingRule, SweptPast
+from isiw.strategy.settling import EdgeVariance, ParticleSpread, SweptPast
+from isiw.strategy.stopping import AnyOf, Budget, StoppingRule
 
 __all__ = ["GPRSettings", "NRSettings", "PFSettings", "SVMRSettings", "SweepSettings"]
 

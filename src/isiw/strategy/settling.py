@@ -1,0 +1,109 @@
+"""The dissertation's rules for when to stop: when edges, particles or a sweep have settled."""
+
+from __future__ import annotations
+
+import statistics
+from dataclasses import dataclass
+from typing import Literal
+
+from isiw.checks import check_choice, check_numbers, check_wholes
+from isiw.strategy.stopping import Progress, StopDecision
+
+__all__ = ["EdgeVariance", "ParticleSpread", "SweptPast"]
+
+
+@dataclass(frozen=True)
+class EdgeVariance:
+    """Stop when the reported edges have settled: the dissertation's rule (4.3).
+
+    Args:
+        variance_ms2: the variance [ms²] of an edge's last values below which it has settled.
+        last: how many values.
+        edges: whether both edges must have settled, as the text says, or either, as its pseudo-code does.
+
+    Raises:
+        InvalidValueError: a variance that is not positive, fewer than two values, or another word for the edges.
+    """
+
+    variance_ms2: float = 50.0
+    last: int = 5
+    edges: Literal["both", "either"] = "both"
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "variance_ms2", above=0)
+        check_wholes(self, "last", least=2)
+        check_choice(self, "edges", ("both", "either"))
+
+    @property
+    def looks_back(self) -> int:
+        """How many past estimates it needs."""
+        return self.last
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        windows = [estimate.window for estimate in progress.past[-self.last :]]
+        edges = [(window.start_ms, window.end_ms) for window in windows if window is not None]
+        if len(edges) < self.last:
+            return StopDecision(stop=False, reason=f"There are not {self.last} windows in a row yet.")
+        start, end = (statistics.variance(values) for values in zip(*edges, strict=True))
+        settled = (max if self.edges == "both" else min)(start, end) < self.variance_ms2
+        spread = f"the last {self.last} values of start and end have variances of {start:.0f} and {end:.0f} ms²"
+        if settled:
+            return StopDecision(stop=True, reason=f"The window has settled: {spread}.")
+        return StopDecision(stop=False, reason=f"The window has not settled: {spread}.")
+
+
+@dataclass(frozen=True)
+class ParticleSpread:
+    """Stop when a particle search has narrowed itself down: the dissertation's rule for its PF (4.6).
+
+    Args:
+        sd_ms: the largest acceptable SD of the particles [ms].
+
+    Raises:
+        InvalidValueError: an SD that is not positive.
+    """
+
+    sd_ms: float = 25.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "sd_ms", above=0)
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        spread_ms = progress.estimate.spread_ms
+        if spread_ms is None or progress.estimate.window is None:
+            return StopDecision(stop=False, reason="No generation of particles has been measured yet.")
+        spread = f"they have an SD of {spread_ms:.0f} ms"
+        if spread_ms <= self.sd_ms:
+            return StopDecision(stop=True, reason=f"The particles have converged: {spread}.")
+        return StopDecision(stop=False, reason=f"The particles have not converged: {spread}.")
+
+
+@dataclass(frozen=True)
+class SweptPast:
+    """Stop a sweep that has left the window behind: the dissertation's manual termination (4.2.1).
+
+    Only an estimate whose `grid_ms` is what was swept so far can be judged by it.
+
+    Args:
+        quiet_ms: how far behind the window's end nothing was enhanced [ms].
+
+    Raises:
+        InvalidValueError: a distance that is not positive.
+    """
+
+    quiet_ms: float = 25.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "quiet_ms", above=0)
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+        window, swept_ms = progress.estimate.window, progress.estimate.grid_ms
+        if window is None or swept_ms is None:
+            return StopDecision(stop=False, reason="The sweep has met no window yet.")
+        behind = f"it has come {swept_ms[-1] - window.end_ms:.0f} ms behind the window's end"
+        if swept_ms[-1] - window.end_ms >= self.quiet_ms:
+            return StopDecision(stop=True, reason=f"The sweep has passed the window: {behind}.")
+        return StopDecision(stop=False, reason=f"The sweep has not passed the window: {behind}.")
