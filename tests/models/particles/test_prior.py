@@ -27,6 +27,7 @@ from isiw.models.particles.laws import (
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Person, Prior
 from isiw.models.particles.shapes import ShapeKind
+from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.shared.scales import Scale
 from isiw.models.shared.start import StartPrior
 from isiw.priors.components import beside
@@ -80,6 +81,25 @@ def test_an_invalid_part_is_refused(part: type, wrong: dict[str, object]) -> Non
 def test_an_invalid_muscle_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
         replace(HAND, **wrong)
+
+
+@pytest.mark.parametrize(
+    ("part", "name"),
+    [
+        (Prior, "gains"),
+        (Prior, "muscles"),
+        (Prior, "floors"),
+        (SwitchPrior, "sizes"),
+        (ProfilePrior, "widths"),
+        (SupraPrior, "curves"),
+        (SupraPrior, "floors"),
+    ],
+)
+def test_a_part_of_several_laws_needs_one_that_is_possible(part: Any, name: str) -> None:
+    laws = getattr(part(), name)
+    for impossible in ((), (replace(laws[0], share=0.0),)):
+        with pytest.raises(InvalidValueError, match=f"{name} needs at least one law"):
+            part(**{name: impossible})
 
 
 @pytest.mark.parametrize("shares", [ShapeShares, NoiseShares])

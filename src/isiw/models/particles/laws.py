@@ -30,6 +30,7 @@ __all__ = [
     "ShapeShares",
     "SwitchPrior",
     "Width",
+    "check_laws",
 ]
 
 
@@ -39,6 +40,22 @@ def _check_shares(shares: object) -> None:
     total = math.fsum(getattr(shares, name) for name in names)
     if not math.isclose(total, 1.0, abs_tol=1e-6):
         raise InvalidValueError(f"the probabilities of {type(shares).__name__} must sum to 1", got=total)
+
+
+def check_laws(owner: object, *names: str) -> None:
+    """Check fields of a dataclass that are several laws: one of them at least is possible.
+
+    Args:
+        owner: the instance.
+        *names: its fields.
+
+    Raises:
+        InvalidValueError: a field without a law, or without one that has a share.
+    """
+    for name in names:
+        laws = getattr(owner, name)
+        if not any(law.share > 0 for law in laws):
+            raise InvalidValueError(f"{type(owner).__name__}.{name} needs at least one law with a share", got=laws)
 
 
 @dataclass(frozen=True)
@@ -124,8 +141,8 @@ class ProfilePrior:
             `start` and `widths`.
 
     Raises:
-        InvalidValueError: an invalid probability, places that leave nothing to the rest, or that count from different
-            events.
+        InvalidValueError: an invalid probability, no widths, places that leave nothing to the rest, or that count from
+            different events.
     """
 
     p_window: float = 0.72
@@ -136,6 +153,7 @@ class ProfilePrior:
 
     def __post_init__(self) -> None:
         check_probabilities(self, "p_window")
+        check_laws(self, "widths")
         if self.p_place >= 1.0:
             raise InvalidValueError("the shares of ProfilePrior.places must sum to less than 1", got=self.p_place)
         if len(references := {place.reference for place in self.places}) > 1:
@@ -308,7 +326,7 @@ class SwitchPrior:
         sizes: of responses that are all or none, a forearm's or a hand's; their ratio is that of the mean response.
 
     Raises:
-        InvalidValueError: an invalid scale.
+        InvalidValueError: an invalid scale, or no sizes.
     """
 
     reliability: Scale = Scale(0.2, 0.7)
@@ -321,6 +339,7 @@ class SwitchPrior:
 
     def __post_init__(self) -> None:
         check_scales(self, "reliability", "switched_on", "switched_off", positive=False, tailed=False)
+        check_laws(self, "sizes")
 
 
 @dataclass(frozen=True)

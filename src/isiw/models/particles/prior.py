@@ -29,6 +29,7 @@ from isiw.models.particles.laws import (
     RectifiedPrior,
     SessionPrior,
     SwitchPrior,
+    check_laws,
 )
 from isiw.models.particles.mixture import JointMixture, Mixture, drawn
 from isiw.models.particles.noise import NoiseKind, Response, recruits
@@ -86,7 +87,7 @@ class Prior:
         muscle: the name of the muscle, where it is known: the others that have a name are left out then.
 
     Raises:
-        InvalidValueError: a muscle that is none of the muscles.
+        InvalidValueError: no gains, muscles or floors, or a muscle that is none of the muscles.
     """
 
     profile: ProfilePrior = field(default_factory=ProfilePrior)
@@ -106,6 +107,7 @@ class Prior:
     muscle: str | None = None
 
     def __post_init__(self) -> None:
+        check_laws(self, "gains", "muscles", "floors")
         if self.muscle is not None:
             choice("Prior.muscle", self.muscle, [muscle.name for muscle in self.muscles])
 

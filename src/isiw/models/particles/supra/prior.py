@@ -17,7 +17,7 @@ import torch
 
 from isiw.checks import check_probabilities
 from isiw.design import DesignSpace
-from isiw.models.particles.laws import Floor, SessionPrior, Width
+from isiw.models.particles.laws import Floor, SessionPrior, Width, check_laws
 from isiw.models.particles.mixture import JointMixture, Mixture
 from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.prior import Depression, Person
@@ -88,7 +88,7 @@ class Segment:
         shift_pct: by how much the input of the recruitment curve is shifted in their middle [% RMT].
 
     Raises:
-        InvalidValueError: an invalid probability or scale.
+        InvalidValueError: an invalid probability or scale, or no widths.
     """
 
     probability: float
@@ -97,6 +97,7 @@ class Segment:
 
     def __post_init__(self) -> None:
         check_probabilities(self, "probability")
+        check_laws(self, "widths")
         check_scales(self, "shift_pct", tailed=False)
 
 
@@ -144,6 +145,9 @@ class SupraPrior:
         curves: of recruitment curves, the usual one first.
         floors: of the EMG floor.
         session: of what changes within a session.
+
+    Raises:
+        InvalidValueError: no curves or floors.
     """
 
     start: StartPrior = _START
@@ -158,6 +162,9 @@ class SupraPrior:
         Floor(0.15, Scale(0.009, 1.2), Scale(0.22, 0.5)),
     )
     session: SessionPrior = field(default_factory=SessionPrior)
+
+    def __post_init__(self) -> None:
+        check_laws(self, "curves", "floors")
 
     @cached_property
     def _mixtures(self) -> tuple[Mixture, ...]:
