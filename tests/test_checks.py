@@ -16,6 +16,7 @@ from isiw.checks import (
     amplitude,
     ascending,
     check_choice,
+    check_flags,
     check_numbers,
     check_probabilities,
     check_wholes,
@@ -161,3 +162,22 @@ def test_arrays_are_no_choices_and_no_deadlines() -> None:
         choice("the cohort", np.array(["a", "b"]), ["a", "b"])
     with pytest.raises(InvalidValueError, match="deadline_s"):
         deadline("deadline_s", np.array([1.0, math.inf]))
+
+
+@dataclass(frozen=True)
+class Switched:
+    on: Any
+
+    def __post_init__(self) -> None:
+        check_flags(self, "on")
+
+
+@pytest.mark.parametrize("on", [True, False, np.True_, np.False_])
+def test_a_flag_is_true_or_false(on: Any) -> None:
+    assert Switched(on).on is bool(on)
+
+
+@pytest.mark.parametrize("on", ["false", "", None, 0, 1, 1.0])
+def test_a_word_or_a_number_is_no_flag(on: Any) -> None:
+    with pytest.raises(InvalidValueError, match="on must be True or False"):
+        Switched(on)

@@ -12,6 +12,8 @@ from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Any, TypedDict, Unpack
 
+import numpy as np
+
 from isiw.errors import InvalidValueError
 
 __all__ = [
@@ -21,6 +23,7 @@ __all__ = [
     "ascending",
     "check_amplitude",
     "check_choice",
+    "check_flags",
     "check_numbers",
     "check_probabilities",
     "check_texts",
@@ -244,6 +247,27 @@ def check_texts(owner: object, *names: str) -> None:
     """
     for name in names:
         _put(owner, name, text(f"{type(owner).__name__}.{name}", getattr(owner, name)))
+
+
+def check_flags(owner: object, *names: str) -> None:
+    """Check fields of a frozen dataclass that are True or False; a word such as "false" would count as True.
+
+    Args:
+        owner: the instance.
+        *names: its fields.
+
+    Raises:
+        InvalidValueError: a field that is neither.
+    """
+    for name in names:
+        value = getattr(owner, name)
+        if not isinstance(value, bool | np.bool_):
+            raise InvalidValueError(
+                f"{type(owner).__name__}.{name} must be True or False",
+                got=value,
+                remedy="Write it without quotes: in a configuration true or false.",
+            )
+        _put(owner, name, bool(value))
 
 
 def check_choice(owner: object, name: str, known: Iterable[Any]) -> None:

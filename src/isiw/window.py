@@ -269,8 +269,8 @@ class WindowEstimate:
         return dict(zip(self.hypothesis_names, shares, strict=True))
 
     def __str__(self) -> str:
-        if not self.rests_on_data:
-            return NO_MEP if self.silent else TOO_FEW
+        if self.too_little is not None:
+            return self.too_little
         start, end = self.interval(0.9) or ((None, None), (None, None))
         depressed = self.depressed, self.depressed_probability
         return finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end), depressed)
@@ -278,7 +278,14 @@ class WindowEstimate:
     @property
     def rests_on_data(self) -> bool:
         """Whether enough was measured to speak of a window; with less it is what was believed beforehand."""
-        return not self.silent and (self.pairs is None or self.pairs >= ENOUGH_PAIRS)
+        return self.too_little is None
+
+    @property
+    def too_little(self) -> str | None:
+        """What is said where too little was measured to speak of a window; None where enough was."""
+        if self.silent:
+            return NO_MEP
+        return None if self.pairs is None or self.pairs >= ENOUGH_PAIRS else TOO_FEW
 
     def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:
         """Credible intervals of start and end, given that there is a window [ms].

@@ -11,7 +11,7 @@ import pytest
 
 from isiw.devices.deadlines import Deadlines, PunctualDevice
 from isiw.devices.protocol import Readiness
-from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, StillArmedError
+from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered, StillArmedError
 from isiw.trials import Measurement, Stimulus
 from scripted import ScriptedDevice
 
@@ -180,6 +180,47 @@ def test_a_device_that_is_armed_too_late_is_disarmed_once_more(
     assert not stopped_after.is_set()
     released.set()
     assert stopped_after.wait(30)
+
+
+def test_a_stop_that_ends_after_the_next_staging_does_not_count_for_it(
+    punctual: MakePunctual, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    device, stopping, armed = ScriptedDevice(), threading.Event(), threading.Event()
+    states = []
+
+    def stage() -> None:
+        stopping.wait(30)
+        states.append("armed")
+        armed.set()
+
+    def stop() -> None:
+        states.append("disarmed")
+        stopping.set()
+        armed.wait(30)
+
+    monkeypatch.setattr(device, "stage", stage)
+    monkeypatch.setattr(device, "stop", stop)
+    wrapped = punctual(device)
+    late = threading.Thread(target=wrapped.stop)
+    late.start()
+    stopping.wait(30)
+    wrapped.stage()
+    late.join()
+    wrapped.stop()
+    assert states == ["disarmed", "armed", "disarmed"]
+
+
+def test_what_was_stopped_delivers_nothing_before_it_is_staged_anew(punctual: MakePunctual) -> None:
+    device = ScriptedDevice()
+    wrapped = punctual(device)
+    wrapped.stage()
+    wrapped.stop()
+    with pytest.raises(NotDelivered, match="not staged"):
+        wrapped.deliver(STIMULUS, 1.0)
+    assert device.delivered == []
+    wrapped.stage()
+    wrapped.deliver(STIMULUS, 1.0)
+    assert len(device.delivered) == 1
 
 
 def test_a_stop_that_fails_is_tried_again_and_told(

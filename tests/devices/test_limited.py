@@ -8,8 +8,8 @@ import pytest
 from isiw.devices.clock import MonotonicClock, VirtualClock
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Readiness
-from isiw.errors import DeviceError, LimitExceededError, NotDelivered
+from isiw.devices.protocol import DeviceInfo, Readiness
+from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, NotDelivered
 from isiw.trials import Measurement, Stimulus
 from scripted import ScriptedDevice
 
@@ -292,6 +292,21 @@ def test_the_intensity_at_staging_is_locked_also_when_it_is_staged_again(
     assert inner.delivered == []
 
 
+def test_a_device_that_is_stopped_while_it_is_checked_delivers_nothing(
+    inner: ScriptedDevice, clock: VirtualClock
+) -> None:
+    def held() -> bool:
+        guarded.stop()
+        return True
+
+    guarded = LimitedDevice(inner, LIMITS, clock, dead_man=held)
+    guarded.stage()
+    clock.sleep_s(guarded.wait_s())
+    with pytest.raises(NotDelivered, match="not staged"):
+        guarded.deliver(Stimulus(0, 10), 1.0)
+    assert inner.delivered == []
+
+
 @pytest.mark.parametrize("held", [False, None, 1, "yes"])
 def test_without_the_dead_mans_switch_nothing_is_delivered(
     inner: ScriptedDevice, clock: VirtualClock, held: object
@@ -307,3 +322,10 @@ def test_without_the_dead_mans_switch_nothing_is_delivered(
 def test_a_virtual_clock_is_for_simulated_devices_only() -> None:
     with pytest.raises(DeviceError, match="simulated=True"):
         LimitedDevice(ScriptedDevice(simulated=False), LIMITS, VirtualClock())
+
+
+def test_a_word_is_neither_simulated_nor_ready() -> None:
+    with pytest.raises(InvalidValueError, match=r"DeviceInfo.simulated must be True or False; got 'false'"):
+        DeviceInfo("rig", "impact", simulated=cast("bool", "false"))
+    with pytest.raises(InvalidValueError, match=r"Readiness.ready must be True or False"):
+        Readiness(ready=cast("bool", "no"))

@@ -33,6 +33,17 @@ def earlier(folder: Path, subject: str = "P07") -> list[float]:
     return earlier_pulses_s(folder, subject, HOUR_S, but=folder / "mine.mcap")
 
 
+def test_a_log_of_any_name_counts_and_the_own_one_never(
+    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_log(tmp_path / "P07 day 1", header)
+    make_log(tmp_path / "mine.mcap", header)
+    (tmp_path / "notes.txt").write_text("the coil at 5 mm")
+    assert len(earlier(tmp_path)) == 3
+    monkeypatch.chdir(tmp_path)
+    assert len(earlier_pulses_s(tmp_path, "P07", HOUR_S, but=Path("mine.mcap"))) == 3
+
+
 def test_every_intent_counts_by_its_time_unless_it_was_refused(tmp_path: Path, header: Header) -> None:
     found = salvage(make_log(tmp_path / "a.mcap", header, intents=3, refused=[1]))
     times_ns = [message.log_time_ns for message in found.messages if message.topic == "/intent"]

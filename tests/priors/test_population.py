@@ -71,3 +71,12 @@ def test_kinds_that_come_often_are_expected_more() -> None:
 def test_kinds_that_mean_nothing_to_a_particle_teach_nothing() -> None:
     shares = population_of(people_at(6.0, 8), kinds=np.full((8, 300), -1)).shares["kind"]
     assert shares == pytest.approx(KINDS, abs=0.03)
+
+
+def test_people_of_whom_nothing_is_known_teach_nothing() -> None:
+    rng = np.random.default_rng(3)
+    values, kinds = USUAL_SD * rng.standard_normal((12, 500)), rng.choice(3, size=(12, 500), p=KINDS)
+    used = kinds != 2  # the third kind has no such latent, as who has no window has no start
+    people = People({"x": Block(values[..., None], stats.norm.logpdf(values, scale=USUAL_SD), used)}, {"kind": kinds})
+    learnt_shares = learnt(people, {"x": HYPER}, {"kind": KINDS}, np.random.default_rng(4)).shares["kind"]
+    assert learnt_shares == pytest.approx(KINDS, abs=0.06)

@@ -15,6 +15,7 @@ from isiw.log.reader import read_session
 from isiw.session.journal import Journal
 from isiw.strategy.catalogue import make_strategy
 from isiw.trials import MistrialReason
+from isiw.window import TOO_FEW
 from server.serving import PLAN, SETTINGS, SPACE, client_of, created, done, mep_mv, refused, told
 
 
@@ -105,6 +106,31 @@ def test_tms_alone_is_told_without_being_asked(client: httpx.Client, session: st
     first = done(client.post(f"{session}/tell", json=alone))
     assert done(client.post(f"{session}/tell", json=alone)) == first
     assert read_session(tmp_path / "P07.mcap").table[0].commanded_isi_ms is None
+
+
+def test_tms_alone_that_was_refused_stays_open_until_it_is_told_rightly(client: httpx.Client, session: str) -> None:
+    alone = {"trial": 0, "isi_ms": None, "mep_mv": 60.0}
+    refused(client.post(f"{session}/tell", json=alone), 422, "InvalidValueError")
+    for request in ({}, {"trial": 0}, {"trial": 1}):
+        error = refused(client.post(f"{session}/ask", json=request), 409, "TrialOpen")
+        assert "TMS alone" in error["message"]
+    done(client.post(f"{session}/tell", json={**alone, "mep_mv": 0.06}))
+    assert done(client.post(f"{session}/ask"))["trial"] == 1
+
+
+def test_no_window_is_named_where_too_little_was_told(client: httpx.Client, session: str) -> None:
+    def estimate() -> dict[str, object]:
+        answer = done(client.get(f"{session}/estimate"))
+        return {name: answer[name] for name in ("text", "probability", "segments_ms", "start_ms", "expected_f1")}
+
+    nothing: dict[str, object] = {"probability": None, "segments_ms": [], "start_ms": None, "expected_f1": None}
+    told(client, session, 2)
+    assert estimate() == {"text": TOO_FEW, **nothing}
+    done(client.post(f"{session}/close"))
+    assert estimate() == {"text": TOO_FEW, **nothing}
+    done(client.post(f"{session}/resume"))
+    told(client, session, 1)
+    assert estimate()["probability"] is not None
 
 
 def test_a_slip_is_refused_by_its_field_and_can_be_put_right(client: httpx.Client, session: str) -> None:

@@ -54,6 +54,16 @@ def refusing(refusals: int, error: Exception | None = None) -> Callable[[Stimulu
     return answer
 
 
+@pytest.mark.parametrize("error", [LogError("my own log cannot be written"), OSError("the disk"), ValueError("eh")])
+def test_whatever_a_device_fails_with_the_stimulus_may_have_been_given(log: Path, error: Exception) -> None:
+    limits = Limits(0, 200, 5.0, max_pulses=4)
+    device = ScriptedDevice(refusing(1, error))
+    with pytest.raises(type(error)):
+        Session(device, scripted_strategy(9), log=log, limits=limits).run()
+    assert [trial.reason for trial in read_session(log).table] == [MistrialReason.OUTCOME_UNKNOWN]
+    assert not [event for event in read_session(log).events if event.kind == "refused"]
+
+
 def test_what_the_device_refused_before_firing_is_tried_again_and_does_not_count(log: Path, tmp_path: Path) -> None:
     undisturbed = Session(ScriptedDevice(), scripted_strategy(4), log=tmp_path / "undisturbed.mcap").run()
     limits = Limits(0, 200, 5.0, max_pulses=4)

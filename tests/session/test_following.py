@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -197,3 +198,14 @@ def test_the_pace_is_the_usual_one_whatever_rests_were_between() -> None:
     for end_s in (0.0, 5.0, 10.0, 600.0, 605.0):
         pace.passed(end_s)
     assert pace.left_s(10) == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize("answer", ["n", 1, None])
+def test_only_true_goes_on_after_a_pause(tmp_path: Path, answer: Any) -> None:
+    device = ScriptedDevice()
+    session = Session(
+        device, scripted_strategy(3), log=tmp_path / "s.mcap", safeguards=Safeguards(on_pause=lambda _: answer),
+        on_trial=lambda _: session.pause("A break."),
+    )  # fmt: skip
+    session.run()
+    assert len(device.delivered) == 1

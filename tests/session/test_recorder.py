@@ -183,6 +183,20 @@ def test_tms_alone_is_told_without_being_asked(log: Path) -> None:
     assert read_session(log).table[0].commanded_isi_ms is None
 
 
+def test_tms_alone_that_was_given_is_logged_at_once_whatever_the_limits_allow(log: Path, space: DesignSpace) -> None:
+    clock, limits = VirtualClock(), Limits.of_space(space, min_iti_s=7.0, max_pulses=2)
+    with open_session(scripted_strategy(9), log, limits=limits, clock=clock) as session:
+        for _ in range(3):
+            session.tell(None, 0.01)
+        assert clock.now_s() == 0.0
+        assert session.wait_s() == 7.0
+        with pytest.raises(LimitExceededError, match="2 pulses"):
+            session.ask()
+    record = read_session(log)
+    assert len(record.table.told) == 3
+    assert [(event.kind, event.text) for event in record.events] == [("limit", "TMS alone was given beyond 2 pulses.")]
+
+
 def test_the_limits_hold(log: Path, space: DesignSpace) -> None:
     clock = VirtualClock()
     limits = Limits.of_space(space, min_iti_s=7.0, max_pulses=3)

@@ -13,8 +13,9 @@ import pytest
 from forked import Forked
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import Readiness
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
-from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, LogError, StrategyError
+from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, StrategyRecipe
@@ -116,6 +117,37 @@ def test_earlier_stimuli_count_against_the_limits(interrupted: Path, space: Desi
     result = resume(interrupted, device, scripted_strategy(10), limits=limits).run()
     assert len(device.delivered) == 2
     assert result.decision.reason == "The limit of 6 pulses is reached."
+
+
+class Stimulator(ScriptedDevice):
+    """Reports its intensity."""
+
+    intensity_pct_mso = 60.0
+
+    def readiness(self) -> Readiness:
+        return Readiness(intensity_pct_mso=self.intensity_pct_mso)
+
+
+def test_the_intensity_that_a_session_began_with_is_locked_also_when_it_is_resumed(
+    log: Path, space: DesignSpace
+) -> None:
+    stimulator = Stimulator()
+    with pytest.raises(LimitExceededError, match="85 % MSO"):
+        Session(
+            stimulator,
+            scripted_strategy(10),
+            log=log,
+            on_trial=lambda update: setattr(stimulator, "intensity_pct_mso", 85.0 if update.trial.index == 2 else 60.0),
+        ).run()
+    assert read_session(log).header.limits.intensity_pct_mso == 60.0
+    with pytest.raises(LimitExceededError, match=r"85 % MSO.*60 % MSO"):
+        resume(log, stimulator, scripted_strategy(10)).run()
+    assert len(stimulator.delivered) == 3
+    as_set = Limits.of_space(space, max_pulses=4)  # what somebody says anew holds
+    resume(log, stimulator, scripted_strategy(10), limits=as_set).run()
+    header = read_session(log).header
+    assert (len(stimulator.delivered), header.limits.intensity_pct_mso) == (4, 85.0)
+    assert header.asks_from == 0
 
 
 def test_what_a_session_went_on_with_holds_when_it_is_resumed_again(interrupted: Path, space: DesignSpace) -> None:

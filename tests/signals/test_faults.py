@@ -6,12 +6,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from isiw.design import DesignSpace
 from isiw.devices.simulated import SimulatedDevice
 from isiw.signals import judge
 from isiw.signals.faults import Fault, likely_fault, remedy_for
-from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
+from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
 from known import instance
 from wrong_rigs import NAMED, SPACE, WRONG, rig
 
@@ -67,3 +69,15 @@ def test_a_mistrial_without_a_sign_is_told_by_its_reason_and_figure() -> None:
     fault = likely_fault(Measurement(0.1, 90.0), trial)
     assert fault is not None
     assert fault.what == "the realised ISI was 90 ms, not the commanded 40 ms"
+
+
+def test_the_reflex_of_a_tap_whose_impact_nobody_measures_is_no_fault() -> None:
+    times_ms, valve_ms, pulse_ms = np.arange(8000) / 5.0, 1000.0, 1200.0
+    emg_mv = 0.0015 * np.random.default_rng(0).standard_normal(8000)
+    for at_ms, size_mv, period_ms in ((valve_ms + 160.0, 0.6, 6.0), (pulse_ms + 18.0, 0.06, 14.0)):
+        since_ms = times_ms - at_ms
+        emg_mv += size_mv * np.sin(2 * np.pi * since_ms / period_ms) * ((since_ms > 0) & (since_ms < period_ms))
+    sweep = Sweep({"emg": Channel(emg_mv, 5000.0, "mV")}, t_tms_ms=pulse_ms, t_valve_ms=valve_ms)
+    trial = judge(sweep, Stimulus(0, 200.0), DesignSpace(0, 500, reference="valve"))
+    assert trial.reason is None
+    assert likely_fault(sweep, trial) is None

@@ -9,7 +9,7 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.devices.robot.presets import preset
 from isiw.devices.robot.tapper import Tapper, TapperSettings
-from isiw.errors import InvalidValueError
+from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals import SignalLimits, is_saturated, judge, judge_measurement
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
 from isiw.types import ArrayLike, FloatArray
@@ -264,3 +264,53 @@ def test_a_measurement_is_judged_by_the_rules_of_a_sweep(
     assert judged.isi_ms == isi_ms
     assert judged.status is (Status.ACCEPTED if reason is None else Status.MISTRIAL)
     assert judged.mep_mv == 0.1  # of a mistrial for whoever looks at it
+
+
+@pytest.mark.parametrize("full_scale_mv", [None, 5.0])
+def test_a_clipped_mep_is_saturated_also_one_step_below_the_full_scale(full_scale_mv: float | None) -> None:
+    times = np.arange(5000) / 5.0
+    swing = 9.0 * np.sin(2 * np.pi * (times - 798.0) / 14.0) * ((times > 798.0) & (times < 812.0))
+    emg = np.clip(sweep_of().channels["emg"].values + swing, -5.0 * 32767 / 32768, 5.0 * 32767 / 32768)
+    clipped, limits = with_channel(sweep_of(), "emg", emg), SignalLimits(full_scale_mv=full_scale_mv)
+    assert mistrial_of(clipped, limits=limits) is MistrialReason.SATURATION
+
+
+@pytest.mark.parametrize("samples", [-1, 1])
+def test_channels_may_differ_by_a_sample(samples: int) -> None:
+    sweep = sweep_of()
+    acceleration = sweep.channels["acceleration"]
+    slower = np.resize(acceleration.values[::5], 1000 + samples)
+    assert judge(with_channel(sweep, "acceleration", slower, rate_hz=1000.0), PAIR, IMPACT).reason is not (
+        MistrialReason.MISSING_CHANNEL
+    )
+
+
+def test_a_tap_that_came_with_tms_alone_is_an_error() -> None:
+    with pytest.raises(DeviceError, match=r"a tap where TMS alone was commanded; got 'an impact at 680 ms'"):
+        judge(replace(without(sweep_of(), "acceleration"), t_hit_ms=680.0), Stimulus(0, None), IMPACT)
+
+
+def test_a_pulse_that_was_to_come_before_the_impact_counts() -> None:
+    early = replace(sweep_of(t_tms_ms=650.0), t_hit_ms=680.0)
+    space = DesignSpace(-50, 100, reference="impact")
+    assert judge(early, Stimulus(0, -30.0), space).isi_ms == -30.0
+    assert judge(early, Stimulus(0, -30.0), space).reason is None
+    assert mistrial_of(early, Stimulus(0, 0.0), space) is MistrialReason.TMS_BEFORE_IMPACT
+
+
+def test_a_glitch_beyond_any_amplifier_is_a_mistrial() -> None:
+    emg = sweep_of().channels["emg"].values.copy()
+    emg[4005] = 2000.0
+    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is MistrialReason.IMPLAUSIBLE
+
+
+@pytest.mark.parametrize("valve_ms", [5.0, -100.0])
+def test_a_sweep_that_begins_after_the_valve_command_is_judged(valve_ms: float) -> None:
+    judged = judge(replace(sweep_of(), t_valve_ms=valve_ms, t_hit_ms=680.0), PAIR, IMPACT)
+    assert judged.mep_mv == pytest.approx(0.1, abs=0.01)
+
+
+@pytest.mark.parametrize("wrong", [{"mep_window_ms": (0.015, 0.035)}, {"background_uv": 0.01}])
+def test_a_limit_in_another_unit_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InvalidValueError, match=rf"{next(iter(wrong))}.*Multiply by 1000"):
+        SignalLimits(**wrong)

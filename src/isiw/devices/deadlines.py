@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 from isiw.checks import check_numbers, check_wholes
-from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness
+from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness, require_staged
 from isiw.errors import DeviceTimeoutError, StillArmedError, told
 from isiw.trials import Stimulus
 
@@ -146,7 +146,8 @@ class PunctualDevice:
         self._device, self._deadlines = device, deadlines or Deadlines()
         self._given_up, self._report = given_up, report
         self._stopping = threading.RLock()
-        self._disarmed = False
+        self._stages = 0
+        self._stopped_at = self._disarmed_at = -1  # at how many stages; a `stop` that is late says nothing of the next
         self._late: _Call[Answer] | None = None
         self._worker: _Worker | None = None
         self._owner = threading.get_ident()
@@ -162,7 +163,7 @@ class PunctualDevice:
         Raises:
             DeviceTimeoutError: not within its deadline.
         """
-        self._disarmed = False
+        self._stages += 1
         self._within("stage", self._device.stage, self._deadlines.stage_s)
 
     def readiness(self) -> Readiness:
@@ -183,9 +184,12 @@ class PunctualDevice:
             timeout_s: the longest the device may take [s].
 
         Raises:
+            NotDelivered: it was stopped since it was staged.
             DeviceTimeoutError: no answer in time; `late_answer` may have it.
         """
-        call = self._begun(partial(self._device.deliver, stimulus, timeout_s))
+        with self._stopping:
+            require_staged(self._info.name, staged=self._stopped_at != self._stages)
+            call = self._begun(partial(self._device.deliver, stimulus, timeout_s))
         self._late = call
         return self._awaited("deliver", call, timeout_s, self._given_up)
 
@@ -212,10 +216,11 @@ class PunctualDevice:
             StillArmedError: the device could not be disarmed, however often it was tried.
         """
         with self._stopping:
-            if not self._disarmed:
-                idle = self._idle
+            stages, idle = self._stages, self._idle
+            if self._disarmed_at != stages:
+                self._stopped_at = stages
                 self._stop()
-                self._disarmed = idle
+                self._disarmed_at = stages if idle else -1
 
     def _stop(self) -> None:
         failure = None

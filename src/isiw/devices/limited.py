@@ -163,6 +163,7 @@ class LimitedDevice:
         with self._one_at_a_time:
             require_staged(self._info.name, staged=self._staged)
             self.check(stimulus)
+            require_staged(self._info.name, staged=self._staged)  # the check may take long, and `stop` come meanwhile
             self._delivered += 1
             self._times_s.append(self._clock.now_s())
             try:

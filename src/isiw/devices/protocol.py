@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, get_args, runtime_checkable
 
-from isiw.checks import check_choice, check_numbers, number
+from isiw.checks import check_choice, check_flags, check_numbers, number
 from isiw.errors import NotDelivered
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Reference
@@ -34,7 +34,8 @@ class DeviceInfo:
         tap_alone: whether it can deliver a tap without the magnetic pulse, which `Stimulus.tap_alone` asks for.
 
     Raises:
-        InvalidValueError: an unknown reference, or a detection limit or a hit delay that is not positive.
+        InvalidValueError: an unknown reference, a detection limit or a hit delay that is not positive, or a word where
+            True or False is due.
     """
 
     name: str
@@ -49,6 +50,7 @@ class DeviceInfo:
 
     def __post_init__(self) -> None:
         check_choice(self, "reference", get_args(Reference))
+        check_flags(self, "simulated", "tap_alone")
         check_numbers(self, "detection_limit_mv", above=0, optional=True)
         if self.hit_delay_ms is not None:
             mean, sd = (number("DeviceInfo.hit_delay_ms", value, above=0) for value in self.hit_delay_ms)
@@ -66,7 +68,7 @@ class Readiness:
         intensity_pct_mso: intensity that is set [% of the maximum stimulator output]; None where it is not known.
 
     Raises:
-        InvalidValueError: a number that is not finite, or a negative intensity.
+        InvalidValueError: a number that is not finite, a negative intensity, or a word where True or False is due.
     """
 
     ready: bool = True
@@ -75,6 +77,7 @@ class Readiness:
     intensity_pct_mso: float | None = None
 
     def __post_init__(self) -> None:
+        check_flags(self, "ready")
         check_numbers(self, "coil_c", optional=True)
         check_numbers(self, "intensity_pct_mso", least=0, optional=True)
 

@@ -8,7 +8,7 @@ from typing import Final
 from isiw.errors import InvalidValueError
 from isiw.log.durable import put
 
-__all__ = ["check_output", "write_output"]
+__all__ = ["check_output", "is_log", "write_output"]
 
 _LOG: Final = b"\x89MCAP"
 """What every log begins with."""
@@ -48,7 +48,7 @@ def check_output(path: str | Path, *, overwrite: bool = False) -> None:
     target = Path(path)
     if target.is_dir():
         raise InvalidValueError("there is a folder of this name", got=str(target), remedy="Name a file.")
-    if overwrite and _is_log(target):
+    if overwrite and is_log(target):
         raise InvalidValueError("a log is never overwritten", got=str(target), remedy="Choose another path.")
     if not overwrite and target.exists():
         raise _taken(target)
@@ -62,7 +62,12 @@ def _taken(target: Path) -> InvalidValueError:
     )
 
 
-def _is_log(path: Path) -> bool:
+def is_log(path: Path) -> bool:
+    """Whether a file begins as every log does, whatever its name.
+
+    Args:
+        path: the file, or nothing.
+    """
     if not path.is_file():
         return False
     with path.open("rb") as file:

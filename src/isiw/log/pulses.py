@@ -7,6 +7,7 @@ from pathlib import Path
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.durable import log_of
+from isiw.log.outputs import is_log
 from isiw.log.reader import of_production, read_any
 from isiw.log.salvage import Message, Salvage, salvage
 from isiw.log.schema import Event, Intent, Record
@@ -14,6 +15,9 @@ from isiw.log.topics import decode
 from isiw.trials import Trial
 
 __all__ = ["earlier_pulses_s", "pulses_s"]
+
+_SUFFIXES = {".mcap", ".part"}
+"""Of logs as they are usually named; one that is damaged is no log by its content."""
 
 _TIMED = ("/intent", "/trial", "/event")
 
@@ -65,8 +69,9 @@ def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: 
     if not folder.is_dir():
         raise LogError("there is no such folder of logs", got=str(folder), remedy="Check Safeguards.earlier_logs.")
     since_s = time.time() - period_s
-    recent = (file for file in folder.glob("*.mcap*") if file.suffix in {".mcap", ".part"})
-    logs = {log_of(file) for file in recent if file.stat().st_mtime >= since_s} - {log_of(but)}
+    recent = (file for file in folder.iterdir() if file.is_file() and file.stat().st_mtime >= since_s)
+    logs = {log_of(file.resolve()) for file in recent if file.suffix in _SUFFIXES or is_log(file)}
+    logs -= {log_of(but.resolve())}
     ages_s = [age_s for log in sorted(logs) for age_s in _of_subject(log, subject)]
     return sorted((age_s for age_s in ages_s if age_s <= period_s), reverse=True)
 

@@ -85,7 +85,7 @@ class SessionRecord:
         ]
         if last is not None:
             lines += [
-                str(last) if self.rests_on_data else NO_MEP if self.is_silent else TOO_FEW,
+                self.too_little or str(last),
                 f"{'Ended' if last.stop else 'Not over'}: {last.reason}",
             ]
             if self.is_judged_since:
@@ -109,7 +109,14 @@ class SessionRecord:
     @property
     def rests_on_data(self) -> bool:
         """Whether enough pairs of stimuli count to speak of a window, and any trial showed an MEP."""
-        return not self.is_silent and sum(trial.isi_ms is not None for trial in self.table.told) >= ENOUGH_PAIRS
+        return self.too_little is None
+
+    @property
+    def too_little(self) -> str | None:
+        """What is said where too little was measured to speak of a window; None where enough was."""
+        if self.is_silent:
+            return NO_MEP
+        return None if sum(trial.isi_ms is not None for trial in self.table.told) >= ENOUGH_PAIRS else TOO_FEW
 
     @property
     def is_silent(self) -> bool:

@@ -136,11 +136,11 @@ def learnt(
 
 
 def _log_ratio(block: Block, law: _Normal) -> FloatArray:
-    """Log density under the law over that under the prior, shape (n, i)."""
+    """Log density under the law over that under the prior, times the share of the lab's people, shape (n, i)."""
     mean, sd = law
     z = (block.values - mean) / sd
     log_law = -0.5 * (z**2).sum(-1) - np.log(sd).sum() - 0.5 * np.log(2 * np.pi) * len(mean)
-    ratio: FloatArray = log_law - block.log_density + np.log((1 - P_OUTSIDER) / P_OUTSIDER)
+    ratio: FloatArray = log_law - block.log_density + np.log(1 - P_OUTSIDER)
     return ratio
 
 
@@ -152,11 +152,11 @@ def _picked(
     rng: np.random.Generator,
 ) -> IntArray:
     """A particle of each person under the laws, memberships integrated out, shape (n,)."""
-    blocks = people.blocks.items()
+    # Blocks that mean nothing to a particle, and kinds of -1, weigh as in the prior.
     log_weight = sum(
-        np.where(block.used, np.logaddexp(0.0, _log_ratio(block, laws[name])), 0.0) for name, block in blocks
+        np.where(block.used, np.logaddexp(np.log(P_OUTSIDER), _log_ratio(block, laws[name])), 0.0)
+        for name, block in people.blocks.items()
     )
-    # Kinds of -1 mean nothing to the particle, and weigh as in the prior.
     for name, kinds in people.kinds.items():
         log_share = np.append(np.log(shares[name] / usual[name]), 0.0)
         log_weight = log_weight + log_share[kinds]
@@ -167,7 +167,7 @@ def _picked(
 def _members(block: Block, law: _Normal, picks: IntArray, rng: np.random.Generator) -> FloatArray:
     """The picked particles of those who are of the lab's law in this block, shape (m, d)."""
     rows = np.arange(len(picks))
-    log_odds = _log_ratio(block, law)[rows, picks]
+    log_odds = _log_ratio(block, law)[rows, picks] - np.log(P_OUTSIDER)
     inside = block.used[rows, picks] & (rng.logistic(size=len(picks)) < log_odds)
     members: FloatArray = block.values[rows, picks][inside]
     return members

@@ -181,6 +181,16 @@ class EstimateAnswer(OkAnswer):
     band_high_mv: Numbers
 
     @classmethod
-    def of(cls, estimate: Estimate) -> Self:
-        """The answer of an estimate as a log has it."""
-        return cls.model_validate({"text": str(estimate), **estimate.model_dump()})
+    def of(cls, estimate: Estimate, too_little: str | None = None) -> Self:
+        """The answer of an estimate as a log has it.
+
+        Args:
+            estimate: the estimate.
+            too_little: that too little was measured to speak of a window, in words; then it names none, and gives the
+                expected MEP alone.
+        """
+        if too_little is None:
+            return cls.model_validate({"text": str(estimate), **estimate.model_dump()})
+        profile = {"grid_ms", "profile_mv", "band_low_mv", "band_high_mv"}
+        nothing = Estimate(trial=estimate.trial, probability=None).model_dump(exclude=profile)
+        return cls.model_validate({"text": too_little, **nothing, **estimate.model_dump(include=profile)})

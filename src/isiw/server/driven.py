@@ -108,7 +108,8 @@ class DrivenSession:
 
     def estimate(self) -> EstimateAnswer:
         """What is believed about the window now."""
-        return EstimateAnswer.of(Estimate.of(0, self.recorder.estimate(), self.recorder.decision(), None))
+        estimate = self.recorder.estimate()
+        return EstimateAnswer.of(Estimate.of(0, estimate, self.recorder.decision(), None), estimate.too_little)
 
     def require_no_wait(self, most_s: float) -> None:
         """Raise where the next stimulus is not allowed soon.
@@ -137,6 +138,13 @@ class DrivenSession:
             LimitExceededError: a limit is reached.
         """
         asked, comes_next = self.recorder.asked, len(self.recorder.trials)
+        if asked is not None and asked.isi_ms is None:
+            raise Refusal(
+                409,
+                "TrialOpen",
+                f"trial {asked.trial} is TMS alone, and what was told of it was refused",
+                remedy="Tell its outcome, or make it a mistrial.",
+            )
         if asked is not None and request.trial is None:
             raise Refusal(
                 409,
@@ -158,13 +166,12 @@ class DrivenSession:
         """What came of a trial; told again it is answered as at first.
 
         Raises:
-            Refusal: the trial has another outcome, or was not asked for, or TMS alone would come too early.
+            Refusal: the trial has another outcome, or was not asked for.
             InvalidValueError: a value that cannot be.
         """
         if request.trial in self._outcomes:
             return self._known(request.trial, _told(request), f"isi_ms={request.isi_ms} mep_mv={request.mep_mv}")
         self._require_next(request.trial, asked=request.isi_ms is not None)
-        self.require_no_wait(0.0)  # TMS alone is begun by telling it
         self.recorder.tell(
             request.isi_ms,
             request.mep_mv,

@@ -180,9 +180,10 @@ class Sessions:
         """
         with suppress(_NotOpenError), self._driving_if_open(name) as session:
             return session.estimate()
-        if not (estimates := self.record(name).estimates):
+        record = self.record(name)
+        if not record.estimates:
             raise not_open(name)
-        return EstimateAnswer.of(estimates[-1])
+        return EstimateAnswer.of(record.estimates[-1], record.too_little)
 
     def decision(self, name: str) -> DecisionAnswer:
         """Whether to stop a session, and why.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer
-from isiw.errors import DeviceError, DeviceTimeoutError, LimitExceededError, LogError, NotDelivered, told
+from isiw.errors import DeviceError, DeviceTimeoutError, LimitExceededError, NotDelivered, told
 from isiw.log.schema import Event
 from isiw.session.journal import Journal
 from isiw.session.pausing import Pausing
@@ -17,8 +17,8 @@ from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
 __all__ = ["Delivery"]
 
-_NOTHING_GIVEN = (NotDelivered, LimitExceededError, LogError)
-"""What is raised only before a stimulus is delivered."""
+_NOTHING_GIVEN = (NotDelivered, LimitExceededError)
+"""What a device raises only before it delivers."""
 
 
 @dataclass
@@ -59,16 +59,18 @@ class Delivery:
         self._require_allowed(stimulus)
         if not self.journal.intent(stimulus, self.rig.clock.now_s(), fallback):
             return
-        trial: Trial | None = Trial.unknown(stimulus)
+        trial: Trial | None = None
         try:
+            self.journal.log.require_in_place()
+            trial = Trial.unknown(stimulus)  # from here on it may have been given, whatever fails
             answer = self._answer(stimulus)
             trial = self._judged(stimulus, answer)
             self.watch = self.watch.after(trial, answer)
-        except _NOTHING_GIVEN as error:
-            trial = None
-            self.journal.log.append(Event(kind="refused", trial=stimulus.trial, text=told(error)))
-            raise
         except Exception as error:
+            if trial is None or isinstance(error, _NOTHING_GIVEN):
+                trial = None
+                self.journal.log.append(Event(kind="refused", trial=stimulus.trial, text=told(error)))
+                raise
             if not self.pausing.due:
                 raise
             self.rig.faults.append(f"While the device was being disarmed: {told(error)}")
@@ -88,7 +90,6 @@ class Delivery:
 
     def _answer(self, stimulus: Stimulus) -> Answer:
         """What came of a stimulus; its waveforms are logged, also where it comes too late."""
-        self.journal.log.require_in_place()
         try:
             answer = self.rig.deliver(stimulus, self.timeout_s)
         except DeviceTimeoutError:

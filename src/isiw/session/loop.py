@@ -167,6 +167,7 @@ class Session(Judging):
     def continue_from(
         self,
         trials: TrialTable,
+        header: Header,
         open_log: Callable[[Header], LogWriter],
         first_records: Sequence[Record],
         earlier_s: Callable[[], Sequence[float]] = tuple,
@@ -175,11 +176,13 @@ class Session(Judging):
 
         Args:
             trials: what was delivered before; the strategy has learned it.
-            open_log: opens the log that goes on, with this session's header.
+            header: this session's, with what it keeps of the log's.
+            open_log: opens the log that goes on, with that header.
             first_records: what it holds next.
             earlier_s: says how long ago each stimulus before was [s].
         """
-        self._journal.trials, self._open_log, self._first_records = trials, open_log, first_records
+        self._journal.trials, self._header = trials, header
+        self._open_log, self._first_records = open_log, first_records
         self._own_earlier_s, self._resumed = earlier_s, True
         self._steps.delivery.watch = self._steps.delivery.watch.resumed(trials)
 
@@ -216,6 +219,7 @@ class Session(Judging):
             try:
                 self._log_beginning()
                 with self._operated(keys=keys), self._rig.armed(len(self.trials), earlier_s):
+                    self._log_locked_limits()
                     decision = self._loop()
                 self._journal.faults(self._rig.faults)
             except BaseException as error:
@@ -334,6 +338,12 @@ class Session(Judging):
             self._journal.log.append(record)
         if self.trials:
             self._steps.log_estimate(len(self.trials) - 1)
+
+    def _log_locked_limits(self) -> None:
+        """Log the intensity that the device reported when it was armed, so that a resumed session is held to it."""
+        if self._rig.limits != self._header.limits:
+            self._header = self._header.model_copy(update={"limits": self._rig.limits})
+            self._journal.log.append(self._header)
 
     def _loop(self) -> StopDecision:
         decision = None

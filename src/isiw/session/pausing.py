@@ -96,6 +96,10 @@ class Pausing:
     def _goes_on(self, reason: str) -> bool:
         self.waiting = Pause(self.asking.next(), reason)
         try:
-            return not self.asking.over and self._rig.interrupts.freely(self.decide, reason) and not self.asking.over
+            return (
+                not self.asking.over
+                and self._rig.interrupts.freely(self.decide, reason) is True
+                and not self.asking.over
+            )
         finally:
             self.waiting = None

@@ -26,7 +26,7 @@ from isiw.session.header import header_of, require_parts
 from isiw.session.journal import Journal, learn, relearned
 from isiw.session.judging import Judging
 from isiw.session.replay import replay, warn_where_differing
-from isiw.session.resume import ages_s, continued, require_same_person, resumption, with_lost_pulses
+from isiw.session.resume import ages_s, as_resumed, require_same_person, resumption, with_lost_pulses
 from isiw.signals.faults import remedy_for
 from isiw.signals.judgement import SignalLimits
 from isiw.signals.plausibility import doubt_of, doubts_of, require_plausible
@@ -128,8 +128,8 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         "limits": limits or record.header.limits,
         "config": record.header.config if config is None else header.config,
     }
-    header = header.model_copy(update=kept)
-    writer = continued(path, salvaged, record.header, replayed, header)
+    header = as_resumed(header.model_copy(update=kept), record.header, replayed)
+    writer = LogWriter.continuing(path, salvaged, record.header, header)
     ages = ages_s(salvaged, len(replayed.trials))
     for trial in replayed.unknown:
         writer.append(trial)
@@ -266,7 +266,8 @@ class Recorder(Judging):
         """What came of the ISI that was asked; it is on disk before the strategy learns it.
 
         Args:
-            isi_ms: the realised ISI on the space's reference [ms]; None is TMS alone, told without being asked.
+            isi_ms: the realised ISI on the space's reference [ms]; None is TMS alone, which was given without being
+                asked for. It counts for all limits, and `wait_s` says when it may be given.
             mep_mv: peak-to-peak amplitude [mV]; 0 is below the detection limit.
             isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
             background_rms_uv: EMG before the pulse [µV RMS], where known.
@@ -280,15 +281,15 @@ class Recorder(Judging):
         Warns:
             ImplausibleDataWarning: what looks like a slip of unit; it is told and logged all the same.
         """
-        if isi_ms is None and self.asked is None:
-            self._wait()
         with self._lock:
             self._tell(isi_ms, mep_mv, isi_sd_ms, background_rms_uv)
 
     def _tell(self, isi_ms: float | None, mep_mv: float, isi_sd_ms: float, background_rms_uv: float | None) -> None:
         self._catch_up()
         if isi_ms is None and self.asked is None:
-            self._begin(None)
+            self._begin(None)  # given already, and logged whatever the limits allow
+            if len(self.trials) >= self._limits.max_pulses:
+                self._journal.event("limit", f"TMS alone was given beyond {self._limits.max_pulses} pulses.")
         mep_mv = number("mep_mv", mep_mv, least=0)
         isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         asked = self._require_asked()

@@ -26,7 +26,7 @@ from isiw.signals.judgement import SignalLimits
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus, TrialTable
 
-__all__ = ["ages_s", "continued", "exclude", "include", "resume", "resumption", "with_lost_pulses"]
+__all__ = ["ages_s", "as_resumed", "exclude", "include", "resume", "resumption", "with_lost_pulses"]
 
 
 def resume(  # noqa: PLR0913 - all but three are keyword-only
@@ -103,25 +103,23 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     )
     session.continue_from(
         replayed.trials,
-        partial(continued, path, salvaged, header, replayed),
+        as_resumed(session.header, header, replayed),
+        partial(LogWriter.continuing, path, salvaged, header),
         (*replayed.unknown, resumption(record, replayed)),
         partial(ages_s, salvaged, len(replayed.trials)),
     )
     return session
 
 
-def continued(path: str | Path, salvaged: Salvage, header: Header, replayed: Replayed, as_resumed: Header) -> LogWriter:
-    """The log, open to go on.
+def as_resumed(header: Header, logged: Header, replayed: Replayed) -> Header:
+    """The header that holds from here on.
 
     Args:
-        path: where it is.
-        salvaged: what was read from it.
-        header: the one that held so far.
-        replayed: what the strategy has learned of it.
-        as_resumed: the one that holds from here on, but for what never changes.
+        header: of the session that goes on.
+        logged: the one that held so far; what never changes stays as it says.
+        replayed: what the strategy has learned of the log.
     """
-    kept = {"created": header.created, "asks_from": replayed.asks_from}
-    return LogWriter.continuing(path, salvaged, header, as_resumed.model_copy(update=kept))
+    return header.model_copy(update={"created": logged.created, "asks_from": replayed.asks_from})
 
 
 def resumption(record: SessionRecord, replayed: Replayed) -> Event:

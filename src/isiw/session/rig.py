@@ -69,6 +69,11 @@ class Rig:
         return self._punctual.describe()
 
     @property
+    def limits(self) -> Limits:
+        """What it may deliver; once it was staged, with the intensity that it reported."""
+        return self._limited.limits
+
+    @property
     def pulses_left(self) -> int:
         """How many deliveries are still allowed."""
         return self._limited.pulses_left

@@ -15,7 +15,7 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.signals.impact import impact_time
-from isiw.signals.judgement import SignalLimits
+from isiw.signals.judgement import SignalLimits, of_one_length
 from isiw.signals.plausibility import implausible_amplitude, off_by
 from isiw.signals.waveforms import is_recording
 from isiw.trials import Channel, Measurement, MistrialReason, Sweep, Trial
@@ -32,6 +32,9 @@ PULSE_SPAN_MS = (-2.0, 50.0)
 """When the pulse and what it evokes are in the EMG [ms after the pulse]."""
 
 TAP_SPAN_MS = 60.0
+LATEST_HIT_MS = 300.0
+"""From the valve command to the impact, in any rig that is believed in."""
+
 CLEAR = 20.0
 
 
@@ -107,7 +110,7 @@ def _fault_of_sweep(sweep: Sweep, trial: Trial) -> Fault | None:
         return Fault("the EMG has samples that are no numbers", "Look at how the rig converts what it records.")
     if not is_recording(emg.values):
         return Fault("the EMG is a flat line", "Is the amplifier on, and its cable plugged in?")
-    if acceleration is not None and not _of_one_length(emg, acceleration):
+    if not of_one_length(sweep):
         return Fault(
             "EMG and acceleration do not last equally long", "Check the sampling rates that the channels are given."
         )
@@ -164,6 +167,8 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
     spans = [(trial.t_tms_ms + PULSE_SPAN_MS[0], trial.t_tms_ms + PULSE_SPAN_MS[1])]
     if trial.t_hit_ms is not None:
         spans.append((trial.t_hit_ms - 2.0, trial.t_hit_ms + TAP_SPAN_MS))
+    elif trial.t_valve_ms is not None:
+        spans.append((trial.t_valve_ms, trial.t_valve_ms + LATEST_HIT_MS + TAP_SPAN_MS))
     if steepest_ms is None or any(first <= steepest_ms <= last for first, last in spans):
         return None
     return Fault(
@@ -210,8 +215,3 @@ def _explained(trial: Trial, limits: SignalLimits) -> str:
     if trial.reason is MistrialReason.ISI_OFF and trial.isi_ms is not None:
         return f"the realised ISI was {trial.isi_ms:.0f} ms, not the commanded {trial.commanded_isi_ms:g} ms"
     return f"{trial.reason}"
-
-
-def _of_one_length(one: Channel, other: Channel) -> bool:
-    lengths = [channel.values.size / channel.rate_hz for channel in (one, other)]
-    return abs(lengths[0] - lengths[1]) <= max(1 / one.rate_hz, 1 / other.rate_hz)

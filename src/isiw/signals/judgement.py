@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from isiw.checks import ascending, check_numbers
+from isiw.checks import MOST_MEP_MV, ascending, check_numbers
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals.events import tap_artefact_times
@@ -27,7 +27,7 @@ from isiw.signals.mep import (
     mep_amplitudes,
 )
 from isiw.signals.plausibility import implausible_amplitude
-from isiw.signals.waveforms import is_recording
+from isiw.signals.waveforms import MIN_REST_MS, is_recording
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
 from isiw.types import ArrayLike, BoolArray, FloatArray
 
@@ -38,6 +38,7 @@ __all__ = [
     "is_saturated",
     "judge",
     "judge_measurement",
+    "of_one_length",
     "require_unit",
     "wrong_isi",
 ]
@@ -49,6 +50,13 @@ ACCELERATION_UNITS = frozenset({"m/s^2", "m/s²", "g", "V", "mV"})
 """Units of the acceleration; the impact is found in any of them."""
 
 FLAT_MS = 1.0
+
+NEARLY_FULL = 0.999
+"""The largest code of a converter lies below its full scale: by a step of one in 2,048 where it has 12 bits."""
+
+LEAST_WINDOW_MS = 1.0
+LEAST_BACKGROUND_UV = 0.2
+"""No amplifier is so quiet, and no MEP so early: such limits are in mV, or in s."""
 
 
 def require_unit(name: str, unit: str, known: Collection[str]) -> None:
@@ -75,14 +83,15 @@ class SignalLimits:
     Args:
         mep_window_ms: where the MEP is sought [ms after the pulse]; `MEP_WINDOWS_MS` has one for each muscle group.
         background_uv: the most EMG at rest before the pulse [µV RMS]; above it the muscle was not relaxed.
-        full_scale_mv: the largest EMG that the amplifier can show [mV]; None to look for flat tops only.
+        full_scale_mv: the largest EMG that the amplifier can show [mV]; None to look for flat tops only, which are
+            looked for in any case.
         isi_tolerance_ms: how far the realised ISI may be from the commanded one [ms], where that is less than the
             space's tolerance.
         tap_artefact_ms: how long the artefact of the tap lasts in the EMG [ms]; what it covers of the MEP window does
             not count.
 
     Raises:
-        InvalidValueError: a limit that is not positive, or an empty window.
+        InvalidValueError: a limit that is not positive, an empty window, or a slip of unit.
     """
 
     mep_window_ms: tuple[float, float] = MEP_WINDOW_MS
@@ -95,6 +104,20 @@ class SignalLimits:
         check_numbers(self, "background_uv", "tap_artefact_ms", above=0)
         check_numbers(self, "full_scale_mv", "isi_tolerance_ms", above=0, optional=True)
         ascending("SignalLimits.mep_window_ms", self.mep_window_ms, least=0)
+        if self.mep_window_ms[-1] < LEAST_WINDOW_MS:
+            raise InvalidValueError(
+                "SignalLimits.mep_window_ms ends before any MEP begins",
+                got=self.mep_window_ms,
+                expected=f"ms after the pulse, such as {MEP_WINDOW_MS}",
+                remedy="Is it in seconds? Multiply by 1000.",
+            )
+        if self.background_uv < LEAST_BACKGROUND_UV:
+            raise InvalidValueError(
+                "SignalLimits.background_uv is less than any amplifier's noise",
+                got=self.background_uv,
+                expected="µV RMS, such as 10",
+                remedy="Is it in mV? Multiply by 1000.",
+            )
 
     def tolerance_ms(self, space: DesignSpace) -> float:
         """How far a realised ISI may be from the commanded one [ms]."""
@@ -146,7 +169,7 @@ def _judge_tap(sweep: Sweep, stimulus: Stimulus, limits: SignalLimits) -> Trial:
             "the device reports a magnetic pulse where a tap alone was commanded", got=f"one at {sweep.t_tms_ms:g} ms"
         )
     judged = replace(Trial.unknown(stimulus), t_valve_ms=sweep.t_valve_ms)
-    if not _usable(sweep, "emg") or not _of_one_length(sweep):
+    if not _usable(sweep, "emg") or not of_one_length(sweep):
         return _mistrial(judged, MistrialReason.MISSING_CHANNEL)
     emg = sweep.channels["emg"]
     hit_ms, wrong = _impact(sweep)
@@ -163,7 +186,8 @@ def _measured(timed: Trial, mep_mv: float) -> Trial:
     if math.isnan(mep_mv):
         return timed
     if mep_mv == 0 or implausible_amplitude(mep_mv) is not None:
-        return _mistrial(replace(timed, mep_mv=mep_mv), MistrialReason.IMPLAUSIBLE)
+        told_mv = mep_mv if mep_mv <= MOST_MEP_MV else None  # as where a sample is missing and the converter says so
+        return _mistrial(replace(timed, mep_mv=told_mv), MistrialReason.IMPLAUSIBLE)
     return replace(timed, status=Status.ACCEPTED, reason=None, mep_mv=mep_mv)
 
 
@@ -213,15 +237,15 @@ def is_saturated(
     Args:
         emg_mv: EMG [mV], shape (w,).
         rate_hz: sampling rate [Hz].
-        full_scale_mv: the largest value that the amplifier can show [mV]. Without it, a top that stays at exactly one
-            value for 1 ms or longer, far out of the sweep's usual range, is taken for a limit.
+        full_scale_mv: the largest value that the amplifier can show [mV]. With and without it, a top that stays at
+            exactly one value for 1 ms or longer, far out of the sweep's usual range, is taken for a limit.
         span_ms: the part of the sweep that counts [ms from the first sample]; artefacts may run into limits elsewhere.
     """
     emg = np.asarray(emg_mv, dtype=np.float64)
     first, last = (min(edge * rate_hz / 1000, emg.size) for edge in span_ms)
     counts = emg[math.floor(first) : math.ceil(last) + 1]
-    if full_scale_mv is not None:
-        return bool(np.abs(counts).max() >= full_scale_mv)
+    if full_scale_mv is not None and np.abs(counts).max() >= NEARLY_FULL * full_scale_mv:
+        return True
     level = np.median(emg)
     usual = np.median(np.abs(emg - level))
     samples = max(3, round(FLAT_MS * rate_hz / 1000))
@@ -241,12 +265,13 @@ def _mistrial(judged: Trial, reason: MistrialReason) -> Trial:
 def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Trial:
     """The realised ISI, or what is wrong with the timing; where nothing is, the outcome is still unknown."""
     judged = replace(Trial.unknown(stimulus), t_valve_ms=sweep.t_valve_ms, t_tms_ms=sweep.t_tms_ms)
-    if not _usable(sweep, "emg") or not _of_one_length(sweep):
+    if not _usable(sweep, "emg") or not of_one_length(sweep):
         return _mistrial(judged, MistrialReason.MISSING_CHANNEL)
     _unit_mv(sweep.channels["emg"])
     if sweep.t_tms_ms is None:
         return _mistrial(judged, MistrialReason.NO_PULSE)
     if stimulus.isi_ms is None:
+        _require_no_tap(sweep)
         return judged
     hit, wrong = _impact(sweep)
     judged = replace(judged, t_hit_ms=hit, isi_sd_ms=sweep.isi_sd_ms)
@@ -257,6 +282,16 @@ def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: 
     judged = replace(judged, isi_ms=isi_ms)
     wrong = wrong_isi(isi_ms, stimulus.isi_ms, space, limits)
     return judged if wrong is None else _mistrial(judged, wrong)
+
+
+def _require_no_tap(sweep: Sweep) -> None:
+    """Raise where a tap came with TMS alone: a response to both would be taken for one to the pulse."""
+    if sweep.t_hit_ms is not None:
+        raise DeviceError(
+            "the device reports a tap where TMS alone was commanded",
+            got=f"an impact at {sweep.t_hit_ms:g} ms",
+            remedy="Does the valve stay open? Leave t_hit_ms out where nothing hits.",
+        )
 
 
 def wrong_isi(
@@ -271,7 +306,7 @@ def wrong_isi(
         limits: may ask for less than the space's tolerance.
     """
     limits = limits or SignalLimits()
-    if space.reference == "impact" and isi_ms < 0:
+    if space.reference == "impact" and isi_ms < 0 <= commanded_isi_ms:
         return MistrialReason.TMS_BEFORE_IMPACT
     return MistrialReason.ISI_OFF if abs(isi_ms - commanded_isi_ms) > limits.tolerance_ms(space) else None
 
@@ -294,11 +329,15 @@ def _usable(sweep: Sweep, name: str) -> bool:
     return name in sweep.channels and is_recording(sweep.channels[name].values)
 
 
-def _of_one_length(sweep: Sweep) -> bool:
-    """Whether EMG and acceleration, where there is one, cover the same time to within a sample."""
+def of_one_length(sweep: Sweep) -> bool:
+    """Whether EMG and acceleration, where there is one, cover the same time to within a sample.
+
+    Args:
+        sweep: one that has EMG.
+    """
     channels = [sweep.channels[name] for name in ("emg", "acceleration") if name in sweep.channels]
     lengths = [channel.values.size / channel.rate_hz for channel in channels]
-    return max(lengths) - min(lengths) <= max(1 / channel.rate_hz for channel in channels)
+    return max(lengths) - min(lengths) <= max(1 / channel.rate_hz for channel in channels) + 1e-9  # rounding
 
 
 def _unit_mv(emg: Channel) -> float:
@@ -335,8 +374,8 @@ def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Trial) -> float | No
 def _mep_mv(emg_mv: FloatArray, emg: Channel, timed: Trial, limits: SignalLimits) -> float:
     pulse = _on_channel(timed.t_tms_ms, emg)
     shown = np.array([math.nan])
-    if timed.t_hit_ms is not None and timed.t_valve_ms is not None:
-        hit, valve = _on_channel(timed.t_hit_ms, emg), _on_channel(timed.t_valve_ms, emg)
+    hit, valve = _on_channel(timed.t_hit_ms, emg), _on_channel(timed.t_valve_ms, emg)
+    if not math.isnan(hit) and valve >= MIN_REST_MS:  # without rest before it, the tap cannot be found in the EMG
         # A trial without a response must not get the tap's amplitude: where the two coincide, rather too small.
         shown, coinciding = (
             tap_artefact_times(emg_mv, emg.rate_hz, hit, valve_ms=valve, t_tms_ms=pulse, even_as_mep=even_as_mep)
