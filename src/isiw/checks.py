@@ -30,6 +30,7 @@ __all__ = [
     "check_wholes",
     "choice",
     "deadline",
+    "mean_and_sd",
     "number",
     "text",
     "whole",
@@ -134,6 +135,25 @@ def whole(what: str, value: object, **bounds: Unpack[Bounds]) -> int:
     if plain is None or not _within(plain, bounds):
         raise InvalidValueError(f"{what} must be {_described('a whole number', bounds)}", got=value)
     return plain
+
+
+def mean_and_sd(what: str, value: object) -> tuple[float, float]:
+    """The mean and the SD of a time, both positive [ms].
+
+    Args:
+        what: their name, for the message.
+        value: what was given.
+
+    Raises:
+        InvalidValueError: anything else.
+    """
+    pair = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
+    if len(pair) != 2:
+        raise InvalidValueError(
+            f"{what} must be a mean and an SD [ms]", got=value, remedy="Give both, such as (183.1, 6.0)."
+        )
+    mean, sd = (number(what, each, above=0) for each in pair)
+    return mean, sd
 
 
 def text(what: str, value: object) -> str:

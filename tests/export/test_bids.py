@@ -251,3 +251,9 @@ def test_texts_with_tabs_and_newlines_break_no_table(tmp_path: Path) -> None:
     write_sweeps(tmp_path / "s.mcap", {0: sweep(0)}, visit=Visit(electrodes="one\ttwo\nthree"))
     export_logs(tmp_path / "s.mcap", tmp_path / "out", "bids")
     assert table(tmp_path / "out", "*_sessions.tsv").electrodes.tolist() == ["one two three"]
+
+
+def test_a_unit_that_a_file_cannot_hold_is_written_as_far_as_it_can(tmp_path: Path) -> None:
+    channels = {"emg": sweep(0)["emg"], "force": Channel(emg_mv(0), 3000.0, "N\tm\x07", -50.0)}
+    export_logs(write_sweeps(tmp_path / "s.mcap", {0: channels}), tmp_path / "out", "bids")
+    assert table(tmp_path / "out", f"{NAME}_run-01_channels.tsv").units.tolist() == ["mV", "N?m?"]

@@ -81,8 +81,9 @@ def test_the_trials_themselves_stay_as_they_are(logs: Path) -> None:
 
 
 def test_sessions_without_a_code_are_different_people(tmp_path: Path) -> None:
-    for name in ("a", "b"):
-        write_sweeps(tmp_path / "logs" / f"{name}.mcap", {0: {}}, subject="")
+    for hour, name in enumerate(("a", "b")):
+        begun = f"2026-11-21T1{hour}:00:00+00:00"
+        write_sweeps(tmp_path / "logs" / f"{name}.mcap", {0: {}}, subject="", created=begun)
     exported = export_logs(tmp_path / "logs", tmp_path / "out", pseudonymise=True)
     assert len(exported.pseudonyms) == 2
     export_logs(tmp_path / "logs", tmp_path / "named")

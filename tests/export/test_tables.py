@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from isiw.export.tables import session_facts
 from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
+from isiw.session.recorder import open_session
 from isiw.session.resume import exclude
 from isiw.visit import Visit
 from logs import cut_after
@@ -116,6 +118,19 @@ def test_a_log_that_nobody_can_read_does_not_keep_the_others_from_being_exported
     log.unlink()
     with pytest.raises(LogError, match="no log in the folder can be read"):
         export_logs(log.parent, tmp_path / "again")
+
+
+def test_a_copy_that_was_made_before_the_end_of_a_session_counts_once(tmp_path: Path) -> None:
+    (tmp_path / "logs" / "backup").mkdir(parents=True)
+    part = tmp_path / "logs" / "P07.mcap.part"
+    with open_session(scripted_strategy(9), tmp_path / "logs" / "P07.mcap", subject="P07") as session:
+        for trial in range(5):
+            session.tell(session.ask(), 0.05 + 0.01 * trial)
+            if trial == 3:
+                shutil.copy(part, part.parent / "backup" / part.name)
+    exported = export_logs(tmp_path / "logs", tmp_path / "out")
+    assert (exported.sessions, exported.trials) == (1, 5)
+    assert "is left out: it is a part of P07.mcap" in exported.lacking[0]
 
 
 def test_a_copy_of_a_log_counts_once(log: Path, tmp_path: Path) -> None:

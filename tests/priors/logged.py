@@ -32,6 +32,7 @@ def write_log(
     seed: int = 1,
     simulated: bool = False,
     created: str = "2026-11-21T10:00:00+00:00",
+    hit_delay_ms: tuple[float, float] | None = None,
 ) -> Path:
     """The log of a session with ISIs all over the range."""
     header = Header(
@@ -42,7 +43,7 @@ def write_log(
         strategy=StrategyRecipe(name="", seed=seed),
         space=space,
         limits=Limits.of_space(space),
-        device=DeviceInfo("bench", space.reference, simulated=simulated),
+        device=DeviceInfo("bench", space.reference, simulated=simulated, hit_delay_ms=hit_delay_ms),
         signals=SignalLimits(),
     )
     responder = (person or gaussian_person()).begin(seed)

@@ -11,9 +11,10 @@ import torch
 
 from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
-from isiw.errors import InvalidValueError
+from isiw.errors import InvalidValueError, LogError
 from isiw.log.reader import read_session
 from isiw.models.particles.prior import Prior
+from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse
 from isiw.subjects.subject import SimulatedSubject
@@ -48,6 +49,33 @@ def next_day(first: Any) -> Any:
 
 def starts_ms(prior: Prior) -> torch.Tensor:
     return prior.sample(1, 20_000, torch.Generator().manual_seed(1), VALVE_SPACE).values[0, :, 0]
+
+
+def test_another_day_on_a_rig_with_another_hit_delay_is_refused(tmp_path: Path) -> None:
+    paths = [
+        write_log(tmp_path / f"{mean_ms}.mcap", person(), trials=6, created=f"2026-11-2{day}", seed=day,
+                  hit_delay_ms=(mean_ms, 5.0))
+        for day, mean_ms in enumerate((180.0, 184.0, 80.0), 1)
+    ]  # fmt: skip
+    first, second, elsewhere = map(read_session, paths)
+    both = priors.after(first, second)
+    assert both.profile.start.hit_delay_ms == (184.0, 5.0)  # each session has its own rig's
+    assert {place.hit_delay_ms for place in both.profile.places} == {(180.0, 5.0), (184.0, 5.0)}
+    for compared in (priors.after, priors.moved):
+        with pytest.raises(InvalidValueError, match=r"another time.*80\.0.*180\.0"):
+            compared(first, elsewhere)
+    with pytest.raises(InvalidValueError, match="rig that it was learnt with"):
+        make_strategy(prior=both, hit_delay_ms=(80.0, 5.0), particles=50)
+    with pytest.raises(LogError, match=r"from 80 to 180 ms.*Learn a prior for each rig"):
+        priors.learn([paths[0], paths[2]], again=True)
+
+
+def test_a_session_without_trials_is_no_day(tmp_path: Path) -> None:
+    first, second = (
+        read_session(write_log(tmp_path / f"{day}.mcap", trials=0, created=f"2026-11-2{day}")) for day in (1, 2)
+    )
+    with pytest.raises(LogError, match="no accepted trial"):
+        priors.moved(first, second)
 
 
 def test_seven_in_ten_windows_are_expected_about_the_first_days(next_day: Any) -> None:

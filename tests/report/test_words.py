@@ -84,6 +84,7 @@ def test_no_window_is_a_finding_once_it_has_95_percent(
     [
         (0.0142, 8.7, "An enhancement of more than 14 µV (8.7 % of RMT) is excluded with 90 % probability."),
         (0.0142, 12.3, "An enhancement of more than 14 µV (12 % of RMT) is excluded with 90 % probability."),
+        (0.0, 10.4, "An enhancement of more than 2 µV is excluded with 90 % probability."),
         (0.0049, None, "An enhancement of more than 4.9 µV is excluded with 90 % probability."),
     ],
 )

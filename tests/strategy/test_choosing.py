@@ -12,6 +12,7 @@ import torch
 
 from isiw.acquisition.fixed import EvenSpacing, RandomIsi
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.errors import StrategyError
 from isiw.models.dissertation.bootstrap import BootstrapPosterior
 from isiw.models.particles import ParticlePosterior
 from isiw.models.protocol import Observation, Posterior, Tensor
@@ -50,6 +51,12 @@ def test_candidates_are_few_evenly_spaced_and_hold_both_ends(space: DesignSpace)
     steps = np.diff(candidates)
     np.testing.assert_allclose(steps[:-1], steps[0], rtol=1e-4)
     assert 0 < steps[-1] <= steps[0] * (1 + 1e-4)
+
+
+@pytest.mark.parametrize("scores", [torch.arange(3.0), torch.tensor(1.0), torch.zeros(3, 6)])
+def test_each_isi_has_a_score(three: Posterior, scores: Tensor) -> None:
+    with pytest.raises(StrategyError, match="Scores must score each ISI"):
+        best_choices(three, Scores(scores), FIVE, told=2, people=3)
 
 
 def test_each_person_is_asked_what_scores_best_and_falls_back_alone(three: Posterior) -> None:

@@ -21,6 +21,7 @@ class Part:
 class Whole:
     parts: tuple[Part, ...]
     people: int = 3
+    extra: Part | None = None
 
 
 def test_values_become_the_dataclass() -> None:
@@ -32,6 +33,7 @@ def test_values_become_the_dataclass() -> None:
     [
         ({"parts": [], "peple": 3}, r"f.toml: the key peple is unknown; got 3; .*Did you mean people"),
         ({"parts": [{"nam": "a"}]}, r"the key parts.0.nam is unknown.*Did you mean name"),
+        ({"parts": [], "extra": {"nam": "a"}}, r"the key extra.nam is unknown.*Did you mean name"),
         ({"parts": [], "people": "many"}, r"the value of people cannot be used; got 'many'"),
         ({"people": 3}, r"the key parts is missing"),
     ],

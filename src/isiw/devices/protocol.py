@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, get_args, runtime_checkable
 
-from isiw.checks import check_choice, check_flags, check_numbers, number
+from isiw.checks import check_choice, check_flags, check_numbers, mean_and_sd
 from isiw.errors import NotDelivered
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Reference
@@ -53,8 +53,7 @@ class DeviceInfo:
         check_flags(self, "simulated", "tap_alone")
         check_numbers(self, "detection_limit_mv", above=0, optional=True)
         if self.hit_delay_ms is not None:
-            mean, sd = (number("DeviceInfo.hit_delay_ms", value, above=0) for value in self.hit_delay_ms)
-            object.__setattr__(self, "hit_delay_ms", (mean, sd))
+            object.__setattr__(self, "hit_delay_ms", mean_and_sd("DeviceInfo.hit_delay_ms", self.hit_delay_ms))
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ class Part:
 def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
     """The sessions of a log or of a folder with logs, and a sentence for each log that is left out.
 
-    Copies of a log, such as those in an earlier export, count once.
+    Copies of a log, such as those in an earlier export, count once, and so does one that was copied before its end.
 
     Args:
         source: a log, with or without `.part`, or a folder, whose folders are looked into, too.
@@ -66,7 +66,28 @@ def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
     if not records:
         what = "no log in the folder can be read" if left_out else "there is no log in the folder"
         raise LogError(what, got=str(source), expected="files called .mcap or .mcap.part")
-    return list(records.values()), left_out
+    whole, parts = _without_parts(list(records.values()))
+    return whole, left_out + parts
+
+
+def _without_parts(records: Sequence[SessionRecord]) -> tuple[list[SessionRecord], list[str]]:
+    """The records that are no part of another one, and a sentence for each that is."""
+    kept: list[SessionRecord] = []
+    left_out = []
+    for record in sorted(records, key=lambda each: len(each.history), reverse=True):
+        longer = next((each for each in kept if _is_part(record, each)), None)
+        if longer is None:
+            kept.append(record)
+        else:
+            left_out.append(f"{record.path.name} is left out: it is a part of {longer.path.name}.")
+    return kept, left_out
+
+
+def _is_part(record: SessionRecord, longer: SessionRecord) -> bool:
+    """Whether all that a log tells is told by another one of the same session as well."""
+    one, other = record.header, longer.header
+    same = (one.created, one.subject, one.seed) == (other.created, other.subject, other.seed)
+    return same and record.history == longer.history[: len(record.history)]
 
 
 def _logs_of(folder: Path) -> list[Path]:

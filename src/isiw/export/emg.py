@@ -259,7 +259,8 @@ def _can_be_written(duration_s: Fraction) -> bool:
 
 def _unit(unit: str) -> str:
     """A unit as both files have it: in ASCII."""
-    return _ASCII_UNITS.get(unit, unit).encode("ascii", "replace").decode()[:8]
+    ascii_unit = _ASCII_UNITS.get(unit, unit).encode("ascii", "replace").decode()
+    return "".join(sign if sign.isprintable() else "?" for sign in ascii_unit.strip())[:8]
 
 
 def _labels(layout: Layout) -> list[str]:

@@ -42,7 +42,13 @@ def columns(name: str) -> list[int]:
     return [int(column) for column in torch.nonzero(mask)[:, 0]]
 
 
-def place(share: float, mean: FloatArray, sd: FloatArray, reference: Reference) -> Place:
+def place(
+    share: float,
+    mean: FloatArray,
+    sd: FloatArray,
+    reference: Reference,
+    hit_delay_ms: tuple[float, float] | None = None,
+) -> Place:
     """A law of start and log width.
 
     Args:
@@ -50,9 +56,10 @@ def place(share: float, mean: FloatArray, sd: FloatArray, reference: Reference) 
         mean: shape (2,).
         sd: shape (2,).
         reference: the event that the start counts from.
+        hit_delay_ms: of the rig, where it is stated, mean and SD [ms].
     """
     (width,) = _log_scales(mean[1:], sd[1:])
-    return Place(share, Scale(float(mean[0]), float(sd[0])), width, reference)
+    return Place(share, Scale(float(mean[0]), float(sd[0])), width, reference, hit_delay_ms)
 
 
 def floor(share: float, mean: FloatArray, sd: FloatArray) -> Floor:

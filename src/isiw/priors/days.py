@@ -26,7 +26,7 @@ from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Tensor
 from isiw.priors.components import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.priors.recall import recalled
-from isiw.types import FloatArray, Reference
+from isiw.types import FloatArray
 
 __all__ = ["DayToDay", "after", "moved"]
 
@@ -89,7 +89,7 @@ def after(*records: SessionRecord, prior: Prior | None = None, law: DayToDay | N
     Raises:
         LogError: a session without an accepted trial.
         InvalidValueError: sessions of different people, the same twice, or a later one first; sessions, or a prior,
-            that count ISIs from different events.
+            that count ISIs from different events, or are of rigs with different hit delays.
     """
     _require_days_of_one_person(records)
     if not isinstance(prior, Prior | None):
@@ -111,7 +111,8 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
     Raises:
         LogError: a session without an accepted trial.
         InvalidValueError: sessions of different people, the same twice, or the later one first; sessions that count
-            ISIs from different events, or one in which there is probably no window.
+            ISIs from different events, or are of rigs with different hit delays, or one in which there is probably no
+            window.
     """
     _require_days_of_one_person((first, second))
     earlier = recalled(first, Prior())
@@ -138,7 +139,8 @@ def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
                 expected="the first one first",
             )
     for first, second in itertools.combinations(records, 2):
-        if all(one == other for one, other in zip(first.table, second.table, strict=False)):
+        trials = list(zip(first.table, second.table, strict=False))
+        if trials and all(one == other for one, other in trials):
             paths = f"{first.path} and {second.path}"
             raise InvalidValueError("two logs are of the same session", got=paths, expected="each session once")
 
@@ -163,7 +165,7 @@ def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
         usual.profile,
         p_window=mixed(p_window, usual.profile.p_window, law.p_other),
         shapes=mixed_shares(_shares(latents.shape[latents.present], len(fields(shapes))), shapes, law.p_other),
-        places=beside(usual.profile.places, _places(latents, law, posterior.space.reference)),
+        places=beside(usual.profile.places, _places(latents, law, posterior)),
     )
     return replace(
         usual,
@@ -182,8 +184,9 @@ def _shares(kinds: Tensor, of: int) -> list[float]:
     return shares
 
 
-def _places(latents: Latents, law: DayToDay, reference: Reference) -> tuple[Place, ...]:
-    return tuple(place(law.p_stays * share, mean, sd, reference) for share, mean, sd in _normals(latents, "place", law))
+def _places(latents: Latents, law: DayToDay, posterior: ParticlePosterior) -> tuple[Place, ...]:
+    rig = posterior.space.reference, posterior.model.prior.profile.start.hit_delay_ms
+    return tuple(place(law.p_stays * share, mean, sd, *rig) for share, mean, sd in _normals(latents, "place", law))
 
 
 def _laws(

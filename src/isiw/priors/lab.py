@@ -15,12 +15,12 @@ from isiw.checks import check_probabilities
 from isiw.errors import LogError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares, ShapeShares
-from isiw.models.particles.places import Place
+from isiw.models.particles.places import MOST_APART_MS, Place
 from isiw.models.particles.prior import Prior
 from isiw.priors.components import beside, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.priors.people import hyper_prior, people_of, usual_shares
 from isiw.priors.population import Law, Population, learnt
-from isiw.priors.recall import recalled, require_meps
+from isiw.priors.recall import recalled, require_meps, stated_hit_delay_ms
 from isiw.types import Reference
 
 __all__ = ["LabPrior", "LearntSession", "learn"]
@@ -134,7 +134,8 @@ def learn(
 
     Raises:
         LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person
-            twice, or sessions that count ISIs from different events, or of which some are simulated and others are not.
+            twice, or sessions that count ISIs from different events, or are of rigs with different hit delays, or of
+            which some are simulated and others are not.
     """
     if isinstance(logs, str | Path):
         raise LogError("logs must be a list of paths", got=str(logs), remedy=f'Write ["{logs}"] for a single one.')
@@ -150,7 +151,8 @@ def learn(
         on_done(record)
     rng = np.random.default_rng(seed)
     population = learnt(people_of(posteriors), hyper_prior(prior, space), usual_shares(prior), rng)
-    return _lab_prior(population, prior, sessions, space.reference)
+    stated_ms = next(filter(None, map(stated_hit_delay_ms, records)), None)
+    return _lab_prior(population, prior, sessions, (space.reference, stated_ms))
 
 
 def _learnt_session(record: SessionRecord) -> LearntSession:
@@ -175,6 +177,15 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
     if len(references) > 1:
         remedy = "Learn a prior from each kind of session."
         raise LogError("the sessions count ISIs from different events", got=sorted(references), remedy=remedy)
+    delays_ms = [stated_hit_delay_ms(record) for record in records]
+    means_ms = [stated[0] for stated in delays_ms if stated is not None]
+    if references == {"valve"} and means_ms and max(means_ms) - min(means_ms) > MOST_APART_MS:
+        raise LogError(
+            "the sessions are of rigs whose taps take different times, so their windows cannot be compared",
+            got=f"hit delays from {min(means_ms):g} to {max(means_ms):g} ms",
+            expected=f"at most {MOST_APART_MS:g} ms apart",
+            remedy="Learn a prior for each rig.",
+        )
 
 
 def _require_once(records: Sequence[SessionRecord], keys: Sequence[str], what: str, remedy: str) -> None:
@@ -186,7 +197,10 @@ def _require_once(records: Sequence[SessionRecord], keys: Sequence[str], what: s
 
 
 def _lab_prior(
-    population: Population, usual: Prior, sessions: tuple[LearntSession, ...], reference: Reference
+    population: Population,
+    usual: Prior,
+    sessions: tuple[LearntSession, ...],
+    rig: tuple[Reference, tuple[float, float] | None],
 ) -> LabPrior:
     laws, shares = population.laws, population.shares
     return LabPrior(
@@ -194,7 +208,7 @@ def _lab_prior(
         p_window=mixed(float(shares["window"][1]), usual.profile.p_window, LEAST_USUAL),
         shapes=mixed_shares(shares["shape"].tolist(), usual.profile.shapes, LEAST_USUAL),
         noise=mixed_shares(shares["noise"].tolist(), usual.noise, LEAST_USUAL),
-        place=_where_known(laws["place"], lambda share, mean, sd: place(share, mean, sd, reference)),
+        place=_where_known(laws["place"], lambda share, mean, sd: place(share, mean, sd, *rig)),
         floor=_where_known(laws["floor"], floor),
         gain=_where_known(laws["gain"], gain),
         muscle=_where_known(laws["muscle"], lambda share, mean, sd: muscle(share, mean, sd, "as in the lab")),

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from isiw.checks import mean_and_sd
 from isiw.errors import LogError
 from isiw.log.reader import SessionRecord
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
 
-__all__ = ["recalled", "require_meps"]
+__all__ = ["recalled", "require_meps", "stated_hit_delay_ms"]
 
 
 def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> ParticlePosterior:
-    """The posterior after a logged session; the hit delay is what its rig stated, where the prior says nothing of it.
+    """The posterior after a logged session; the hit delay is what its rig stated, or else what the prior says.
 
     Args:
         record: the session.
@@ -23,7 +24,8 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
 
     Raises:
         LogError: it has no accepted trial, or none with an MEP.
-        InvalidValueError: the prior's places count from another event than the session's ISIs.
+        InvalidValueError: the prior's places count from another event than the session's ISIs, or are of a rig with
+            another hit delay.
     """
     require_meps(record)
     model = ParticleModel(_of_rig(prior, record), particles=particles)
@@ -57,11 +59,21 @@ def require_meps(record: SessionRecord) -> None:
         )
 
 
+def stated_hit_delay_ms(record: SessionRecord) -> tuple[float, float] | None:
+    """Mean and SD of the hit delay that a session's strategy was told, or its rig states [ms]; None where neither is.
+
+    Args:
+        record: the session.
+    """
+    stated = record.header.strategy.settings.get("hit_delay_ms") or record.header.device.hit_delay_ms
+    return None if stated is None else mean_and_sd("the session's hit_delay_ms", stated)
+
+
 def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
     """The prior, told when the tap hits and whose MEPs these are, as far as prior, strategy or device say."""
-    start, settings = prior.profile.start, record.header.strategy.settings
-    stated = start.hit_delay_ms or settings.get("hit_delay_ms") or record.header.device.hit_delay_ms
-    profile = replace(prior.profile, start=replace(start, hit_delay_ms=stated))
-    told = settings.get("muscle")
+    start = prior.profile.start
+    delay_ms = stated_hit_delay_ms(record) or start.hit_delay_ms
+    profile = replace(prior.profile, start=replace(start, hit_delay_ms=delay_ms))
+    told = record.header.strategy.settings.get("muscle")
     known = told if told in {muscle.name for muscle in prior.muscles} else None
     return replace(prior, profile=profile, muscle=prior.muscle or known)

@@ -18,7 +18,7 @@ from isiw.session.progress import asked, outcome
 from isiw.session.recorder import OWN_LOOP
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.trials import Stimulus, Trial
-from isiw.window import Window
+from isiw.window import MIN_EXCESS_MV, Window
 
 __all__ = [
     "JUDGED_SINCE",
@@ -167,8 +167,10 @@ def _best_isi(estimate: Estimate) -> str:
 def _excluded(estimate: Estimate) -> str:
     if estimate.window is not None or estimate.excluded_mv is None:
         return ""
-    share = "" if estimate.excluded_pct_rmt is None else f" ({_figure(estimate.excluded_pct_rmt)} % of RMT)"
-    enhancement = f"An enhancement of more than {_figure(1e3 * estimate.excluded_mv)} µV{share}"
+    # Less is no window, and says nothing of the input: below the threshold it can shift without any MEP.
+    told = estimate.excluded_pct_rmt is not None and estimate.excluded_mv > MIN_EXCESS_MV
+    share = f" ({_figure(estimate.excluded_pct_rmt or 0.0)} % of RMT)" if told else ""
+    enhancement = f"An enhancement of more than {_figure(1e3 * max(estimate.excluded_mv, MIN_EXCESS_MV))} µV{share}"
     return f"{enhancement} is excluded with 90 % probability."
 
 

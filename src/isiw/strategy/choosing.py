@@ -17,6 +17,7 @@ import torch
 from isiw.acquisition.fixed import golden_index
 from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
 from isiw.design import DesignSpace
+from isiw.errors import StrategyError
 from isiw.models.protocol import ExpectsTheUsual, Observation, Posterior, ProposesIsi, ResponseModel, Tensor
 from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
 from isiw.window import WindowEstimate
@@ -258,9 +259,19 @@ def best_choices(
         told: trials told of each person.
         people: how many there are.
         cost: is taken off the scores.
+
+    Raises:
+        StrategyError: not as many scores as there are ISIs.
     """
     candidates = candidate_isis(space)
-    scores = acquisition(posterior, candidates).cpu().expand(people, -1)
+    scores = acquisition(posterior, candidates).cpu()
+    if scores.shape[-1:] != candidates.shape:
+        raise StrategyError(
+            f"{type(acquisition).__name__} must score each ISI",
+            got=tuple(scores.shape),
+            expected=f"scores of shape ({len(candidates)},), or a row of them for each person",
+        )
+    scores = scores.expand(people, -1)
     costs = None if cost is None else cost(candidates)
     best = best_candidate(scores, costs, first=golden_index(told, len(candidates)))
     nothing = f"{type(acquisition).__name__} gives no ISI a finite score: an evenly spaced one instead."

@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
+from types import NoneType, UnionType
 from typing import Any, Final, TypeVar, cast, get_args, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
@@ -101,4 +102,6 @@ def _explained(kind: Any, error: ErrorDetails, source: str) -> ConfigError:
 def _known_keys(kind: Any, section: Sequence[int | str]) -> list[str]:
     for name in section:
         kind = get_args(kind)[0] if isinstance(name, int) else get_type_hints(kind)[name]
+        if isinstance(kind, UnionType):  # a section that may be left out
+            kind = next(each for each in get_args(kind) if each is not NoneType)
     return sorted(f.name for f in fields(kind)) if is_dataclass(kind) else sorted(kind.model_fields)

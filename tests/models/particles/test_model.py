@@ -137,7 +137,9 @@ def test_an_uncertain_isi_is_integrated_out() -> None:
 
 def test_an_estimate_knows_the_noise_that_its_samples_suppose() -> None:
     # Of two kinds of noise one has wide windows only, so that kind and width must go together in every sample.
-    prior = Prior(ProfilePrior(p_window=0.9), NoiseShares(0.5, 0.0, 0.5, 0.0, 0.0), muscles=(FOREARM,))
+    prior = Prior(
+        ProfilePrior(p_window=0.9), NoiseShares(0.5, 0.0, 0.5, 0.0, 0.0), muscles=(replace(FOREARM, share=1.0),)
+    )
     posterior = ParticleModel(prior).begin(VALVE_SPACE, 3)
     recruits = posterior.swarm.latents.noise == NoiseKind.RECRUITMENT
     width = LATENTS.index("log_width_ms")

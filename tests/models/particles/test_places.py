@@ -14,6 +14,7 @@ from isiw.models.particles import ParticleModel
 from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
 from isiw.models.shared.scales import Scale
+from isiw.priors.components import beside
 
 MANY = 20_000
 HERE = Place(0.5, Scale(150.0, 5.0), Scale(60.0, 0.1))
@@ -82,8 +83,8 @@ def test_an_impossible_place_is_refused(wrong: Any) -> None:
 
 
 def test_a_known_muscle_keeps_what_was_learnt_of_it() -> None:
-    learnt = replace(Prior().muscles[0], name="as in the lab", share=0.5)
-    prior = replace(Prior(), muscles=(*Prior().muscles, learnt, learnt), muscle="forearm")
+    learnt = replace(Prior().muscles[0], name="as in the lab", share=0.25)
+    prior = replace(Prior(), muscles=beside(Prior().muscles, [learnt, learnt]), muscle="forearm")
     assert [muscle.name for muscle in prior.possible_muscles] == [
         "forearm",
         "other muscle",

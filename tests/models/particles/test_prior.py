@@ -95,11 +95,11 @@ def test_an_invalid_muscle_is_refused(wrong: dict[str, Any]) -> None:
         (SupraPrior, "floors"),
     ],
 )
-def test_a_part_of_several_laws_needs_one_that_is_possible(part: Any, name: str) -> None:
+def test_the_shares_of_several_laws_sum_to_one(part: Any, name: str) -> None:
     laws = getattr(part(), name)
-    for impossible in ((), (replace(laws[0], share=0.0),)):
-        with pytest.raises(InvalidValueError, match=f"{name} needs at least one law"):
-            part(**{name: impossible})
+    for wrong in ((), (replace(laws[0], share=0.0),), (*laws, laws[0])):
+        with pytest.raises(InvalidValueError, match=f"{name} must sum to 1"):
+            part(**{name: wrong})
 
 
 @pytest.mark.parametrize("shares", [ShapeShares, NoiseShares])
@@ -165,7 +165,7 @@ def test_no_other_curve_has_a_threshold() -> None:
 
 def test_hands_reach_from_small_meps_to_large_ones_below_and_above_threshold() -> None:
     # A of 0.2 and 3 mV over a floor of 0.009 mV; k = 0.23 times 90 % and 110 % RMT less an x50 of 117 %.
-    response = people(Prior(noise=ONLY_CURVES, muscles=(HAND,), muscle="hand")).response
+    response = people(Prior(noise=ONLY_CURVES, muscles=(replace(HAND, share=1.0),), muscle="hand")).response
     largest, drives = response.log_ratio.exp(), response.rest
     for values, (low, high) in (
         (largest, (0.2 / 0.009, 3.0 / 0.009)),

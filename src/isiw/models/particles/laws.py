@@ -6,6 +6,7 @@ The first of several laws is what is usual, the others say what else may be.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Final
 
@@ -37,25 +38,26 @@ __all__ = [
 def _check_shares(shares: object) -> None:
     names = [f.name for f in fields(shares)]  # type: ignore[arg-type] # a dataclass
     check_probabilities(shares, *names)
-    total = math.fsum(getattr(shares, name) for name in names)
-    if not math.isclose(total, 1.0, abs_tol=1e-6):
-        raise InvalidValueError(f"the probabilities of {type(shares).__name__} must sum to 1", got=total)
+    _require_whole(f"the probabilities of {type(shares).__name__}", [getattr(shares, name) for name in names])
 
 
 def check_laws(owner: object, *names: str) -> None:
-    """Check fields of a dataclass that are several laws: one of them at least is possible.
+    """Check fields of a dataclass that are several laws, each with a share.
 
     Args:
         owner: the instance.
         *names: its fields.
 
     Raises:
-        InvalidValueError: a field without a law, or without one that has a share.
+        InvalidValueError: a field whose shares do not sum to 1, as where there is no law.
     """
     for name in names:
-        laws = getattr(owner, name)
-        if not any(law.share > 0 for law in laws):
-            raise InvalidValueError(f"{type(owner).__name__}.{name} needs at least one law with a share", got=laws)
+        _require_whole(f"the shares of {type(owner).__name__}.{name}", [law.share for law in getattr(owner, name)])
+
+
+def _require_whole(what: str, shares: Sequence[float]) -> None:
+    if not math.isclose(total := math.fsum(shares), 1.0, abs_tol=1e-6):
+        raise InvalidValueError(f"{what} must sum to 1", got=total)
 
 
 @dataclass(frozen=True)
@@ -141,8 +143,8 @@ class ProfilePrior:
             `start` and `widths`.
 
     Raises:
-        InvalidValueError: an invalid probability, no widths, places that leave nothing to the rest, or that count from
-            different events.
+        InvalidValueError: an invalid probability, widths whose shares do not sum to 1, places that leave nothing to the
+            rest, or that count from different events.
     """
 
     p_window: float = 0.72
@@ -179,7 +181,7 @@ class ProfilePrior:
         """Check that the places mean something in a space.
 
         Raises:
-            InvalidValueError: they count from another event than the space.
+            InvalidValueError: they count from another event than the space, or are of a rig with another hit delay.
         """
         if self.places and self.places[0].reference != space.reference:
             raise InvalidValueError(
@@ -187,6 +189,14 @@ class ProfilePrior:
                 got=f"{space.reference} in the space",
                 expected=self.places[0].reference,
                 remedy="Use the prior with the kind of space that it was learnt in.",
+            )
+        delay_ms = self.start.hit_delay_ms
+        if others := [place.hit_delay_ms for place in self.places if not place.is_of_rig(delay_ms)]:
+            raise InvalidValueError(
+                "the prior's places are of a rig whose taps take another time, so no window would be where it was",
+                got=f"a hit delay of {delay_ms} ms",
+                expected=f"about {others[0]} ms",
+                remedy="Use the prior with the rig that it was learnt with, or count ISIs from the impact.",
             )
 
 
@@ -326,7 +336,7 @@ class SwitchPrior:
         sizes: of responses that are all or none, a forearm's or a hand's; their ratio is that of the mean response.
 
     Raises:
-        InvalidValueError: an invalid scale, or no sizes.
+        InvalidValueError: an invalid scale, or sizes whose shares do not sum to 1.
     """
 
     reliability: Scale = Scale(0.2, 0.7)

@@ -10,6 +10,7 @@ import torch
 
 from isiw.checks import MOST_OF_A_KIND, check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import levels
@@ -64,6 +65,7 @@ class ParticleModel:
         check_wholes(self, "thinned", least=1, most=MOST_OF_A_KIND)
         check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
         check_probabilities(self, "unusual_kept")
+        _require_device(self.device)
 
     @cached_property
     def prior_where_asking(self) -> Prior:
@@ -214,6 +216,13 @@ class ParticlePosterior:
         if excluded is None or len(shift_pct_rmt) < LEAST_SAMPLES:
             return excluded
         return excluded._replace(shift_pct_rmt=float(torch.quantile(shift_pct_rmt, EXCLUDED_AT)))
+
+
+def _require_device(name: str) -> None:
+    try:
+        torch.device(name)
+    except (RuntimeError, TypeError) as error:
+        raise InvalidValueError("the torch device is unknown", got=name, expected="such as cpu, cuda or mps") from error
 
 
 def _each(person: Person, function: Callable[[Tensor], Tensor]) -> Person:

@@ -6,12 +6,15 @@ import math
 from dataclasses import dataclass
 from typing import get_args
 
-from isiw.checks import check_choice, check_probabilities
+from isiw.checks import check_choice, check_probabilities, mean_and_sd
 from isiw.models.particles.mixture import Mixture
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.types import Reference
 
-__all__ = ["Place", "mixture_of"]
+__all__ = ["MOST_APART_MS", "Place", "mixture_of"]
+
+MOST_APART_MS = 10.0
+"""Hit delays of one rig are not further apart from one measurement to the next."""
 
 
 @dataclass(frozen=True)
@@ -23,21 +26,35 @@ class Place:
         start_ms: the start on the clock of the reference [ms].
         width_ms: the width [ms].
         reference: the event that the start counts from.
+        hit_delay_ms: mean and SD of the hit delay of the rig that it was learnt with [ms]; None where nobody stated it.
 
     Raises:
-        InvalidValueError: an invalid share, scale or reference.
+        InvalidValueError: an invalid share, scale, reference or hit delay.
     """
 
     share: float
     start_ms: Scale
     width_ms: Scale
     reference: Reference = "valve"
+    hit_delay_ms: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         check_probabilities(self, "share")
         check_scales(self, "start_ms", positive=False, tailed=False)
         check_scales(self, "width_ms", tailed=False)
         check_choice(self, "reference", get_args(Reference))
+        if self.hit_delay_ms is not None:
+            object.__setattr__(self, "hit_delay_ms", mean_and_sd("Place.hit_delay_ms", self.hit_delay_ms))
+
+    def is_of_rig(self, hit_delay_ms: tuple[float, float] | None) -> bool:
+        """Whether it can be of a rig: from the valve command, starts are as late as its taps.
+
+        Args:
+            hit_delay_ms: the rig's hit delay, as for a place.
+        """
+        if self.reference != "valve" or self.hit_delay_ms is None or hit_delay_ms is None:
+            return True
+        return abs(self.hit_delay_ms[0] - hit_delay_ms[0]) <= MOST_APART_MS
 
 
 def mixture_of(places: tuple[Place, ...]) -> Mixture:

@@ -87,7 +87,8 @@ class Prior:
         muscle: the name of the muscle, where it is known: the others that have a name are left out then.
 
     Raises:
-        InvalidValueError: no gains, muscles or floors, or a muscle that is none of the muscles.
+        InvalidValueError: shares of gains, muscles or floors that do not sum to 1, or a muscle that is none of the
+            muscles.
     """
 
     profile: ProfilePrior = field(default_factory=ProfilePrior)

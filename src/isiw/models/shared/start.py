@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import torch
 
-from isiw.checks import ascending, check_numbers, check_probabilities, number
+from isiw.checks import ascending, check_numbers, check_probabilities, mean_and_sd
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.protocol import Tensor
@@ -101,8 +101,7 @@ class StartPrior:
         if not math.isclose(total, 1.0, abs_tol=1e-6):
             raise InvalidValueError("the shares of StartPrior.spans must sum to 1", got=total)
         if self.hit_delay_ms is not None:
-            mean, sd = (number("StartPrior.hit_delay_ms", value, above=0) for value in self.hit_delay_ms)
-            object.__setattr__(self, "hit_delay_ms", (mean, sd))
+            object.__setattr__(self, "hit_delay_ms", mean_and_sd("StartPrior.hit_delay_ms", self.hit_delay_ms))
 
     def start_ms(self, quantile: Tensor, space: DesignSpace) -> Tensor:
         """Starts in a space [ms] at some quantiles of the prior, same shape.

@@ -13,8 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import reduce
 from numbers import Integral
-from os import PathLike
-from typing import Any, Final, Protocol, TypeVar, get_args, get_type_hints
+from typing import Any, Final, Protocol, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -256,10 +255,11 @@ def _converted(setting: Setting, value: Any, source: str) -> Any:
         raise StrategyError(
             f"{source} is of another kind of model", got=type(value).__module__, expected=kind.__module__
         )
-    if kind is not None and isinstance(value, str | PathLike):
+    taken = (Mapping, *(each for each in kinds if isinstance(each, type)))
+    if kind is not None and get_origin(setting.kind) is not tuple and not isinstance(value, taken):
         raise ConfigError(
-            f"{source} cannot be a text or a path",
-            got=str(value),
+            f"{source} is neither such an object nor a table",
+            got=value,
             expected=f"a {kind.__name__}, or a table of its fields",
             remedy="A lab's prior is read with isiw.priors.load(path).",
         )

@@ -88,7 +88,7 @@ class Segment:
         shift_pct: by how much the input of the recruitment curve is shifted in their middle [% RMT].
 
     Raises:
-        InvalidValueError: an invalid probability or scale, or no widths.
+        InvalidValueError: an invalid probability or scale, or widths whose shares do not sum to 1.
     """
 
     probability: float
@@ -147,7 +147,7 @@ class SupraPrior:
         session: of what changes within a session.
 
     Raises:
-        InvalidValueError: no curves or floors.
+        InvalidValueError: shares of curves or floors that do not sum to 1.
     """
 
     start: StartPrior = _START
