@@ -26,10 +26,11 @@ class DesignSpace:
     Args:
         low_ms: first ISI [ms].
         high_ms: last ISI [ms].
-        step_ms: distance between two ISIs [ms]; the range must hold a whole number of steps.
-        reference: the event that an ISI is counted from, the `"impact"` of the hammer or the `"valve"` command.
+        step_ms: distance between two ISIs [ms], by default 1; the range must hold a whole number of steps.
+        reference: the event that an ISI is counted from, the `"impact"` of the hammer (the default here; in a
+            configuration it is the other one) or the `"valve"` command.
         tolerance_ms: how far a *realised* ISI may lie beyond the range before it is an error, and from the commanded
-            one before it is a mistrial [ms].
+            one before it is a mistrial [ms]; by default 10.
 
     Raises:
         InvalidValueError: a bound that is not finite, an empty range, a step that does not fit, too many ISIs, an

@@ -16,6 +16,11 @@ Every message says what is wrong, what was got, what was expected, and the way o
     ├── StudyError                        a study that cannot be run, continued or read
     └── LogError                          a log that cannot be written or read
         └── DamagedLogError               a log that ends too early or fails its checksums
+
+Warnings, which are no errors:
+
+    ImplausibleDataWarning                data that look like a slip of unit; they are learnt all the same
+    OtherVersionsWarning                  a session goes on with other versions, and may ask other ISIs
 """
 
 from __future__ import annotations
@@ -25,6 +30,7 @@ __all__ = [
     "DamagedLogError",
     "DeviceError",
     "DeviceTimeoutError",
+    "ImplausibleDataWarning",
     "InvalidValueError",
     "IsiwError",
     "LimitExceededError",

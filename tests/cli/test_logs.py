@@ -35,7 +35,7 @@ def log(tmp_path: Path) -> Path:
 def test_export_writes_each_format(isiw: Command, log: Path, to: str, file: str) -> None:
     result = isiw("export", log, "--to", to, "out")
     assert result.exit_code == 0, result.output
-    assert "1 sessions with 3 trials: out" in result.output
+    assert "1 session with 3 trials: out" in result.output
     assert (Path("out") / file).is_file()
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import isiw
 from isiw.errors import LogError
-from isiw.report.evidence import contradiction, no_comparison
+from isiw.report.evidence import contradiction, no_comparison, nothing_stood_out
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Status, Trial
 from isiw.window import NO_MEP, Window
@@ -52,6 +52,18 @@ def test_a_window_with_hardly_a_trial_outside_has_nothing_to_be_compared_with() 
     alone = [Trial(6 + k, Status.ACCEPTED, None, mep_mv=0.02) for k in range(3)]
     assert no_comparison(WINDOW, [*told, *alone]) is None
     assert no_comparison(None, told) is None
+
+
+def at_rest(mep_mv: float, rest_uv: float | None = 1.5) -> Trial:
+    return Trial(0, Status.ACCEPTED, 50.0, isi_ms=50.0, mep_mv=mep_mv, background_rms_uv=rest_uv)
+
+
+def test_where_no_mep_stands_out_of_emg_at_rest_the_statement_asks_whether_the_stimulator_fired() -> None:
+    quiet = [at_rest(0.01)] * 10
+    assert "larger than that at rest. Did the stimulator fire" in str(nothing_stood_out(quiet))
+    assert nothing_stood_out(quiet[:9]) is None
+    assert nothing_stood_out([*quiet, at_rest(0.05)]) is None
+    assert nothing_stood_out([at_rest(0.01, None)] * 20) is None
 
 
 def test_amplitudes_that_are_all_zero_are_doubted_and_find_nothing(tmp_path: Path) -> None:

@@ -109,3 +109,9 @@ def test_a_study_that_could_not_even_be_listed_is_refused(changed: Any) -> None:
 def test_a_setting_that_is_none_by_default_may_be_named_so() -> None:
     assert StudyStrategy("default", {"hit_delay_ms": None}) == StudyStrategy("default")
     assert StudyStrategy("nr", {"max_trials": None, "segments": "all"}).settings == {"segments": "all"}
+
+
+def test_a_single_name_is_a_strategy_and_a_cohort() -> None:
+    study = tiny(strategies=("nr",), cohorts="gaussian")
+    assert (study.strategies, study.cohorts) == ((StudyStrategy("nr"),), ("gaussian",))
+    assert tiny(strategies="nr").strategies == (StudyStrategy("nr"),)

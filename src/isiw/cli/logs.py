@@ -33,7 +33,8 @@ def export(
             show(f"{subject} is now {pseudonym}")
         if exported.pseudonyms:
             show("Who is who is kept nowhere else.")
-        show(f"{exported.sessions} sessions with {exported.trials} trials: {exported.folder}", style="bold")
+        sessions = f"{exported.sessions} session{'' if exported.sessions == 1 else 's'}"
+        show(f"{sessions} with {exported.trials} trials: {exported.folder}", style="bold")
         for loss in exported.lacking:
             show(loss, style="red")
         if exported.lacking:

@@ -61,4 +61,5 @@ def show_prior(
 def _print(lab: LabPrior) -> None:
     show(isiw.priors.compared(lab).to_string(float_format=lambda value: f"{value:.3g}", na_rep=""))
     trials = sum(session.trials for session in lab.sessions)
-    show(f"Learnt from {len(lab.sessions)} sessions with {trials} trials.", style="bold")
+    sessions = f"{len(lab.sessions)} session{'' if len(lab.sessions) == 1 else 's'}"
+    show(f"Learnt from {sessions} with {trials} trials.", style="bold")

@@ -41,7 +41,7 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
         int | None, typer.Option(help="Most pulses, lost ones included; default 100.", **NO_DEFAULT)
     ] = None,
     min_iti_s: Annotated[
-        float | None, typer.Option(help="Shortest time between two pulses [s]; default 5.", **NO_DEFAULT)
+        float | None, typer.Option(help="Shortest time between two pulses, in seconds; default 5.", **NO_DEFAULT)
     ] = None,
     subject: Annotated[str | None, typer.Option(help="The person's code, for the log.", **NO_DEFAULT)] = None,
     cohort: Annotated[

@@ -12,11 +12,16 @@ from isiw.log.reader import SessionRecord
 from isiw.trials import Trial
 from isiw.window import NO_MEP, Window
 
-__all__ = ["contradiction", "no_comparison", "nothing_measured"]
+__all__ = ["contradiction", "no_comparison", "nothing_measured", "nothing_stood_out"]
 
 ENOUGH_ON_EACH_SIDE = 4
 NO_LARGER = 0.5
 """From this p-value of a one-sided rank test on, MEPs are not larger at all."""
+
+OF_REST = 8.0
+"""Peak-to-peak amplitude of EMG at rest over its RMS, at most: some 6 within the window of an MEP."""
+
+ENOUGH_TO_STAND_OUT = 10
 
 _LOOK = "Did the stimulator fire, was the EMG recorded, was the intensity enough?"
 
@@ -67,6 +72,20 @@ def contradiction(window: Window | None, trials: Sequence[Trial]) -> str | None:
         return None
     medians = " and ".join(f"{1e3 * statistics.median(meps_mv):.0f}" for meps_mv in (inside, outside))
     return f"The data do not bear this out: the MEPs inside are no larger than those outside (medians {medians} µV)."
+
+
+def nothing_stood_out(trials: Sequence[Trial]) -> str | None:
+    """That no MEP was larger than EMG at rest; None where one was, or where too few trials say so.
+
+    A muscle that the pulse alone does not reach looks like this, and so does a stimulator that does not fire.
+
+    Args:
+        trials: the trials that count.
+    """
+    known = [(t.mep_mv, t.background_rms_uv) for t in trials if t.mep_mv is not None and t.background_rms_uv]
+    if len(known) < ENOUGH_TO_STAND_OUT or any(1e3 * mep_mv > OF_REST * rest_uv for mep_mv, rest_uv in known):
+        return None
+    return f"In none of these trials was the EMG after the pulse larger than that at rest. {_LOOK}"
 
 
 def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:

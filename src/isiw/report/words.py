@@ -13,7 +13,7 @@ from isiw.log.reader import SessionRecord, require_records
 from isiw.log.schema import RUN_KEY, SERVED_KEY, Estimate
 from isiw.metrics import f1
 from isiw.report.depression import depression_sentence
-from isiw.report.evidence import contradiction, no_comparison, nothing_measured
+from isiw.report.evidence import contradiction, no_comparison, nothing_measured, nothing_stood_out
 from isiw.session.progress import asked, outcome
 from isiw.session.recorder import OWN_LOOP
 from isiw.strategy.catalogue import known_settings, list_strategies
@@ -115,6 +115,7 @@ def finding_sentences(record: SessionRecord) -> list[str]:
         _edges(estimate, space),
         contradiction(estimate.window, record.table.told) or "",
         no_comparison(estimate.window, record.table.told) or "",
+        nothing_stood_out(record.table.told) or "",
         *(f"Doubt since trial {event.trial}: {event.text}" for event in record.events if event.kind == "doubt"),
         _best_isi(estimate),
         _excluded(estimate),

@@ -116,7 +116,7 @@ class Study:
     """A study.
 
     Args:
-        strategies: what is compared.
+        strategies: what is compared; a name is the strategy as it comes.
         cohorts: named cohorts.
         people: how many people of each.
         seed: seed of the people, their trial noise and the strategies; 0–999 are for development.
@@ -151,8 +151,11 @@ class Study:
     hit_delay: HitDelay = "unstated"
 
     def __post_init__(self) -> None:
-        for name in ("strategies", "cohorts", "marks"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+        strategies, cohorts = _several(self.strategies), _several(self.cohorts)
+        named = tuple(StudyStrategy(each) if isinstance(each, str) else each for each in strategies)
+        object.__setattr__(self, "strategies", named)
+        object.__setattr__(self, "cohorts", cohorts)
+        object.__setattr__(self, "marks", tuple(self.marks))
         check_wholes(self, "people", "batch", least=1, most=_MOST_SESSIONS)
         check_wholes(self, "trials", least=1, most=_MOST_TRIALS)
         check_wholes(self, "seed", least=0, most=_MOST_SEED)
@@ -222,6 +225,11 @@ def load_study(path: str | Path) -> Study:
         ConfigError: it cannot be read, or has an unknown key or a bad value; the message names file, key and value.
     """
     return study_from(read_toml(path), str(path))
+
+
+def _several(values: Any) -> tuple[Any, ...]:
+    """What may be several, or one name."""
+    return (values,) if isinstance(values, str) else tuple(values)
 
 
 def study_from(values: Mapping[str, Any], source: str) -> Study:

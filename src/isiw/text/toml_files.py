@@ -49,6 +49,12 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise ConfigError(
             f"the TOML file cannot be read: {error.strerror}", got=str(path), remedy="Check the path."
         ) from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(
+            "this is not a text, and so no TOML file",
+            got=str(path),
+            remedy="A session's log is read with isiw show, and gone on with by isiw resume.",
+        ) from error
     except (ValueError, RecursionError) as error:  # not TOML, not UTF-8, or nested without end
         raise ConfigError(f"{path} is not valid TOML: {error}", remedy="Correct the line that it names.") from error
 
