@@ -275,6 +275,20 @@ def test_a_clipped_mep_is_saturated_also_one_step_below_the_full_scale(full_scal
     assert mistrial_of(clipped, limits=limits) is MistrialReason.SATURATION
 
 
+def test_an_amplifier_that_blanks_the_mep_has_recorded_none() -> None:
+    emg = sweep_of().channels["emg"].values.copy()
+    emg[3895:4065] = 0.0  # from 1 ms before the pulse to 33 ms after it
+    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is MistrialReason.MISSING_CHANNEL
+    emg[3960:] = sweep_of().channels["emg"].values[3960:]  # 12 ms after the pulse the MEP is yet to come
+    assert judge(with_channel(sweep_of(), "emg", emg), PAIR, IMPACT).reason is None
+
+
+def test_a_coarse_converter_blanks_nothing() -> None:
+    coarse = np.round(sweep_of().channels["emg"].values / 0.02) * 0.02  # ten times the noise at rest
+    reason = judge(with_channel(sweep_of(), "emg", coarse), PAIR, IMPACT).reason
+    assert reason is not MistrialReason.MISSING_CHANNEL
+
+
 @pytest.mark.parametrize("samples", [-1, 1])
 def test_channels_may_differ_by_a_sample(samples: int) -> None:
     sweep = sweep_of()

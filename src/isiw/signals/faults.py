@@ -61,7 +61,9 @@ _REMEDIES: Mapping[MistrialReason, str] = MappingProxyType(
         MistrialReason.TMS_BEFORE_IMPACT: "Check the hit delay that the rig reckons with, and the sampling rate.",
         MistrialReason.BACKGROUND_ACTIVITY: "Let the person relax the muscle; check electrodes, ground and mains hum.",
         MistrialReason.SATURATION: "Lower the amplifier's gain, or keep cables away from the coil.",
-        MistrialReason.MISSING_CHANNEL: "Check that the EMG is recorded from 50 ms before to 50 ms after the pulse.",
+        MistrialReason.MISSING_CHANNEL: (
+            "Check that the EMG is recorded, and not blanked, from 50 ms before to 50 ms after the pulse."
+        ),
         MistrialReason.ISI_OFF: "Check how the rig times the pulse, the reference of its ISIs, and the sampling rate.",
         MistrialReason.IMPLAUSIBLE: "Check the unit and the gain of the EMG.",
         MistrialReason.REJECTED: "See the notes in the log.",

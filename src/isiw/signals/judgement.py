@@ -51,6 +51,10 @@ ACCELERATION_UNITS = frozenset({"m/s^2", "m/s²", "g", "V", "mV"})
 
 FLAT_MS = 1.0
 
+BLANKED_MS = 5.0
+BLANKED_TIMES = 3
+"""An amplifier that blanks the pulse's artefact holds one value; a coarse converter repeats one at rest as well."""
+
 NEARLY_FULL = 0.999
 """The largest code of a converter lies below its full scale: by a step of one in 2,048 where it has 12 bits."""
 
@@ -154,7 +158,7 @@ def _judge_pulse(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: S
     span_ms = (pulse + limits.mep_window_ms[0], pulse + limits.mep_window_ms[1])
     if is_saturated(emg_mv, emg.rate_hz, limits.full_scale_mv, span_ms=span_ms):
         return _mistrial(timed, MistrialReason.SATURATION)
-    if timed.background_rms_uv is None:
+    if timed.background_rms_uv is None or _is_blanked(emg_mv, emg.rate_hz, pulse, span_ms):
         return _mistrial(timed, MistrialReason.MISSING_CHANNEL)
     measured = _measured(timed, _mep_mv(emg_mv, emg, timed, limits))
     if timed.background_rms_uv > limits.background_uv:
@@ -251,6 +255,14 @@ def is_saturated(
     samples = max(3, round(FLAT_MS * rate_hz / 1000))
     tops = (float(counts.max()), float(counts.min()))
     return any(abs(top - level) > 10 * usual and _longest_run(counts == top) >= samples for top in tops)
+
+
+def _is_blanked(emg_mv: FloatArray, rate_hz: float, pulse_ms: float, span_ms: tuple[float, float]) -> bool:
+    """Whether the amplifier held one value for a part of the MEP's window, much longer than before the pulse."""
+    before, first, last = (math.floor(edge_ms * rate_hz / 1000) for edge_ms in (pulse_ms, *span_ms))
+    held = _longest_run(np.diff(emg_mv[first : last + 1]) == 0)
+    at_rest = _longest_run(np.diff(emg_mv[:before]) == 0)
+    return held * 1000 / rate_hz >= BLANKED_MS and held > BLANKED_TIMES * at_rest
 
 
 def _longest_run(mask: BoolArray) -> int:
