@@ -8,6 +8,7 @@ two has learnt anything from the person: a method is worth what it reaches beyon
 
 from __future__ import annotations
 
+import platform
 import shlex
 import sys
 from collections.abc import Sequence
@@ -15,6 +16,7 @@ from typing import Annotated
 
 import numpy as np
 import pandas as pd
+import torch
 import typer
 
 import isiw
@@ -104,6 +106,8 @@ def main(
     """Print mean F1 of both, by cohort, over 500 ms after the valve command."""
     table = without_any_trial(list(COHORTS), people, seed, VALVE_SPACE)
     print(f"- command: `{shlex.join(['python', *sys.argv])}`")
+    versions = ", ".join(f"{module.__name__} {module.__version__}" for module in (isiw, torch, np))
+    print(f"- python {platform.python_version()}, {versions}; seed {seed}, and {OTHER_SEED} for the fixed windows")
     print(f"- people: {people} per cohort; standard errors about .01 at most")
     print("- `kim11` has eleven people, so its fixed window was chosen on the same ones\n")
     print(table.to_markdown(index=False, floatfmt=".2f"))

@@ -32,6 +32,7 @@ __all__ = [
     "deadline",
     "mean_and_sd",
     "number",
+    "require_sum_of_one",
     "text",
     "whole",
 ]
@@ -154,6 +155,20 @@ def mean_and_sd(what: str, value: object) -> tuple[float, float]:
         )
     mean, sd = (number(what, each, above=0) for each in pair)
     return mean, sd
+
+
+def require_sum_of_one(what: str, shares: Iterable[float]) -> None:
+    """Raise where probabilities that exclude each other do not sum to 1.
+
+    Args:
+        what: their name, for the message.
+        shares: the probabilities.
+
+    Raises:
+        InvalidValueError: they sum to anything else.
+    """
+    if not math.isclose(total := math.fsum(shares), 1.0, abs_tol=1e-6):
+        raise InvalidValueError(f"{what} must sum to 1", got=total)
 
 
 def text(what: str, value: object) -> str:

@@ -28,6 +28,7 @@ __all__ = [
     "Window",
     "WindowEstimate",
     "finding",
+    "lacking",
     "least_excess_mv",
     "window_from_excess",
 ]
@@ -283,9 +284,7 @@ class WindowEstimate:
     @property
     def too_little(self) -> str | None:
         """What is said where too little was measured to speak of a window; None where enough was."""
-        if self.silent:
-            return NO_MEP
-        return None if self.pairs is None or self.pairs >= ENOUGH_PAIRS else TOO_FEW
+        return lacking(self.pairs, silent=self.silent)
 
     def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:
         """Credible intervals of start and end, given that there is a window [ms].
@@ -352,6 +351,18 @@ class WindowEstimate:
         isi = np.atleast_1d(np.asarray(isi_ms, dtype=float))
         low, median, high = (np.interp(isi, self.grid_ms, row) for row in self.profile_quantiles_mv)
         return ProfileBand(median, low, high)
+
+
+def lacking(pairs: int | None, *, silent: bool) -> str | None:
+    """What is said where too little was measured to speak of a window; None where enough was.
+
+    Args:
+        pairs: how many pairs of stimuli count; None where that is not known.
+        silent: whether no trial that counts showed an MEP.
+    """
+    if silent:
+        return NO_MEP
+    return None if pairs is None or pairs >= ENOUGH_PAIRS else TOO_FEW
 
 
 def finding(

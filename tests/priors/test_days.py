@@ -62,7 +62,7 @@ def test_another_day_on_a_rig_with_another_hit_delay_is_refused(tmp_path: Path) 
     assert both.profile.start.hit_delay_ms == (184.0, 5.0)  # each session has its own rig's
     assert {place.hit_delay_ms for place in both.profile.places} == {(180.0, 5.0), (184.0, 5.0)}
     for compared in (priors.after, priors.moved):
-        with pytest.raises(InvalidValueError, match=r"another time.*80\.0.*180\.0"):
+        with pytest.raises(InvalidValueError, match=r"another hit delay.*80\.0.*180\.0"):
             compared(first, elsewhere)
     with pytest.raises(InvalidValueError, match="rig that it was learnt with"):
         make_strategy(prior=both, hit_delay_ms=(80.0, 5.0), particles=50)

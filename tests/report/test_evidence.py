@@ -60,7 +60,7 @@ def at_rest(mep_mv: float, rest_uv: float | None = 1.5) -> Trial:
 
 def test_where_no_mep_stands_out_of_emg_at_rest_the_statement_asks_whether_the_stimulator_fired() -> None:
     quiet = [at_rest(0.01)] * 10
-    assert "larger than that at rest. Did the stimulator fire" in str(nothing_stood_out(quiet))
+    assert "larger than at rest. Did the stimulator fire" in str(nothing_stood_out(quiet))
     assert nothing_stood_out(quiet[:9]) is None
     assert nothing_stood_out([*quiet, at_rest(0.05)]) is None
     assert nothing_stood_out([at_rest(0.01, None)] * 20) is None

@@ -22,6 +22,7 @@ __all__ = [
     "NOT_OVER",
     "NO_DEFAULT",
     "Overwrite",
+    "counted",
     "errors_reported",
     "refuse_ignored",
     "show",
@@ -104,3 +105,13 @@ def refuse_ignored(why: str, **options: object) -> None:
     given = [f"--{name.replace('_', '-')}" for name, value in options.items() if value not in (None, [])]
     if given:
         raise isiw.errors.ConfigError(why, got=", ".join(given), remedy="Leave these options out.")
+
+
+def counted(count: int, noun: str) -> str:
+    """A number of things in words, such as "1 session" and "2 sessions".
+
+    Args:
+        count: how many.
+        noun: what one of them is called.
+    """
+    return f"{count} {noun}{'' if count == 1 else 's'}"

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 import isiw
-from isiw.cli.console import DAMAGED, NO_DEFAULT, Overwrite, errors_reported, show
+from isiw.cli.console import DAMAGED, NO_DEFAULT, Overwrite, counted, errors_reported, show
 
 __all__ = ["app"]
 
@@ -33,8 +33,8 @@ def export(
             show(f"{subject} is now {pseudonym}")
         if exported.pseudonyms:
             show("Who is who is kept nowhere else.")
-        sessions = f"{exported.sessions} session{'' if exported.sessions == 1 else 's'}"
-        show(f"{sessions} with {exported.trials} trials: {exported.folder}", style="bold")
+        what = f"{counted(exported.sessions, 'session')} with {counted(exported.trials, 'trial')}"
+        show(f"{what}: {exported.folder}", style="bold")
         for loss in exported.lacking:
             show(loss, style="red")
         if exported.lacking:

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, Overwrite, errors_reported, show
+from isiw.cli.console import NO_DEFAULT, Overwrite, counted, errors_reported, show
 from isiw.log.outputs import check_output
 
 if TYPE_CHECKING:
@@ -60,6 +60,5 @@ def show_prior(
 
 def _print(lab: LabPrior) -> None:
     show(isiw.priors.compared(lab).to_string(float_format=lambda value: f"{value:.3g}", na_rep=""))
-    trials = sum(session.trials for session in lab.sessions)
-    sessions = f"{len(lab.sessions)} session{'' if len(lab.sessions) == 1 else 's'}"
-    show(f"Learnt from {sessions} with {trials} trials.", style="bold")
+    trials = counted(sum(session.trials for session in lab.sessions), "trial")
+    show(f"Learnt from {counted(len(lab.sessions), 'session')} with {trials}.", style="bold")

@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 import isiw
-from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, refuse_ignored, show
+from isiw.cli.console import DAMAGED, NO_DEFAULT, counted, errors_reported, refuse_ignored, show
 
 if TYPE_CHECKING:
     from isiw.session import ThresholdRecorder
@@ -117,9 +117,7 @@ def _say_what_is_there(log: Path) -> None:
     person = isiw.session.simulated_person(record.header)
     if person is not None:
         show(f"The simulated person's true threshold is {person.rmt_pct_mso:.1f} % MSO.")
-    pulses = isiw.session.pulses_given(record)
-    given = "1 pulse" if pulses == 1 else f"{pulses} pulses"
-    show(f"{given}, learnt from {len(search.pulses)}. Log: {record.path}")
+    show(f"{counted(isiw.session.pulses_given(record), 'pulse')}, learnt from {len(search.pulses)}. Log: {record.path}")
     for loss in record.losses:
         show(loss, style="red")
     if record.losses:

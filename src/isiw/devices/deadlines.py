@@ -146,8 +146,9 @@ class PunctualDevice:
         self._device, self._deadlines = device, deadlines or Deadlines()
         self._given_up, self._report = given_up, report
         self._stopping = threading.RLock()
-        self._stages = 0
-        self._stopped_at = self._disarmed_at = -1  # at how many stages; a `stop` that is late says nothing of the next
+        # How often it was staged; how often when it was last stopped, and when it was disarmed with no verb busy. So a
+        # `stop` that ends after the next `stage` has begun is not taken for one that disarmed it.
+        self._stages, self._stopped_at, self._disarmed_at = 0, -1, -1
         self._late: _Call[Answer] | None = None
         self._worker: _Worker | None = None
         self._owner = threading.get_ident()

@@ -36,7 +36,7 @@ from isiw.signals.plausibility import is_silent
 from isiw.strategy.stopping import StopDecision
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial, TrialTable
-from isiw.window import ENOUGH_PAIRS, NO_MEP, TOO_FEW
+from isiw.window import lacking
 
 __all__ = ["Records", "SessionRecord", "of_production", "read_any", "read_salvaged", "read_session", "require_records"]
 
@@ -114,9 +114,7 @@ class SessionRecord:
     @property
     def too_little(self) -> str | None:
         """What is said where too little was measured to speak of a window; None where enough was."""
-        if self.is_silent:
-            return NO_MEP
-        return None if sum(trial.isi_ms is not None for trial in self.table.told) >= ENOUGH_PAIRS else TOO_FEW
+        return lacking(sum(trial.isi_ms is not None for trial in self.table.told), silent=self.is_silent)
 
     @property
     def is_silent(self) -> bool:

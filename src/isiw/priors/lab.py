@@ -181,7 +181,7 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
     means_ms = [stated[0] for stated in delays_ms if stated is not None]
     if references == {"valve"} and means_ms and max(means_ms) - min(means_ms) > MOST_APART_MS:
         raise LogError(
-            "the sessions are of rigs whose taps take different times, so their windows cannot be compared",
+            "the sessions were run on rigs with different hit delays, so their windows cannot be compared",
             got=f"hit delays from {min(means_ms):g} to {max(means_ms):g} ms",
             expected=f"at most {MOST_APART_MS:g} ms apart",
             remedy="Learn a prior for each rig.",

@@ -14,7 +14,7 @@ from isiw.report.words import finding_sentence
 from isiw.text import plain
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
-from isiw.window import ENOUGH_PAIRS, NO_MEP, TOO_FEW
+from isiw.window import lacking
 
 __all__ = ["drawn"]
 
@@ -70,10 +70,9 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
 
 def _belief(record: SessionRecord, estimate: Estimate) -> dict[str, Any]:
     pairs = sum(trial.index <= estimate.trial and trial.isi_ms is not None for trial in record.table.told)
-    window_is_told = pairs >= ENOUGH_PAIRS and not record.is_silent
-    window = estimate.window if window_is_told else None
-    nothing = NO_MEP if record.is_silent else TOO_FEW
-    found = finding_sentence(estimate, record.header.space) if window_is_told else nothing
+    nothing = lacking(pairs, silent=record.is_silent)
+    window = estimate.window if nothing is None else None
+    found = nothing or finding_sentence(estimate, record.header.space)
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
     bands = {
         "profile": estimate.profile_mv,

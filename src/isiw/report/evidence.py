@@ -85,7 +85,7 @@ def nothing_stood_out(trials: Sequence[Trial]) -> str | None:
     known = [(t.mep_mv, t.background_rms_uv) for t in trials if t.mep_mv is not None and t.background_rms_uv]
     if len(known) < ENOUGH_TO_STAND_OUT or any(1e3 * mep_mv > OF_REST * rest_uv for mep_mv, rest_uv in known):
         return None
-    return f"In none of these trials was the EMG after the pulse larger than that at rest. {_LOOK}"
+    return f"In no trial was the EMG after the pulse larger than at rest. {_LOOK}"
 
 
 def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:

@@ -51,9 +51,9 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         ) from error
     except UnicodeDecodeError as error:
         raise ConfigError(
-            "this is not a text, and so no TOML file",
+            "this is not a TOML file, which is text",
             got=str(path),
-            remedy="A session's log is read with isiw show, and gone on with by isiw resume.",
+            remedy="To see what a session's log holds use isiw show, to continue the session isiw resume.",
         ) from error
     except (ValueError, RecursionError) as error:  # not TOML, not UTF-8, or nested without end
         raise ConfigError(f"{path} is not valid TOML: {error}", remedy="Correct the line that it names.") from error

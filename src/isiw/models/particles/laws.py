@@ -6,11 +6,10 @@ The first of several laws is what is usual, the others say what else may be.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Final
 
-from isiw.checks import check_numbers, check_probabilities
+from isiw.checks import check_numbers, check_probabilities, require_sum_of_one
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.particles.places import Place
@@ -38,7 +37,7 @@ __all__ = [
 def _check_shares(shares: object) -> None:
     names = [f.name for f in fields(shares)]  # type: ignore[arg-type] # a dataclass
     check_probabilities(shares, *names)
-    _require_whole(f"the probabilities of {type(shares).__name__}", [getattr(shares, name) for name in names])
+    require_sum_of_one(f"the probabilities of {type(shares).__name__}", [getattr(shares, name) for name in names])
 
 
 def check_laws(owner: object, *names: str) -> None:
@@ -52,12 +51,7 @@ def check_laws(owner: object, *names: str) -> None:
         InvalidValueError: a field whose shares do not sum to 1, as where there is no law.
     """
     for name in names:
-        _require_whole(f"the shares of {type(owner).__name__}.{name}", [law.share for law in getattr(owner, name)])
-
-
-def _require_whole(what: str, shares: Sequence[float]) -> None:
-    if not math.isclose(total := math.fsum(shares), 1.0, abs_tol=1e-6):
-        raise InvalidValueError(f"{what} must sum to 1", got=total)
+        require_sum_of_one(f"the shares of {type(owner).__name__}.{name}", [law.share for law in getattr(owner, name)])
 
 
 @dataclass(frozen=True)
@@ -193,7 +187,7 @@ class ProfilePrior:
         delay_ms = self.start.hit_delay_ms
         if others := [place.hit_delay_ms for place in self.places if not place.is_of_rig(delay_ms)]:
             raise InvalidValueError(
-                "the prior's places are of a rig whose taps take another time, so no window would be where it was",
+                "the prior was learnt on a rig with another hit delay, so its windows would be in the wrong place",
                 got=f"a hit delay of {delay_ms} ms",
                 expected=f"about {others[0]} ms",
                 remedy="Use the prior with the rig that it was learnt with, or count ISIs from the impact.",

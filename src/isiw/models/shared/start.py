@@ -9,9 +9,8 @@ from typing import Final, NamedTuple
 
 import torch
 
-from isiw.checks import ascending, check_numbers, check_probabilities, mean_and_sd
+from isiw.checks import ascending, check_numbers, check_probabilities, mean_and_sd, require_sum_of_one
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
 from isiw.models.protocol import Tensor
 
 __all__ = ["Span", "StartPrior"]
@@ -97,9 +96,7 @@ class StartPrior:
 
     def __post_init__(self) -> None:
         check_probabilities(self, "p_anywhere", "p_robot")
-        total = math.fsum(span.share for span in self.spans)
-        if not math.isclose(total, 1.0, abs_tol=1e-6):
-            raise InvalidValueError("the shares of StartPrior.spans must sum to 1", got=total)
+        require_sum_of_one("the shares of StartPrior.spans", (span.share for span in self.spans))
         if self.hit_delay_ms is not None:
             object.__setattr__(self, "hit_delay_ms", mean_and_sd("StartPrior.hit_delay_ms", self.hit_delay_ms))
 
