@@ -55,7 +55,7 @@ def test_a_file_changes_what_it_names(config_file: WriteFile) -> None:
     [
         ("sead = 7", ["session.toml", "sead", "7", "Did you mean seed?"]),
         ("[subject]\ncohrt = 'x'", ["subject.cohrt", "'x'", "Did you mean cohort?", "cohort, data, kind, number"]),
-        ("seed = 'many'", ["value of seed", "'many'", "integer"]),
+        ("seed = 'many'", ["value of seed", "'many'", "a whole number"]),
         ("[strategy.settings]\nmax_trails = 9", ["strategy.settings", "max_trails", "Did you mean max_trials?"]),
         ("[strategy.settings]\nmax_trials = 'all'", ["strategy.settings", "max_trials", "'all'", "whole number"]),
         ("seed = -1", ["value of seed", "-1"]),

@@ -80,11 +80,12 @@ def test_a_malformed_body_is_refused_in_words_and_begins_nothing(
         ({"strategy": {"name": "defualt"}}, "strategy.name", "default"),
         ({"strategy": {"name": "even", "settings": {"particels": 9}}}, "strategy.settings", "particles"),
         ({"space": {"low_ms": 100, "high_ms": 50}}, "space", "low_ms < high_ms"),
-        ({"space": {"low": 100}}, "space.low", "not permitted"),
+        ({"space": {"low": 100}}, "space.low", "is unknown; got 100; expected one of high_ms, low_ms"),
         ({"limits": {"max_pulses": 0}}, "limits.max_pulses", "greater than"),
         ({"protocol": {"iti_s": [9.0, 5.0]}}, "protocol", "ascend"),
         ({"visit": {"day": 0}}, "visit.day", "greater than"),
-        ({"seed": True}, "seed", "integer"),
+        ({"seed": True}, "seed", "expected a whole number"),
+        ({"visit": 5}, "visit", "expected a table"),
     ],
 )
 def test_a_plan_that_cannot_be_is_refused_by_the_name_of_its_field(

@@ -34,7 +34,10 @@ def test_values_become_the_dataclass() -> None:
         ({"parts": [], "peple": 3}, r"f.toml: the key peple is unknown; got 3; .*Did you mean people"),
         ({"parts": [{"nam": "a"}]}, r"the key parts.0.nam is unknown.*Did you mean name"),
         ({"parts": [], "extra": {"nam": "a"}}, r"the key extra.nam is unknown.*Did you mean name"),
-        ({"parts": [], "people": "many"}, r"the value of people cannot be used; got 'many'"),
+        ({"parts": [], "people": "many"}, r"the value of people cannot be used; got 'many'; expected a whole number"),
+        ({"parts": "ab"}, r"the value of parts cannot be used; got 'ab'; expected a list"),
+        ({"parts": [7]}, r"the value of parts.0 cannot be used; got 7; expected a table of keys and values"),
+        ({"parts": [{"name": 7}]}, r"the value of parts.0.name cannot be used; got 7; expected text"),
         ({"people": 3}, r"the key parts is missing"),
     ],
 )

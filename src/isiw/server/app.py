@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
+from pydantic_core import ErrorDetails
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 
@@ -19,6 +19,7 @@ from isiw.server.guard import Guard, Rules, wants_200
 from isiw.server.refusals import Refusal, answered, as_refusal
 from isiw.server.routes import router
 from isiw.server.sessions import Sessions
+from isiw.text.expected import expected_instead
 
 __all__ = ["guarded", "make_app"]
 
@@ -65,11 +66,10 @@ def _refused(request: Request, error: Exception) -> Response:
 
 def _invalid(request: Request, error: Exception) -> Response:
     """A path, query or header that cannot be used."""
-    found: dict[str, Any] = error.errors()[0]  # type: ignore[attr-defined] # it is the RequestValidationError
+    found: ErrorDetails = error.errors()[0]  # type: ignore[attr-defined] # it is the RequestValidationError
     *_, field = found["loc"]
-    refusal = Refusal(
-        422, "InvalidValueError", f"{field} cannot be used", got=found["input"], expected=found["msg"], field=str(field)
-    )
+    what, expected = f"{field} cannot be used", expected_instead(found)
+    refusal = Refusal(422, "InvalidValueError", what, got=found["input"], expected=expected, field=str(field))
     return answered(refusal, as_200=wants_200(request.url.query))
 
 

@@ -15,6 +15,7 @@ from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, Visi
 from isiw.errors import IsiwError
 from isiw.log.schema import MOST_TRIALS
 from isiw.server.refusals import Refusal
+from isiw.text.expected import UNKNOWN, expected_instead, known_keys
 from isiw.visit import VisitProtocol
 
 __all__ = [
@@ -166,7 +167,7 @@ def _read(kind: type[_Kind], content_type: str, body: bytes) -> _Kind:
     try:
         return kind.model_validate_json(body or b"{}", strict=True)
     except ValidationError as error:
-        raise _refused(error.errors()[0]) from error
+        raise _refused(kind, error.errors()[0]) from error
 
 
 def _form_as_json(kind: type[BaseModel], body: bytes) -> bytes:
@@ -193,7 +194,7 @@ def _value(text: str) -> Any:
         return text
 
 
-def _refused(error: ErrorDetails) -> Refusal:
+def _refused(kind: type[BaseModel], error: ErrorDetails) -> Refusal:
     """What is wrong with a body, by the name of its field."""
     field = ".".join(map(str, error["loc"])) or None
     own = error.get("ctx", {}).get("error")
@@ -203,11 +204,14 @@ def _refused(error: ErrorDetails) -> Refusal:
         )
     if error["type"] == "json_invalid":
         return Refusal(400, "MalformedBody", "the body is no JSON", expected=error["msg"])
+    known = ", ".join(known_keys(kind, error["loc"][:-1])) if error["type"] in UNKNOWN else None
+    missing = error["type"] == "missing"
+    what = "is unknown" if known else "is missing" if missing else "cannot be used"
     return Refusal(
         422,
         "InvalidValueError",
-        f"the field {field} cannot be used" if field else "the body cannot be used",
-        got=None if error["type"] == "missing" else error["input"],
-        expected=error["msg"],
+        f"the field {field} {what}" if field else "the body cannot be used",
+        got=None if missing else error["input"],
+        expected=f"one of {known}" if known else None if missing else expected_instead(error),
         field=field,
     )

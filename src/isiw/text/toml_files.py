@@ -5,22 +5,19 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Mapping
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Any, Final, TypeVar, cast, get_args, get_type_hints
+from typing import Any, Final, TypeVar, cast
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
 from isiw.errors import ConfigError, IsiwError
+from isiw.text.expected import UNKNOWN, expected_instead, known_keys
 
 __all__ = ["checked", "parsed", "read_toml"]
 
 _T = TypeVar("_T")
-
-_UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
 
 _TOO_MANY_PARTS: Final = re.compile(r"(?:\.\s*[\w\"'-]{1,40}\s*){100}")
 
@@ -75,7 +72,7 @@ def checked(kind: type[_T], values: Mapping[str, Any], source: str) -> _T:
     except ValidationError as error:
         found = error.errors()
         # A key that was misspelt is reported before the one that is missing because of it.
-        raise _explained(kind, next((e for e in found if e["type"] in _UNKNOWN), found[0]), source) from error
+        raise _explained(kind, next((e for e in found if e["type"] in UNKNOWN), found[0]), source) from error
 
 
 def _strict(kind: type) -> type[BaseModel]:
@@ -86,14 +83,17 @@ def _strict(kind: type) -> type[BaseModel]:
 def _explained(kind: Any, error: ErrorDetails, source: str) -> ConfigError:
     _, *path = error["loc"]
     key = ".".join(str(part) for part in path)
-    if error["type"] in _UNKNOWN:
-        known = _known_keys(kind, path[:-1])
+    if error["type"] in UNKNOWN:
+        known = known_keys(kind, path[:-1])
         close = difflib.get_close_matches(str(path[-1]), known, n=1)
+        ways = [f"Did you mean {close[0]}?"] if close else []
+        if "settings" in known:
+            ways.append(f"Settings go into [{'.'.join(map(str, [*path[:-1], 'settings']))}].")
         return ConfigError(
             f"{source}: the key {key} is unknown",
             got=error["input"],
             expected=f"one of {', '.join(known)}",
-            remedy=f"{f'Did you mean {close[0]}? ' if close else ''}Correct it or remove it.",
+            remedy=" ".join([*ways, "Correct it or remove it."]),
         )
     if error["type"] == "missing":
         return ConfigError(f"{source}: the key {key} is missing", remedy="Add it.")
@@ -102,12 +102,4 @@ def _explained(kind: Any, error: ErrorDetails, source: str) -> ConfigError:
     own = error.get("ctx", {}).get("error")
     if isinstance(own, IsiwError):
         return ConfigError(f"{what}: {own.what}", got=own.got, expected=own.expected, remedy=own.remedy or remedy)
-    return ConfigError(what, got=error["input"], expected=error["msg"].removeprefix("Input should be "), remedy=remedy)
-
-
-def _known_keys(kind: Any, section: Sequence[int | str]) -> list[str]:
-    for name in section:
-        kind = get_args(kind)[0] if isinstance(name, int) else get_type_hints(kind)[name]
-        if isinstance(kind, UnionType):  # a section that may be left out
-            kind = next(each for each in get_args(kind) if each is not NoneType)
-    return sorted(f.name for f in fields(kind)) if is_dataclass(kind) else sorted(kind.model_fields)
+    return ConfigError(what, got=error["input"], expected=expected_instead(error), remedy=remedy)

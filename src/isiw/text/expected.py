@@ -1,0 +1,54 @@
+"""What pydantic finds wrong with a value, in the words of who wrote it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
+from types import NoneType, UnionType
+from typing import Any, Final, get_args, get_type_hints
+
+from pydantic_core import ErrorDetails
+
+__all__ = ["UNKNOWN", "expected_instead", "known_keys"]
+
+UNKNOWN: Final = {"extra_forbidden", "unexpected_keyword_argument"}
+"""Pydantic's types of error for a key that there is not."""
+
+_KINDS: Final = {
+    "bool": "true or false",
+    "dataclass": "a table of keys and values",
+    "dict": "a table of keys and values",
+    "float": "a number",
+    "int": "a whole number",
+    "list": "a list",
+    "mapping": "a table of keys and values",
+    "model": "a table of keys and values",
+    "string": "text",
+    "tuple": "a list",
+}
+
+
+def expected_instead(error: ErrorDetails) -> str:
+    """What should have been there, for after "expected".
+
+    Args:
+        error: as pydantic found it.
+    """
+    kind, _, fault = error["type"].partition("_")
+    if kind in _KINDS and fault in {"type", "parsing", "from_float", "attributes_type"}:
+        return _KINDS[kind]
+    return error["msg"].removeprefix("Input should be ")
+
+
+def known_keys(kind: Any, section: Sequence[int | str]) -> list[str]:
+    """The keys that there are in a section.
+
+    Args:
+        kind: the pydantic model or dataclass of the whole.
+        section: the way to the section, by keys and by places in lists.
+    """
+    for name in section:
+        kind = get_args(kind)[0] if isinstance(name, int) else get_type_hints(kind)[name]
+        if isinstance(kind, UnionType):  # a section that may be left out
+            kind = next(each for each in get_args(kind) if each is not NoneType)
+    return sorted(f.name for f in fields(kind)) if is_dataclass(kind) else sorted(kind.model_fields)
