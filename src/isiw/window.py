@@ -12,23 +12,19 @@ import numpy as np
 
 from isiw.checks import check_probabilities, number
 from isiw.errors import InvalidValueError
+from isiw.text.found import finding, lacking
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
     "EDGE_LEVEL",
-    "ENOUGH_PAIRS",
     "MIN_EXCESS_MV",
     "MIN_EXCESS_OF_BASELINE",
-    "NO_MEP",
-    "TOO_FEW",
     "BestISI",
     "Enhancement",
     "Interval",
     "ProfileBand",
     "Window",
     "WindowEstimate",
-    "finding",
-    "lacking",
     "least_excess_mv",
     "window_from_excess",
 ]
@@ -39,17 +35,7 @@ EDGE_LEVEL = 0.135
 MIN_EXCESS_MV = 0.002
 MIN_EXCESS_OF_BASELINE = 0.10
 
-ENOUGH_PAIRS = 3
-"""With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
-
-TOO_FEW = "Too few trials counted to speak of a window: most of what is believed was believed beforehand."
-"""What is said instead."""
-
-NO_MEP = "No MEP was seen in any trial that counts, so nothing is known about a window."
-"""What is said where every amplitude was below the detection limit."""
-
 Interval: TypeAlias = tuple[float, float]
-_Edge: TypeAlias = tuple[float | None, float | None, float | None]
 
 
 @dataclass(frozen=True)
@@ -351,52 +337,6 @@ class WindowEstimate:
         isi = np.atleast_1d(np.asarray(isi_ms, dtype=float))
         low, median, high = (np.interp(isi, self.grid_ms, row) for row in self.profile_quantiles_mv)
         return ProfileBand(median, low, high)
-
-
-def lacking(pairs: int | None, *, silent: bool) -> str | None:
-    """What is said where too little was measured to speak of a window; None where enough was.
-
-    Args:
-        pairs: how many pairs of stimuli count; None where that is not known.
-        silent: whether no trial that counts showed an MEP.
-    """
-    if silent:
-        return NO_MEP
-    return None if pairs is None or pairs >= ENOUGH_PAIRS else TOO_FEW
-
-
-def finding(
-    probability: float | None,
-    window: Window | None,
-    start: _Edge,
-    end: _Edge,
-    depressed: tuple[Window | None, float | None] = (None, None),
-) -> str:
-    """A window in a line, and each of its edges in another, where they are known; and where the MEP is depressed.
-
-    Args:
-        probability: that there is a window.
-        window: the reported decision.
-        start: median, and lower and upper end of the 90 % interval, of its start [ms]; None where not known.
-        end: those of its end [ms].
-        depressed: the reported ISIs that depress the MEP, and the probability of any; None where nobody looked.
-    """
-    chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
-    lines = [f"Window: {'none' if window is None else window}{chance}"]
-    for name, edge in (("Start", start), ("End", end)):
-        median, low, high = ("" if edge_ms is None else _edge(edge_ms) for edge_ms in edge)
-        if window is not None and low:
-            lines.append(f"{name}: {median}, 90 % interval {low} to {high}")
-    segment, anywhere = depressed
-    if anywhere is not None:
-        lines.append(f"Depressed: {'nowhere' if segment is None else segment} (probability of it: {anywhere:.2f})")
-    return "\n".join(lines)
-
-
-def _edge(edge_ms: float) -> str:
-    if math.isinf(edge_ms):
-        return "before the range" if edge_ms < 0 else "beyond the range"
-    return f"{edge_ms:.0f} ms"
 
 
 def _central(edges_ms: FloatArray, level: float) -> FloatArray:

@@ -12,8 +12,8 @@ import pytest
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, drawn
+from isiw.text.found import TOO_FEW
 from isiw.trials import Channel
-from isiw.window import TOO_FEW
 from report.sessions import tapped
 
 

@@ -11,8 +11,9 @@ import isiw
 from isiw.errors import LogError
 from isiw.report.evidence import contradiction, no_comparison, nothing_stood_out
 from isiw.strategy.stopping import StopDecision
+from isiw.text.found import NO_MEP
 from isiw.trials import Status, Trial
-from isiw.window import NO_MEP, Window
+from isiw.window import Window
 from scripted import scripted_strategy
 
 

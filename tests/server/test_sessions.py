@@ -14,8 +14,8 @@ from isiw.errors import InvalidValueError, LogError
 from isiw.log.reader import read_session
 from isiw.session.journal import Journal
 from isiw.strategy.catalogue import make_strategy
+from isiw.text.found import TOO_FEW
 from isiw.trials import MistrialReason
-from isiw.window import TOO_FEW
 from server.serving import PLAN, SETTINGS, SPACE, client_of, created, done, mep_mv, refused, told
 
 

@@ -25,7 +25,8 @@ from isiw.strategy.stopping import (
     stimuli_left,
 )
 from isiw.strategy.strategy import Strategy
-from isiw.window import NO_MEP, WindowEstimate
+from isiw.text.found import NO_MEP
+from isiw.window import WindowEstimate
 
 
 def progress(delivered: int = 3, probability: float | None = 0.95, edges_ms: object = None) -> Progress:

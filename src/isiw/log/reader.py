@@ -34,9 +34,9 @@ from isiw.log.verdicts import VERDICTS, under_all
 from isiw.log.writer import CONFIGURATION
 from isiw.signals.plausibility import is_silent
 from isiw.strategy.stopping import StopDecision
+from isiw.text.found import lacking
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial, TrialTable
-from isiw.window import lacking
 
 __all__ = ["Records", "SessionRecord", "of_production", "read_any", "read_salvaged", "read_session", "require_records"]
 

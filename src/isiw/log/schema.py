@@ -31,10 +31,11 @@ from isiw.log.production import Production, ProductionHeader
 from isiw.signals.judgement import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import IntensityRange, ThresholdEstimate
+from isiw.text.found import finding
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
 from isiw.visit import Visit, VisitProtocol
-from isiw.window import Window, WindowEstimate, finding
+from isiw.window import Window, WindowEstimate
 
 __all__ = [
     "MOST_TRIALS",

@@ -12,9 +12,9 @@ from isiw.log.schema import Estimate
 from isiw.report.tables import trial_row
 from isiw.report.words import finding_sentence
 from isiw.text import plain
+from isiw.text.found import lacking
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
-from isiw.window import lacking
 
 __all__ = ["drawn"]
 

@@ -9,8 +9,9 @@ from collections.abc import Sequence
 from scipy.stats import mannwhitneyu
 
 from isiw.log.reader import SessionRecord
+from isiw.text.found import NO_MEP
 from isiw.trials import Trial
-from isiw.window import NO_MEP, Window
+from isiw.window import Window
 
 __all__ = ["contradiction", "no_comparison", "nothing_measured", "nothing_stood_out"]
 

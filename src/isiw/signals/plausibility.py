@@ -14,7 +14,7 @@ from enum import StrEnum
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.window import ENOUGH_PAIRS
+from isiw.text.found import ENOUGH_PAIRS
 
 __all__ = [
     "Doubt",

@@ -10,7 +10,8 @@ from typing import Protocol, runtime_checkable
 
 from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.errors import InvalidValueError
-from isiw.window import NO_MEP, WindowEstimate
+from isiw.text.found import NO_MEP
+from isiw.window import WindowEstimate
 
 __all__ = [
     "AnyOf",

@@ -21,8 +21,9 @@ from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTr
 from isiw.signals.plausibility import DoubtKind, doubt_of, is_silent, require_plausible
 from isiw.strategy.choosing import Choice, Cost, Method, evenly_spaced
 from isiw.strategy.stopping import StopDecision, StoppingRule
+from isiw.text.found import NO_MEP
 from isiw.types import FloatArray
-from isiw.window import NO_MEP, WindowEstimate
+from isiw.window import WindowEstimate
 
 __all__ = ["Recipe", "Strategy"]
 

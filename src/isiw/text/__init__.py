@@ -1,4 +1,4 @@
-"""Text from outside: what a terminal or a page would obey is taken out, and TOML files are checked key by key."""
+"""Text: from outside, without what a terminal or a page would obey; TOML files, checked key by key; what was found."""
 
 from isiw.text.harmless import one_line, plain
 
