@@ -267,7 +267,11 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
         realised.append(np.nan if sweep.t_tms_ms is None else sweep.t_tms_ms - events.hit_ms[0])
         parts.append(_later(events, VALVE_MS - (sweep.t_valve_ms or 0.0)))
     if not parts:
-        raise InvalidValueError("a study needs sweeps with an acceleration and the valve's time", got=f"none in {name}")
+        raise InvalidValueError(
+            "a study needs sweeps with an acceleration and the valve's time",
+            got=f"none in {name}",
+            remedy="Run a session on a device that hands over its sweeps, with the channel acceleration.",
+        )
     commanded = np.array([np.nan if isi is None else isi for isi in commanded_isi_ms])
     return TimingStudy(name, _joined(parts), commanded, np.array(realised))
 

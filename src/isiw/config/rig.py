@@ -15,6 +15,7 @@ from typing import Any
 
 from isiw.devices.protocol import Device
 from isiw.errors import ConfigError
+from isiw.log.outputs import made_folder
 
 __all__ = ["TEMPLATE_FILES", "device_from_factory", "write_rig_template"]
 
@@ -89,13 +90,14 @@ def write_rig_template(folder: str | Path) -> tuple[Path, ...]:
 
     Raises:
         ConfigError: one of the files exists already; nothing is written.
+        InvalidValueError: the folder cannot be made.
     """
     target = Path(folder)
     files = tuple(target / name for name in TEMPLATE_FILES)
     there = [str(file) for file in files if file.exists()]
     if there:
         raise ConfigError("the files are there already", got=", ".join(there), remedy="Choose another folder.")
-    target.mkdir(parents=True, exist_ok=True)
+    made_folder(target)
     templates = resources.files("isiw.config") / "rig_template"
     for file in files:
         file.write_text((templates / f"{file.name}.txt").read_text(encoding="utf-8"), encoding="utf-8")

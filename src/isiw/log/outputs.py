@@ -8,7 +8,7 @@ from typing import Final
 from isiw.errors import InvalidValueError
 from isiw.log.durable import put
 
-__all__ = ["check_output", "is_log", "write_output"]
+__all__ = ["check_output", "is_log", "made_folder", "write_output"]
 
 _LOG: Final = b"\x89MCAP"
 """What every log begins with."""
@@ -23,11 +23,11 @@ def write_output(path: str | Path, content: bytes, *, overwrite: bool = False) -
         overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: there is a file that is not to be replaced, or a folder.
+        InvalidValueError: there is a file that is not to be replaced, or a folder, or no folder can be made for it.
     """
     target = Path(path)
     check_output(target, overwrite=overwrite)
-    target.parent.mkdir(parents=True, exist_ok=True)
+    made_folder(target.parent)
     try:
         put(target, content, replacing=overwrite)
     except FileExistsError as error:
@@ -52,6 +52,26 @@ def check_output(path: str | Path, *, overwrite: bool = False) -> None:
         raise InvalidValueError("a log is never overwritten", got=str(target), remedy="Choose another path.")
     if not overwrite and target.exists():
         raise _taken(target)
+
+
+def made_folder(path: str | Path) -> Path:
+    """A folder, made where it is missing.
+
+    Args:
+        path: of the folder.
+
+    Raises:
+        InvalidValueError: there is a file of this name, or it cannot be made.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        why = "it is a file" if folder.is_file() else error.strerror
+        raise InvalidValueError(
+            f"the folder cannot be made: {why}", got=str(folder), remedy="Choose another folder."
+        ) from error
+    return folder
 
 
 def _taken(target: Path) -> InvalidValueError:

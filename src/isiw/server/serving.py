@@ -93,6 +93,7 @@ def serve(settings: ServerSettings, ready: Callable[[str], None]) -> None:
 
     Raises:
         ConfigError: the port is taken, or the address is not this computer's.
+        InvalidValueError: the folder cannot be made.
     """
     app = make_app(settings.folder, settings.rules())
     with listening(settings.address, settings.port) as listener:
@@ -139,6 +140,7 @@ def listening(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int)
 
     Raises:
         ConfigError: the port is taken, or the address is not this computer's.
+        InvalidValueError: the folder cannot be made.
     """
     family = socket.AF_INET6 if address.version == 6 else socket.AF_INET
     try:

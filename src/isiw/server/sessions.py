@@ -13,6 +13,7 @@ from typing import Final
 from isiw.devices.limits import Limits
 from isiw.errors import IsiwError
 from isiw.log.durable import log_of, part_of
+from isiw.log.outputs import made_folder
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import SERVED_KEY
 from isiw.server.answers import DecisionAnswer, EstimateAnswer, SessionAnswer, SessionEntry, TrialRow
@@ -33,11 +34,13 @@ class Sessions:
 
     Args:
         folder: where their logs are; made where it is missing.
+
+    Raises:
+        InvalidValueError: it cannot be made.
     """
 
     def __init__(self, folder: Path) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
-        self._folder = folder.resolve()
+        self._folder = made_folder(folder).resolve()
         self._open: dict[str, DrivenSession] = {}
         self._opening: set[str] = set()
         self._lock = threading.Lock()
