@@ -61,6 +61,14 @@ def test_f1_counts_grid_points_of_an_estimate_or_of_its_window() -> None:
     assert f1(WindowEstimate(0.1, None), truth, SPACE) == 0.0
 
 
+def test_a_window_between_two_isis_of_the_space_is_one_still() -> None:
+    coarse = DesignSpace(0, 100, step_ms=10)
+    early, late = Window(32, 38), Window(82, 88)
+    assert f1(early, early, coarse) == 1
+    assert f1(early, late, coarse) == f1(early, None, coarse) == f1(None, late, coarse) == 0
+    assert f1(Window(300, 380), None, coarse) == 1  # outside the space there is nothing to be found
+
+
 def test_edge_errors_are_estimated_minus_true() -> None:
     assert edge_error_ms(Window(10, 20), Window(12, 15)) == (-2.0, 5.0)
     assert edge_error_ms(WindowEstimate(0.9, Window(10, 20)), Window(12, 15)) == (-2.0, 5.0)

@@ -154,10 +154,11 @@ def test_an_isi_of_which_every_trial_is_lost_leaves_the_pooled_sd_as_it_is(lost:
     assert TimingStudy("hand-made", events, commanded, realised).pooled_sd_ms == pytest.approx(1.0)
 
 
-def test_recorded_sweeps_are_studied_like_a_preset() -> None:
-    class NoResponse:
-        mep_mv = 0.0
+class NoResponse:
+    mep_mv = 0.0
 
+
+def test_recorded_sweeps_are_studied_like_a_preset() -> None:
     device = SimulatedDevice(Tapper(lambda _: NoResponse(), "subject4", TapperSettings(trigger="impact")))
     device.stage()
     sweeps = [instance(Sweep, device.deliver(Stimulus(trial, 50.0), 1.0)) for trial in range(30)]
@@ -165,6 +166,14 @@ def test_recorded_sweeps_are_studied_like_a_preset() -> None:
     assert study.event_table.loc["hit", "mean_ms"] == pytest.approx(682, abs=1.0)
     assert study.pooled_sd_ms < 0.1
     assert study.mistrials == 0
+
+
+def test_each_sweep_of_a_study_has_its_isi() -> None:
+    device = SimulatedDevice(Tapper(lambda _: NoResponse(), "subject4", TapperSettings(trigger="impact")))
+    device.stage()
+    sweeps = [instance(Sweep, device.deliver(Stimulus(trial, 50.0), 1.0)) for trial in range(3)]
+    with pytest.raises(InvalidValueError, match="each sweep has one commanded ISI; got 2; expected 3"):
+        study_sweeps("three taps", sweeps, [50.0, 50.0])
 
 
 def on_the_pulses_clock(sweep: Sweep) -> Sweep:
@@ -175,9 +184,6 @@ def on_the_pulses_clock(sweep: Sweep) -> Sweep:
 
 
 def test_a_sweep_clock_that_begins_elsewhere_changes_nothing() -> None:
-    class NoResponse:
-        mep_mv = 0.0
-
     isi_ms = [20.0, 150.0] * 5
     robot = Tapper(lambda _: NoResponse(), "subject4", TapperSettings(trigger="impact"))
     sweeps = [robot.answer(Stimulus(trial, isi)) for trial, isi in enumerate(isi_ms)]
@@ -190,9 +196,6 @@ def test_a_sweep_clock_that_begins_elsewhere_changes_nothing() -> None:
 
 
 def test_a_logged_session_is_studied_like_a_preset(tmp_path: Path) -> None:
-    class NoResponse:
-        mep_mv = 0.0
-
     space = DesignSpace(0, 200, reference="impact")
     device = SimulatedDevice(Tapper(lambda _: NoResponse(), "subject4"))
     strategy = scripted_strategy(max_trials=12, space=space)
@@ -209,9 +212,6 @@ def test_a_logged_session_is_studied_like_a_preset(tmp_path: Path) -> None:
 @pytest.mark.parametrize("fault", [0.0, np.nan])
 @pytest.mark.parametrize("name", ["acceleration", "emg"])
 def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path: Path, name: str, fault: float) -> None:
-    class NoResponse:
-        mep_mv = 0.0
-
     class Faulty(Tapper):
         def answer(self, stimulus: Stimulus) -> Sweep:
             sweep = super().answer(stimulus)

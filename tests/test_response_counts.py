@@ -88,3 +88,29 @@ def test_the_window_depends_on_the_threshold() -> None:
 def test_what_cannot_be_counted_is_an_error(isi: list[float], mep: list[float], threshold: float) -> None:
     with pytest.raises(InvalidValueError):
         response_counts(isi, mep, threshold)
+
+
+@pytest.mark.parametrize(
+    ("meps_mv", "threshold_mv", "said"),
+    [
+        ([40.0, 60.0], 0.03, "Is it in µV"),
+        ([4e-5, 6e-5], 0.03, "Is it in V"),
+        ([-0.1, 0.1], 0.03, "an amplitude is negative"),
+        ([0.04, 0.06], 30.5, "threshold_mv must be"),
+    ],
+)
+def test_amplitudes_in_another_unit_are_not_counted(meps_mv: list[float], threshold_mv: float, said: str) -> None:
+    with pytest.raises(InvalidValueError, match=said):
+        response_counts([10.0, 20.0], meps_mv, threshold_mv)
+
+
+@pytest.mark.parametrize("share", [40.0, -1.0, float("nan")])
+def test_a_share_is_no_percentage(share: float) -> None:
+    with pytest.raises(InvalidValueError, match="the share of responses"):
+        effective_window(response_counts([10.0, 20.0], [0.04, 0.06], 0.03), share)
+
+
+@pytest.mark.parametrize("trials", [0, -1, 2.5])
+def test_trials_of_a_study_are_counted_in_whole_numbers(trials: Any) -> None:
+    with pytest.raises(InvalidValueError, match="trials"):
+        study_counts(STIMULATION["mechanical"], [60.0], trials=trials)

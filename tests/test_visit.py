@@ -68,6 +68,7 @@ def test_a_rest_comes_after_each_block_and_never_first() -> None:
         {"iti_s": (5.0,)},
         {"iti_s": 5.0},
         {"iti_s": (-1.0, 5.0)},
+        {"iti_s": (5000.0, 8000.0)},
         {"tms_alone": 1.0},
         {"tms_alone": 0.5, "tap_alone": 0.5},
         {"tap_alone": -0.1},

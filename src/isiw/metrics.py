@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.types import ArrayLike, FloatArray
+from isiw.types import ArrayLike, BoolArray, FloatArray
 from isiw.window import Interval, Window, WindowEstimate
 
 __all__ = ["covers", "edge_error_ms", "edge_ranks", "f1", "f1_of_masks", "trials_to_criterion", "true_edges_ms"]
@@ -34,11 +34,22 @@ def f1(estimate: WindowEstimate | Window | None, truth: Window | None, space: De
     Args:
         estimate: the estimate, or the reported window; None is "there is no window".
         truth: the true window; None where there is none.
-        space: the design space whose grid counts.
+        space: the design space whose grid counts. A window between two of its ISIs counts as the nearer one; what lies
+            outside the space does not count.
     """
     window = estimate.window if isinstance(estimate, WindowEstimate) else estimate
-    masks = [np.zeros(len(space.grid_ms), dtype=bool) if w is None else w.mask(space.grid_ms) for w in (window, truth)]
-    return float(f1_of_masks(*masks))
+    return float(f1_of_masks(_on_grid(window, space), _on_grid(truth, space)))
+
+
+def _on_grid(window: Window | None, space: DesignSpace) -> BoolArray:
+    """Which ISIs of the space are a window's; at least one where it lies in the space."""
+    grid_ms = space.grid_ms
+    if window is None:
+        return np.zeros(len(grid_ms), dtype=bool)
+    mask = window.mask(grid_ms)
+    if not mask.any() and space.low_ms <= window.start_ms <= window.end_ms <= space.high_ms:
+        mask[np.abs(grid_ms - 0.5 * (window.start_ms + window.end_ms)).argmin()] = True
+    return mask
 
 
 def true_edges_ms(truth: Window, space: DesignSpace) -> Interval:

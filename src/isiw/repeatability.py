@@ -259,7 +259,7 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
         commanded_isi_ms: from the impact [ms], one for each sweep.
 
     Raises:
-        InvalidValueError: no sweeps, or one without acceleration or valve time.
+        InvalidValueError: no sweeps, one without acceleration or valve time, or not one ISI a sweep.
     """
     parts, realised = [], []
     for sweep in sweeps:
@@ -273,6 +273,8 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
             remedy="Run a session on a device that hands over its sweeps, with the channel acceleration.",
         )
     commanded = np.array([np.nan if isi is None else isi for isi in commanded_isi_ms])
+    if len(commanded) != len(parts):
+        raise InvalidValueError("each sweep has one commanded ISI", got=len(commanded), expected=str(len(parts)))
     return TimingStudy(name, _joined(parts), commanded, np.array(realised))
 
 

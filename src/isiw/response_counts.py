@@ -18,10 +18,11 @@ import pandas as pd
 
 from isiw.checks import choice, number, whole
 from isiw.errors import InvalidValueError
+from isiw.signals.plausibility import LARGEST_MV, implausible_amplitude
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
-from isiw.types import ArrayLike
+from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
 
 __all__ = [
@@ -91,18 +92,30 @@ def response_counts(isi_ms: ArrayLike, mep_mv: ArrayLike, threshold_mv: float) -
         A row an ISI, ascending; columns trials, responses, share.
 
     Raises:
-        InvalidValueError: shapes that differ, values that are not finite, or a threshold that is not positive.
+        InvalidValueError: shapes that differ, values that are not finite, amplitudes that are no MEPs in mV, or a
+            threshold that is not positive or larger than any MEP.
     """
     isi, mep = np.asarray(isi_ms, dtype=np.float64), np.asarray(mep_mv, dtype=np.float64)
     if isi.shape != mep.shape or isi.ndim != 1:
         raise InvalidValueError("each trial has one ISI and one MEP", got=(isi.shape, mep.shape))
     if not (np.isfinite(isi).all() and np.isfinite(mep).all()):
         raise InvalidValueError("ISIs and MEPs must be finite", remedy="Leave mistrials out.")
-    threshold_mv = number("threshold_mv", threshold_mv, above=0)
+    _require_amplitudes(mep)
+    threshold_mv = number("threshold_mv", threshold_mv, above=0, most=LARGEST_MV)
     trials = pd.DataFrame({"isi_ms": isi, "response": mep > threshold_mv})
     table = trials.groupby("isi_ms").agg(trials=("response", "count"), responses=("response", "sum"))
     table["share"] = table["responses"] / table["trials"]
     return table
+
+
+def _require_amplitudes(mep_mv: FloatArray) -> None:
+    """Raise where these are no peak-to-peak amplitudes in mV."""
+    if mep_mv.min(initial=0.0) < 0:
+        raise InvalidValueError("an amplitude is negative", got=float(mep_mv.min()), expected="peak-to-peak amplitudes")
+    wrong = implausible_amplitude(float(mep_mv.max(initial=0.0)))
+    if wrong is not None:
+        what, _, remedy = wrong.partition(". ")
+        raise InvalidValueError(f"the largest amplitude cannot be a MEP's: {what}", remedy=remedy)
 
 
 def response_threshold_mv(alone_mv: ArrayLike, false_share: float = 0.05) -> float:
@@ -138,9 +151,10 @@ def effective_window(
         segments: "all" such ISIs, or the run of them about the "peak" of the shares, the first of equal ones.
 
     Raises:
-        InvalidValueError: other segments.
+        InvalidValueError: other segments, or a share outside 0–1.
     """
     choice("segments", segments, get_args(Segments))
+    share = number("the share of responses", share, least=0, below=1)
     isi_ms, shares = counts.index.to_numpy(), counts["share"].to_numpy()
     window = Window.from_mask(isi_ms, shares > share)
     if window is None or segments == "all":
@@ -173,7 +187,7 @@ def study_counts(
         InvalidValueError: no trials of TMS alone where the threshold comes from them, or an invalid number.
     """
     person = subject.begin(seed)
-    alone = whole("alone", alone, least=0)
+    alone, trials = whole("alone", alone, least=0), whole("trials", trials, least=1)
     alone_mv = np.array([person.respond(None, "impact").mep_mv for _ in range(alone)])
     threshold_mv = response_threshold_mv(alone_mv) if threshold_mv is None else threshold_mv
     isi = np.repeat(np.asarray(isi_ms, dtype=np.float64), trials)

@@ -120,7 +120,7 @@ class Sweep:
         isi_sd_ms: SD of the realised ISI where the impact is not measured [ms].
 
     Raises:
-        InvalidValueError: a time that is not finite, or a negative SD.
+        InvalidValueError: channels that are none, a time that is not finite, or a negative SD.
     """
 
     channels: Mapping[str, Channel]
@@ -132,6 +132,13 @@ class Sweep:
     def __post_init__(self) -> None:
         check_numbers(self, "t_valve_ms", "t_tms_ms", "t_hit_ms", optional=True)
         check_numbers(self, "isi_sd_ms", least=0)
+        for name, channel in self.channels.items():
+            if not isinstance(channel, Channel):
+                raise InvalidValueError(
+                    f"the sweep's channel {name} says neither its rate nor its unit",
+                    got=type(channel).__name__,
+                    remedy='Make it one: Channel(values, rate_hz, "mV").',
+                )
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,9 @@ _ITI_DRAWS, _CONTROL_DRAWS = 1, 2
 
 _FINEST_SHARE = 1000
 
+MOST_ITI_S = 1000.0
+"""Nobody waits a quarter of an hour between two trials: such an interval is in ms."""
+
 
 class Control(StrEnum):
     """A control trial: one of the two stimuli without the other."""
@@ -71,8 +74,8 @@ class VisitProtocol:
         rest_s: how long a rest lasts [s].
 
     Raises:
-        InvalidValueError: an interval whose ends do not ascend, a share outside 0–1, shares that leave no pairs, or a
-            number that is not positive.
+        InvalidValueError: an interval whose ends do not ascend or that is in ms, a share outside 0–1, shares that
+            leave no pairs, or a number that is not positive.
     """
 
     iti_s: tuple[float, float] | None = None
@@ -149,7 +152,7 @@ def _exact(share: float) -> Fraction:
 def _interval(iti_s: object) -> tuple[float, float]:
     if not isinstance(iti_s, tuple | list) or len(iti_s) != 2:
         raise InvalidValueError("VisitProtocol.iti_s must be the shortest and the longest interval [s]", got=iti_s)
-    low_s, high_s = (number("VisitProtocol.iti_s", value, least=0) for value in iti_s)
+    low_s, high_s = (number("VisitProtocol.iti_s", value, least=0, most=MOST_ITI_S) for value in iti_s)
     if low_s > high_s:
         raise InvalidValueError("VisitProtocol.iti_s must ascend", got=(low_s, high_s))
     return low_s, high_s

@@ -48,6 +48,16 @@ def test_sweeps_are_stacked_by_isi_with_the_hits_before_the_pulse(record: Sessio
     assert {"MEP window", "TMS pulse", "EMG, ISI inside the window", "EMG, other trials"} <= legend(figure)
 
 
+def test_the_offset_of_an_amplifier_moves_no_trace(record: SessionRecord) -> None:
+    def traces(offset_mv: float) -> list[Any]:
+        waves = {key: replace(channel, values=channel.values + offset_mv) for key, channel in record.waveforms.items()}
+        (axes,) = known(sweeps_figure(replace(record, waveforms=waves))).axes
+        return [segment for item in axes.collections for segment in instance(LineCollection, item).get_segments()]
+
+    for moved, there in zip(traces(5.0), traces(0.0), strict=True):
+        np.testing.assert_allclose(moved, there, atol=1e-6)
+
+
 def test_without_emg_there_are_no_sweeps_to_draw(record: SessionRecord) -> None:
     assert sweeps_figure(replace(record, waveforms={})) is None
     unknown = {key: replace(channel, unit="counts") for key, channel in record.waveforms.items()}

@@ -80,11 +80,12 @@ def test_edges_beyond_the_range_are_drawn_at_its_border(record: SessionRecord) -
 
 
 def test_a_session_without_a_window_is_drawn(record: SessionRecord) -> None:
-    entries = [e.model_copy(update={"segments_ms": ()}) if isinstance(e, Estimate) else e for e in record.history]
-    none = type(record)(record.path, record.header, tuple(entries), {}, (), True)
-    profile = session_figure(none).axes[0]
-    assert profile.get_title(loc="left").startswith("No window")
-    assert "window" not in labels(session_figure(none))
+    for probability, said in ((0.03, "No window"), (0.25, "Undecided")):
+        update = {"segments_ms": (), "probability": probability}
+        entries = [e.model_copy(update=update) if isinstance(e, Estimate) else e for e in record.history]
+        none = type(record)(record.path, record.header, tuple(entries), {}, (), True)
+        assert session_figure(none).axes[0].get_title(loc="left").startswith(said)
+        assert "window" not in labels(session_figure(none))
 
 
 def test_the_band_of_the_prediction_is_the_logs_and_wider_than_that_of_the_expectation(tmp_path: Path) -> None:

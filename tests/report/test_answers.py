@@ -58,6 +58,11 @@ def test_a_tense_muscle_is_not_at_rest_where_nobody_rejected_the_trial(record: S
     assert answer(with_history(record, trials), "at rest").answer == "not in 1 of 2 trials"
 
 
+def test_a_tense_muscle_is_not_at_rest_where_the_trial_was_lost_for_another_reason(record: SessionRecord) -> None:
+    trials = [trial(0, background_rms_uv=80.0, reason=MistrialReason.SATURATION), trial(1, background_rms_uv=1.0)]
+    assert answer(with_history(record, trials), "at rest").answer == "not in 1 of 2 trials"
+
+
 def test_a_device_that_only_repeats_what_was_wanted_is_not_taken_for_exact(record: SessionRecord) -> None:
     _, said, detail = answer(record, "timing")
     assert said == "as the device says"

@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 
 from isiw.log.reader import SessionRecord, read_session
+from isiw.log.schema import Estimate
+from isiw.plots.comparison import comparison_figure
 from isiw.plots.session import session_figure
 from isiw.priors import Difference
 from isiw.report.compared import comparison_page
@@ -27,6 +29,18 @@ def test_the_table_has_a_line_a_session_with_its_window_and_intervals(record: Se
     assert "P07" in first
     assert first.endswith("4     0.90       34–94 ms  29–39 ms  150–> ms")
     assert second.startswith("2 ")
+
+
+@pytest.mark.parametrize(("probability", "said"), [(0.03, "none"), (0.25, "undecided")])
+def test_where_no_window_is_reported_it_may_still_be_undecided(
+    record: SessionRecord, probability: float, said: str
+) -> None:
+    update = {"segments_ms": (), "probability": probability}
+    entries = tuple(e.model_copy(update=update) if isinstance(e, Estimate) else e for e in record.history)
+    open_still = type(record)(record.path, record.header, entries, {}, (), True)
+    assert comparison_table([open_still]).splitlines()[1].endswith(f"{probability}       {said}")
+    words = [text.get_text() for text in comparison_figure([open_still]).axes[0].texts]
+    assert words == [f"{'no window' if said == 'none' else said} (P(window) = {probability})"]
 
 
 def test_a_session_in_which_too_little_was_measured_says_so(record: SessionRecord) -> None:

@@ -42,14 +42,19 @@ def test_below_the_threshold_it_says_nothing_of_depression(tmp_path: Path, inten
     assert depression_sentence(session(tmp_path, intensity_pct_rmt)) == ""
 
 
-def test_what_was_found_depressed_is_said_with_its_probability(tmp_path: Path) -> None:
-    record = with_estimate(session(tmp_path, 120.0), depressed_ms=(10.0, 35.0), depressed_probability=0.87)
-    said = "The tap depresses the MEP at ISIs of 10–35 ms (probability that it does so anywhere: 0.87)."
+@pytest.mark.parametrize(("probability", "depresses"), [(0.87, "probably depresses"), (0.96, "depresses")])
+def test_what_was_found_depressed_is_said_with_its_probability(
+    tmp_path: Path, probability: float, depresses: str
+) -> None:
+    record = with_estimate(session(tmp_path, 120.0), depressed_ms=(10.0, 35.0), depressed_probability=probability)
+    said = f"The tap {depresses} the MEP at ISIs of 10–35 ms (probability that it does so anywhere: {probability})."
     assert said in final_statement(record)
     assert ALONE not in final_statement(record)
 
 
 def test_that_nothing_was_found_depressed_is_said(tmp_path: Path) -> None:
-    record = with_estimate(session(tmp_path, 120.0), depressed_probability=0.13)
-    said = "No ISIs were found at which the tap depresses the MEP (probability that it does so anywhere: 0.13)."
+    record = with_estimate(session(tmp_path, 120.0), depressed_probability=0.03)
+    said = "No ISIs were found at which the tap depresses the MEP (probability that it does so anywhere: 0.03)."
     assert said in final_statement(record)
+    open_still = with_estimate(record, depressed_probability=0.13)
+    assert "It is undecided whether the tap depresses the MEP at any ISI" in final_statement(open_still)

@@ -49,6 +49,12 @@ def test_the_emg_near_the_pulse_keeps_every_sample(record: SessionRecord) -> Non
     assert near["values"] == pytest.approx(shown.tolist(), abs=1e-3 * np.abs(shown).max())
 
 
+def test_an_offset_costs_no_digits(record: SessionRecord) -> None:
+    emg = record.waveforms[record.table[0].index, "emg"]
+    plain, moved = (sweep(record, emg=replace(emg, values=emg.values + offset))[0]["values"] for offset in (0.0, 100.0))
+    assert np.asarray(moved) - 100.0 == pytest.approx(plain, abs=1e-3 * np.abs(plain).max())
+
+
 def test_what_is_not_finite_is_left_open_and_the_rest_is_json(record: SessionRecord) -> None:
     (wave,) = sweep(record, force=Channel(np.array([1.0, math.nan, math.inf, 2.0]), 1000.0, "N"))
     assert wave["values"] == [1.0, None, None, 2.0]

@@ -33,6 +33,21 @@ def test_a_window_whose_meps_are_no_larger_is_not_borne_out() -> None:
     )
 
 
+def test_medians_that_say_the_contrary_are_left_out() -> None:
+    said = contradiction(WINDOW, trials([0.06, 0.06, 0.06, 0.01, 0.01], [0.05, 0.05, 0.07, 0.07, 0.05, 0.02]))
+    assert said == "The data do not bear this out: the MEPs inside are no larger than those outside."
+
+
+def test_without_a_probability_it_is_said_too_that_meps_are_not_clearly_larger() -> None:
+    told = trials([0.02, 0.021, 0.023, 0.02], [0.02, 0.022, 0.019, 0.02])
+    assert contradiction(WINDOW, told) is None
+    said = contradiction(WINDOW, told, without_probability=True)
+    assert said is not None
+    assert said.startswith("The data hardly bear this out: the MEPs inside are not clearly larger")
+    clear = trials([0.08, 0.05, 0.04, 0.06], [0.02, 0.022, 0.021, 0.02])
+    assert contradiction(WINDOW, clear, without_probability=True) is None
+
+
 @pytest.mark.parametrize(
     ("window", "inside_mv", "outside_mv"),
     [

@@ -79,6 +79,11 @@ def test_no_window_is_a_finding_once_it_has_95_percent(
     assert final_statement(with_estimate(record, segments_ms=(), probability=probability)).startswith(said)
 
 
+def test_a_method_without_a_probability_is_said_to_have_none(record: SessionRecord) -> None:
+    said = "By this method, which gives no probability, the tap enhances the MEP at ISIs of 33–93 ms"
+    assert final_statement(with_estimate(record, probability=None)).startswith(said)
+
+
 @pytest.mark.parametrize(
     ("excluded_mv", "pct_rmt", "said"),
     [
@@ -99,7 +104,9 @@ def test_without_a_window_the_largest_enhancement_that_is_excluded_is_said(
 def test_the_best_isi_is_said_with_its_interval_where_there_is_a_window(record: SessionRecord) -> None:
     said = "The largest MEP is expected at 64 ms, with 90 % probability between 51 and 78 ms."
     best = {"best_isi_ms": (64.2, 51.0, 77.6)}
-    assert said in final_statement(with_estimate(record, **best))
+    assert said in final_statement(with_estimate(record, probability=0.97, **best))
+    unsure = final_statement(with_estimate(record, probability=0.59, **best))
+    assert f"If there is a window, the{said.removeprefix('The')}" in unsure
     assert "The largest MEP" not in final_statement(with_estimate(record, segments_ms=(), probability=0.02, **best))
 
 

@@ -136,3 +136,23 @@ def test_a_pulse_that_is_early_within_the_tolerance_is_nobodys_fault(
     for _ in range(3):
         watch = watch.after(early(isi_ms, commanded_ms), Measurement(0.02, isi_ms))
     assert (watch.reason is not None) is paused
+
+
+def test_a_fault_of_trials_that_count_is_shown_once() -> None:
+    watch = Watch(SPACE, SignalLimits(background_uv=1000.0), max_in_a_row=3)
+    loud = [
+        Trial(trial, Status.ACCEPTED, 40.0, isi_ms=40.0, mep_mv=0.1 + 0.01 * trial, background_rms_uv=900.0)
+        for trial in range(9)
+    ]
+    answer = Measurement(0.1, 40.0, background_rms_uv=900.0)
+    for trial in loud[:3]:
+        watch = watch.after(trial, answer)
+    assert "more than any muscle's at rest" in (watch.reason or "")
+    watch = watch.seen()
+    for trial in loud[3:]:
+        watch = watch.after(trial, answer)
+        assert watch.reason is None
+    lost = Trial(0, Status.MISTRIAL, 40.0, MistrialReason.ISI_OFF, isi_ms=90.0)
+    for _ in range(3):
+        watch = watch.after(lost, Measurement(0.1, 90.0))
+    assert "3 trials in a row were rejected" in (watch.reason or "")

@@ -81,3 +81,16 @@ def test_the_reflex_of_a_tap_whose_impact_nobody_measures_is_no_fault() -> None:
     trial = judge(sweep, Stimulus(0, 200.0), DesignSpace(0, 500, reference="valve"))
     assert trial.reason is None
     assert likely_fault(sweep, trial) is None
+
+
+@pytest.mark.parametrize(("at_ms", "accused"), [(400.0, False), (300.0, True)])
+def test_the_click_of_the_valve_is_not_taken_for_the_pulse(at_ms: float, *, accused: bool) -> None:
+    times_ms = np.arange(4500) / 5.0
+    emg_mv = 0.0015 * np.random.default_rng(1).standard_normal(4500)
+    emg_mv += 0.1 * np.sin(2 * np.pi * (times_ms - 650) / 10) * ((times_ms > 650) & (times_ms < 660))
+    emg_mv[round(5 * at_ms) :][:3] += [0.1, -0.1, 0.05]
+    sweep = Sweep({"emg": Channel(emg_mv, 5000.0, "mV")}, t_valve_ms=400.0, t_hit_ms=580.0, t_tms_ms=630.0)
+    trial = judge(sweep, Stimulus(0, 50.0), DesignSpace(0, 200, reference="impact"))
+    assert trial.reason is None
+    fault = likely_fault(sweep, trial)
+    assert (fault is not None and "the steepest edge of the EMG is at 300 ms" in fault.what) == accused

@@ -211,6 +211,21 @@ def test_the_tap_of_a_trial_without_a_response_is_never_told_as_an_mep(isi_ms: f
     assert told_mv(isi_ms, 0.0, 0.1, name).max() < 0.01
 
 
+@pytest.mark.parametrize("begins_ms", [-400.0, -100.0])
+@pytest.mark.parametrize("isi_ms", [0, 3, 6, 9, 12, 15])
+def test_a_rig_that_states_the_hit_alone_gets_no_mep_from_the_tap(isi_ms: float, begins_ms: float) -> None:
+    geometry = replace(preset("subject1"), artefact_mv=0.1)
+    robot = Tapper(lambda _: Evoked(0.0), geometry, TapperSettings(reference="impact"), seed=3)
+    for trial in range(8):
+        stimulus = Stimulus(trial, float(isi_ms))
+        whole = robot.answer(stimulus)
+        hit_ms, emg, pulse_ms = judge(whole, stimulus, IMPACT).t_hit_ms, whole.channels["emg"], known(whole.t_tms_ms)
+        first = round((pulse_ms + begins_ms - emg.t0_ms) * emg.rate_hz / 1000)
+        part = replace(emg, values=emg.values[first:], t0_ms=emg.t0_ms + first * 1000 / emg.rate_hz)
+        told = judge(Sweep({"emg": part}, t_tms_ms=pulse_ms, t_hit_ms=hit_ms), stimulus, IMPACT)
+        assert told.reason is not None or known(told.mep_mv) < 0.01
+
+
 @pytest.mark.parametrize("evoked_mv", [0.0, 0.012, 0.025])
 @pytest.mark.parametrize("name", ["subject1", "subject2"])
 def test_the_tap_that_follows_the_pulse_makes_no_small_mep_large(name: str, evoked_mv: float) -> None:
@@ -283,6 +298,13 @@ def test_an_amplifier_that_blanks_the_mep_has_recorded_none() -> None:
     assert judge(with_channel(sweep_of(), "emg", emg), PAIR, IMPACT).reason is None
 
 
+def test_a_rig_that_fills_up_what_it_did_not_record_hides_no_blanking() -> None:
+    emg = sweep_of().channels["emg"].values.copy()
+    emg[3895:4050] = 0.0  # until 30 ms after the pulse
+    emg[:200] = 0.0
+    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is MistrialReason.MISSING_CHANNEL
+
+
 def test_a_coarse_converter_blanks_nothing() -> None:
     coarse = np.round(sweep_of().channels["emg"].values / 0.02) * 0.02  # ten times the noise at rest
     reason = judge(with_channel(sweep_of(), "emg", coarse), PAIR, IMPACT).reason
@@ -304,6 +326,11 @@ def test_a_tap_that_came_with_tms_alone_is_an_error() -> None:
         judge(replace(without(sweep_of(), "acceleration"), t_hit_ms=680.0), Stimulus(0, None), IMPACT)
 
 
+def test_a_tap_that_shows_in_the_acceleration_of_tms_alone_is_an_error() -> None:
+    with pytest.raises(DeviceError, match=r"a tap where TMS alone was commanded; got 'an impact at 6(79|80)\."):
+        judge(sweep_of(), Stimulus(0, None), IMPACT)
+
+
 def test_a_pulse_that_was_to_come_before_the_impact_counts() -> None:
     early = replace(sweep_of(t_tms_ms=650.0), t_hit_ms=680.0)
     space = DesignSpace(-50, 100, reference="impact")
@@ -322,6 +349,19 @@ def test_a_glitch_beyond_any_amplifier_is_a_mistrial() -> None:
 def test_a_sweep_that_begins_after_the_valve_command_is_judged(valve_ms: float) -> None:
     judged = judge(replace(sweep_of(), t_valve_ms=valve_ms, t_hit_ms=680.0), PAIR, IMPACT)
     assert judged.mep_mv == pytest.approx(0.1, abs=0.01)
+
+
+@pytest.mark.parametrize("window_ms", [(15.0, 25.0, 35.0), (35.0,), (), 35.0])
+def test_an_mep_window_has_two_edges(window_ms: Any) -> None:
+    with pytest.raises(InvalidValueError, match=r"mep_window_ms must be its first and its last ms"):
+        SignalLimits(mep_window_ms=window_ms)
+
+
+@pytest.mark.parametrize("span_ms", [(0.0, np.inf), (2000.0, 2100.0)])
+def test_whether_no_emg_is_saturated_is_no_question(span_ms: tuple[float, float]) -> None:
+    emg = np.zeros(0) if span_ms[0] == 0 else np.arange(100.0)
+    with pytest.raises(InvalidValueError, match="no EMG in the part that counts"):
+        is_saturated(emg, 5000.0, span_ms=span_ms)
 
 
 @pytest.mark.parametrize("wrong", [{"mep_window_ms": (0.015, 0.035)}, {"background_uv": 0.01}])

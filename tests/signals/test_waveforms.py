@@ -67,7 +67,7 @@ def test_the_noise_of_a_coarse_converter_is_not_zero() -> None:
     wave = np.zeros((1, 1000))
     wave[0, ::10] = 1.0
     _, noise = rest_level(wave, 1000, 5000.0)
-    assert noise.item() == pytest.approx(0.25 * np.sqrt(0.1))
+    assert noise.item() == pytest.approx(np.sqrt(0.1))
 
 
 def test_the_rest_that_is_read_is_the_last_200_ms_before_the_stimulus() -> None:

@@ -13,6 +13,7 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, save_figure, tidied
 from isiw.text import one_line
+from isiw.text.found import rules_out
 
 __all__ = ["comparison_figure", "save_comparison_plot"]
 
@@ -65,7 +66,7 @@ def comparison_figure(records: Sequence[SessionRecord], names: Sequence[str] | N
 def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
     last = record.estimates[-1] if record.estimates and record.rests_on_data else None
     if last is None or last.window is None:
-        said = "too little was measured" if last is None else f"no window ({_chance(last)})"
+        said = "too little was measured" if last is None else f"{_nothing(last)} ({_chance(last)})"
         axes.annotate(said, (0.02, line), xycoords=("axes fraction", "data"), va="center", fontsize=8, color=FAINT)
         return
     for start_ms, end_ms in last.window.segments:
@@ -78,6 +79,10 @@ def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
         _chance(last), (1.01, line), xycoords=("axes fraction", "data"), va="center", fontsize=8, color=INK,
         annotation_clip=False,
     )  # fmt: skip
+
+
+def _nothing(estimate: Estimate) -> str:
+    return "no window" if rules_out(estimate.probability) else "undecided"
 
 
 def _chance(estimate: Estimate) -> str:

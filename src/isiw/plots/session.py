@@ -29,6 +29,7 @@ from isiw.plots.style import (
     saying,
     tidied,
 )
+from isiw.text.found import rules_out
 from isiw.trials import Trial
 from isiw.types import FloatArray
 from isiw.window import Window
@@ -155,9 +156,12 @@ def _title(record: SessionRecord) -> str:
         return "No MEP was seen"
     if not record.rests_on_data:
         return f"Too little was measured ({len(record.table.told)} count)"
-    window = record.estimates[-1].window if record.estimates else None
+    if not record.estimates:
+        return "No estimate"
+    last = record.estimates[-1]
+    found = f"Window {last.window}" if last.window else "No window" if rules_out(last.probability) else "Undecided"
     since = ", before trials were judged anew," if record.is_judged_since else ""
-    return f"{'No window' if window is None else f'Window {window}'}{since}"
+    return f"{found}{since}"
 
 
 def _draw_edges(axes: Axes, record: SessionRecord, truth: Window | None) -> None:

@@ -70,7 +70,10 @@ def _trace(trial: Trial, emg: Channel | None) -> _Trace | None:
         return None
     times_ms = emg.t0_ms + 1e3 * np.arange(len(emg.values), dtype=np.float64) / emg.rate_hz - trial.t_tms_ms
     near = (times_ms >= -BEFORE_MS) & (times_ms <= AFTER_MS) & np.isfinite(emg.values)
-    return _Trace(trial, times_ms[near], emg.values[near] * EMG_UNITS_MV[emg.unit]) if near.any() else None
+    if not near.any():
+        return None
+    emg_mv = emg.values[near] * EMG_UNITS_MV[emg.unit]
+    return _Trace(trial, times_ms[near], emg_mv - np.median(emg_mv))  # an amplifier's offset is no deflection
 
 
 def _largest_mv(traces: Sequence[_Trace], span_ms: tuple[float, float]) -> float:

@@ -88,6 +88,6 @@ def _draw_errors(axes: Axes, study: TimingStudy) -> None:
     axes.set_xlabel("commanded ISI [ms]", fontsize=9)
     axes.set_ylabel("ISI error [ms]", fontsize=9)
     pooled = "not known" if np.isnan(study.pooled_sd_ms) else f"{study.pooled_sd_ms:.2f} ms"
-    found = f"pooled SD {pooled}, mistrials: {study.mistrials} of {len(errors)}"
+    found = f"pooled SD {pooled}, mistrials: {study.mistrials} of {np.isfinite(study.commanded_ms).sum()}"
     axes.set_title(found, fontsize=9, loc="left", color=INK)
     axes.legend(fontsize=7.5, frameon=False)

@@ -11,7 +11,7 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate, Event, EventKind
 from isiw.report.tables import lost_rows
 from isiw.report.words import counts_sentence
-from isiw.trials import MistrialReason
+from isiw.trials import MistrialReason, Trial
 
 __all__ = ["Answer", "answers"]
 
@@ -72,7 +72,7 @@ def _timing(record: SessionRecord) -> Answer:
     sizes = f"{statistics.median(errors_ms):.1f} ms (median), at most {max(errors_ms):.1f} ms"
     detail = f"Trials that count are off by {sizes}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
     known = sum(trial.commanded_isi_ms is None or trial.isi_ms is not None for trial in record.table)
-    off = sum(abs(t.isi_error_ms or 0.0) > tolerance_ms and t.overruled not in _OF_TIMING for t in record.table.told)
+    off = sum(abs(trial.isi_error_ms or 0.0) > tolerance_ms for trial in _not_for(record, _OF_TIMING))
     return Answer(question, _verdict(record, len(rejected) + off, known), detail)
 
 
@@ -81,7 +81,7 @@ def _rest(record: SessionRecord) -> Answer:
     levels_uv = [t.background_rms_uv for t in record.table if t.background_rms_uv is not None]
     reasons = frozenset({MistrialReason.BACKGROUND_ACTIVITY})
     rejected = _rejected_for(record, reasons)
-    tense = sum((t.background_rms_uv or 0.0) > limit_uv and t.overruled not in reasons for t in record.table.told)
+    tense = sum((trial.background_rms_uv or 0.0) > limit_uv for trial in _not_for(record, reasons))
     verdict = _verdict(record, len(rejected) + tense, len(levels_uv))
     if not levels_uv:
         return Answer(question, verdict, f"The log has no background EMG. {_listed(rejected)}")
@@ -94,6 +94,11 @@ def _rejected_for(record: SessionRecord, reasons: frozenset[MistrialReason]) -> 
     lost = [str(trial.reason) for trial in record.table if trial.reason in reasons]
     overruled = [f"{t.overruled}, accepted by the operator" for t in record.table if t.overruled in reasons]
     return lost + overruled
+
+
+def _not_for(record: SessionRecord, reasons: frozenset[MistrialReason]) -> list[Trial]:
+    """The trials that count, or were rejected for other reasons: of those too it is known whether this was right."""
+    return [trial for trial in record.table if trial.reason not in reasons and trial.overruled not in reasons]
 
 
 def _verdict(record: SessionRecord, wrong: int, known: int) -> str:

@@ -10,6 +10,7 @@ from isiw.log.schema import Estimate
 from isiw.priors.differing import Difference
 from isiw.report.words import JUDGED_SINCE
 from isiw.text import one_line
+from isiw.text.found import rules_out
 
 __all__ = ["HEADINGS", "comparison_rows", "comparison_sentence", "comparison_table"]
 
@@ -55,7 +56,7 @@ def _row(number: int, record: SessionRecord) -> tuple[str, ...]:
 def _found(last: Estimate) -> tuple[str, ...]:
     chance = "–" if last.probability is None else f"{last.probability:.2f}"
     if last.window is None:
-        return chance, "none", "", ""
+        return chance, "none" if rules_out(last.probability) else "undecided", "", ""
     edges = (_edge(last.start_low_ms, last.start_high_ms), _edge(last.end_low_ms, last.end_high_ms))
     return chance, str(last.window), *edges
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from isiw.log.reader import SessionRecord
+from isiw.text.found import SURE, rules_out
 
 __all__ = ["depression_sentence"]
 
@@ -21,9 +22,12 @@ def depression_sentence(record: SessionRecord) -> str:
     estimate, intensity_pct = record.estimates[-1], record.header.visit.intensity_pct_rmt
     if estimate.depressed_probability is not None:
         chance = f" (probability that it does so anywhere: {estimate.depressed_probability:.2f})"
-        if estimate.depressed is None:
+        if estimate.depressed is not None:
+            likely = "" if estimate.depressed_probability >= SURE else "probably "
+            return f"The tap {likely}depresses the MEP at ISIs of {estimate.depressed}{chance}."
+        if rules_out(estimate.depressed_probability):
             return f"No ISIs were found at which the tap depresses the MEP{chance}."
-        return f"The tap depresses the MEP at ISIs of {estimate.depressed}{chance}."
+        return f"It is undecided whether the tap depresses the MEP at any ISI{chance}."
     if intensity_pct is None or intensity_pct <= THRESHOLD_PCT_RMT:
         return ""
     return (

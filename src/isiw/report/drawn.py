@@ -137,12 +137,13 @@ def _thinned(values: FloatArray, most: int) -> tuple[FloatArray, float]:
 
 
 def _rounded(values: FloatArray, digits: int) -> list[float | None]:
-    """To so many digits of the largest; what is not finite is left open."""
+    """To so many digits of their range, whatever their offset; what is not finite is left open."""
     finite = np.isfinite(values)
-    largest = float(np.abs(values[finite]).max(initial=0.0))
-    decimals = max(-_MOST_DECIMALS, min(_MOST_DECIMALS, digits - math.ceil(math.log10(largest)))) if largest > 0 else 0
+    known = values[finite] if finite.any() else np.zeros(1)
+    extent = float(np.ptp(known) or np.abs(known).max())
+    decimals = max(-_MOST_DECIMALS, min(_MOST_DECIMALS, digits - math.ceil(math.log10(extent)))) if extent > 0 else 0
     rounded: list[float | None] = np.round(np.where(finite, values, 0.0), decimals).tolist()
-    return [value if known else None for value, known in zip(rounded, finite.tolist(), strict=True)]
+    return [value if is_finite else None for value, is_finite in zip(rounded, finite.tolist(), strict=True)]
 
 
 def _number(value: float | None) -> float | None:

@@ -19,6 +19,9 @@ ENOUGH_ON_EACH_SIDE = 4
 NO_LARGER = 0.5
 """From this p-value of a one-sided rank test on, MEPs are not larger at all."""
 
+NOT_CLEARLY = 0.05
+"""From this one on they are not clearly larger, which is said where the method itself says nothing of its certainty."""
+
 OF_REST = 8.0
 """Peak-to-peak amplitude of EMG at rest over its RMS, at most: some 6 within the window of an MEP."""
 
@@ -57,22 +60,31 @@ def _background(lost: Sequence[Trial]) -> str:
     return f"; background EMG {text} RMS"
 
 
-def contradiction(window: Window | None, trials: Sequence[Trial]) -> str | None:
+def contradiction(window: Window | None, trials: Sequence[Trial], *, without_probability: bool = False) -> str | None:
     """That the MEPs inside a reported window are no larger than those outside; None where they are, or are too few.
 
     Args:
         window: the reported window; None where none is.
         trials: the trials that count.
+        without_probability: whether the method gives none: then it is said too where they are not clearly larger.
     """
     if window is None:
         return None
     inside, outside = _inside_and_outside(window, trials)
     if min(len(inside), len(outside)) < ENOUGH_ON_EACH_SIDE:
         return None
-    if float(mannwhitneyu(inside, outside, alternative="greater").pvalue) < NO_LARGER:
-        return None
-    medians = " and ".join(f"{1e3 * statistics.median(meps_mv):.0f}" for meps_mv in (inside, outside))
-    return f"The data do not bear this out: the MEPs inside are no larger than those outside (medians {medians} µV)."
+    p = float(mannwhitneyu(inside, outside, alternative="greater").pvalue)
+    medians_uv = tuple(1e3 * statistics.median(meps_mv) for meps_mv in (inside, outside))
+    figures = f"medians {medians_uv[0]:.0f} and {medians_uv[1]:.0f} µV"
+    if p >= NO_LARGER:
+        said = f" ({figures})" if medians_uv[0] <= medians_uv[1] else ""
+        return f"The data do not bear this out: the MEPs inside are no larger than those outside{said}."
+    if without_probability and p >= NOT_CLEARLY:
+        return (
+            "The data hardly bear this out: the MEPs inside are not clearly larger than those outside "
+            f"({figures}, p = {p:.2f})."
+        )
+    return None
 
 
 def nothing_stood_out(trials: Sequence[Trial]) -> str | None:

@@ -17,6 +17,7 @@ from isiw.report.evidence import contradiction, no_comparison, nothing_measured,
 from isiw.session.progress import asked, outcome
 from isiw.session.recorder import OWN_LOOP
 from isiw.strategy.catalogue import known_settings, list_strategies
+from isiw.text.found import SURE, rules_out
 from isiw.trials import Stimulus, Trial
 from isiw.window import MIN_EXCESS_MV, Window
 
@@ -37,9 +38,6 @@ TRIAL_HEADINGS = ("trial", "asked", "outcome", "realised")
 
 WORTH_SAYING = 0.1
 """Probability from which on an unusual window is mentioned."""
-
-SURE = 0.95
-"""Probability from which on it is said outright that there is a window, or none; below it "probably", or undecided."""
 
 UNUSUAL = 0.9
 """Probability from which on a person is told to be unlike most."""
@@ -113,7 +111,7 @@ def finding_sentences(record: SessionRecord) -> list[str]:
     said = [
         finding_sentence(estimate, space),
         _edges(estimate, space),
-        contradiction(estimate.window, record.table.told) or "",
+        contradiction(estimate.window, record.table.told, without_probability=estimate.probability is None) or "",
         no_comparison(estimate.window, record.table.told) or "",
         nothing_stood_out(record.table.told) or "",
         *(f"Doubt since trial {event.trial}: {event.text}" for event in record.events if event.kind == "doubt"),
@@ -136,18 +134,22 @@ def finding_sentence(estimate: Estimate, space: DesignSpace) -> str:
     window, probability = estimate.window, estimate.probability
     chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
     if window is None:
-        undecided = probability is not None and 1 - probability < SURE
-        return f"It is undecided whether there is a window{chance}." if undecided else f"No window was found{chance}."
-    likely = "" if probability is None or probability >= SURE else "probably "
-    return f"The tap {likely}enhances the MEP at ISIs of {window} {_AFTER[space.reference]}{chance}."
+        is_none = rules_out(probability)
+        return f"No window was found{chance}." if is_none else f"It is undecided whether there is a window{chance}."
+    who = "By this method, which gives no probability, the tap" if probability is None else "The tap"
+    likely = "" if probability is None or probability >= SURE else " probably"
+    return f"{who}{likely} enhances the MEP at ISIs of {window} {_AFTER[space.reference]}{chance}."
 
 
 def _edges(estimate: Estimate, space: DesignSpace) -> str:
     low, high = (estimate.start_low_ms, estimate.start_high_ms), (estimate.end_low_ms, estimate.end_high_ms)
     if estimate.window is None or None in low or None in high:
         return ""
-    is_sure = estimate.probability is None or estimate.probability >= SURE
-    given = "With 90 % probability each, it" if is_sure else "If there is a window, with 90 % probability each it"
+    given = (
+        "With 90 % probability each, it"
+        if _is_sure(estimate)
+        else "If there is a window, with 90 % probability each it"
+    )
     edges = f"{given} starts {_between(low, space)} and ends {_between(high, space)}."
     unusual = {
         "starts before the range": estimate.start_beyond,
@@ -162,7 +164,15 @@ def _best_isi(estimate: Estimate) -> str:
     if estimate.window is None or not estimate.best_isi_ms:
         return ""
     best, low, high = estimate.best_isi_ms
-    return f"The largest MEP is expected at {best:.0f} ms, with 90 % probability between {low:.0f} and {high:.0f} ms."
+    given = "The" if _is_sure(estimate) else "If there is a window, the"
+    return (
+        f"{given} largest MEP is expected at {best:.0f} ms, with 90 % probability between {low:.0f} and {high:.0f} ms."
+    )
+
+
+def _is_sure(estimate: Estimate) -> bool:
+    """Whether a reported window goes without saying "if there is one"."""
+    return estimate.probability is None or estimate.probability >= SURE
 
 
 def _excluded(estimate: Estimate) -> str:

@@ -26,6 +26,8 @@ class Watch:
         in_a_row: how many there have been.
         meps_mv: the amplitudes told [mV].
         settled: doubts that a person has seen.
+        shown: the remedy of the fault that the latest trial shows although it counts.
+        overlooked: the remedies of such faults that a person has seen and went on; they are said once.
         reason: why to pause now, and what to do; None where there is no reason.
     """
 
@@ -36,6 +38,8 @@ class Watch:
     in_a_row: int = 0
     meps_mv: tuple[float, ...] = ()
     settled: frozenset[DoubtKind] = frozenset()
+    shown: str | None = None
+    overlooked: frozenset[str] = frozenset()
     reason: str | None = None
 
     def resumed(self, trials: TrialTable) -> Watch:
@@ -45,7 +49,10 @@ class Watch:
 
     def seen(self) -> Watch:
         """The same after a person has seen the reason and went on."""
-        return replace(self, in_a_row=0, reason=None)
+        overlooked = self.overlooked
+        if self.shown is not None and self.in_a_row >= self.max_in_a_row:
+            overlooked |= {self.shown}
+        return replace(self, in_a_row=0, shown=None, overlooked=overlooked, reason=None)
 
     def after(self, trial: Trial, answer: Answer) -> Watch:
         """The same after one more trial.
@@ -57,12 +64,13 @@ class Watch:
         if too_early_by_chance(trial, self.space):
             return self
         fault = likely_fault(answer, trial, self.signals)
-        if fault is not None:
-            count = self.in_a_row + 1
-            rejected = f"{count} trials in a row were rejected: {fault}" if trial.reason else f"{fault}"
-            learned = replace(self, in_a_row=count, reason=rejected if count >= self.max_in_a_row else None)
+        if fault is None or (trial.reason is None and fault.remedy in self.overlooked):
+            learned = replace(self, in_a_row=0, shown=None, reason=None)
         else:
-            learned = replace(self, in_a_row=0, reason=None)
+            count = self.in_a_row + 1
+            said = f"{count} trials in a row were rejected: {fault}" if trial.reason else f"{fault}"
+            shown = None if trial.reason else fault.remedy
+            learned = replace(self, in_a_row=count, shown=shown, reason=said if count >= self.max_in_a_row else None)
         return learned if trial.mep_mv is None or not trial.told else _with_amplitude(learned, trial.mep_mv)
 
 

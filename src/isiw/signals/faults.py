@@ -31,6 +31,9 @@ DRIVEN_MS = 25.0
 PULSE_SPAN_MS = (-2.0, 50.0)
 """When the pulse and what it evokes are in the EMG [ms after the pulse]."""
 
+CLICK_MS = 10.0
+"""How long a valve that switches is in the EMG."""
+
 TAP_SPAN_MS = 60.0
 LATEST_HIT_MS = 300.0
 """From the valve command to the impact, in any rig that is believed in."""
@@ -169,13 +172,15 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
     spans = [(trial.t_tms_ms + PULSE_SPAN_MS[0], trial.t_tms_ms + PULSE_SPAN_MS[1])]
     if trial.t_hit_ms is not None:
         spans.append((trial.t_hit_ms - 2.0, trial.t_hit_ms + TAP_SPAN_MS))
-    elif trial.t_valve_ms is not None:
-        spans.append((trial.t_valve_ms, trial.t_valve_ms + LATEST_HIT_MS + TAP_SPAN_MS))
+    if trial.t_valve_ms is not None:
+        last_ms = CLICK_MS if trial.t_hit_ms is not None else LATEST_HIT_MS + TAP_SPAN_MS
+        spans.append((trial.t_valve_ms - 2.0, trial.t_valve_ms + last_ms))
     if steepest_ms is None or any(first <= steepest_ms <= last for first, last in spans):
         return None
     return Fault(
-        f"the pulse shows in the EMG at {steepest_ms:.0f} ms, not at {trial.t_tms_ms:.0f} ms as the device says",
-        "Check the sampling rate, and that all times are on the sweep's own clock.",
+        f"the steepest edge of the EMG is at {steepest_ms:.0f} ms, and the pulse at {trial.t_tms_ms:.0f} ms as the "
+        "device says",
+        "Is that edge the pulse's? Then check the sampling rate, and that all times are on the sweep's own clock.",
     )
 
 

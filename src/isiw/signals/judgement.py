@@ -7,7 +7,7 @@ every trial, an unknown unit or a rate that measures nothing, is an error: repea
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 
@@ -95,7 +95,7 @@ class SignalLimits:
             not count.
 
     Raises:
-        InvalidValueError: a limit that is not positive, an empty window, or a slip of unit.
+        InvalidValueError: a limit that is not positive, a window without first and last ms, or a slip of unit.
     """
 
     mep_window_ms: tuple[float, float] = MEP_WINDOW_MS
@@ -107,14 +107,7 @@ class SignalLimits:
     def __post_init__(self) -> None:
         check_numbers(self, "background_uv", "tap_artefact_ms", above=0)
         check_numbers(self, "full_scale_mv", "isi_tolerance_ms", above=0, optional=True)
-        ascending("SignalLimits.mep_window_ms", self.mep_window_ms, least=0)
-        if self.mep_window_ms[-1] < LEAST_WINDOW_MS:
-            raise InvalidValueError(
-                "SignalLimits.mep_window_ms ends before any MEP begins",
-                got=self.mep_window_ms,
-                expected=f"ms after the pulse, such as {MEP_WINDOW_MS}",
-                remedy="Is it in seconds? Multiply by 1000.",
-            )
+        _check_window(self.mep_window_ms)
         if self.background_uv < LEAST_BACKGROUND_UV:
             raise InvalidValueError(
                 "SignalLimits.background_uv is less than any amplifier's noise",
@@ -126,6 +119,21 @@ class SignalLimits:
     def tolerance_ms(self, space: DesignSpace) -> float:
         """How far a realised ISI may be from the commanded one [ms]."""
         return min(space.tolerance_ms, self.isi_tolerance_ms or math.inf)
+
+
+def _check_window(window_ms: tuple[float, float]) -> None:
+    """Raise where this is no span of time after the pulse in which an MEP may be."""
+    name, such_as = "SignalLimits.mep_window_ms", f"such as {MEP_WINDOW_MS}"
+    if not isinstance(window_ms, Sequence) or len(window_ms) != 2:
+        raise InvalidValueError(f"{name} must be its first and its last ms", got=window_ms, expected=such_as)
+    _, last_ms = ascending(name, window_ms, least=0)
+    if last_ms < LEAST_WINDOW_MS:
+        raise InvalidValueError(
+            f"{name} ends before any MEP begins",
+            got=window_ms,
+            expected=f"ms after the pulse, {such_as}",
+            remedy="Is it in seconds? Multiply by 1000.",
+        )
 
 
 def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Trial:
@@ -244,10 +252,15 @@ def is_saturated(
         full_scale_mv: the largest value that the amplifier can show [mV]. With and without it, a top that stays at
             exactly one value for 1 ms or longer, far out of the sweep's usual range, is taken for a limit.
         span_ms: the part of the sweep that counts [ms from the first sample]; artefacts may run into limits elsewhere.
+
+    Raises:
+        InvalidValueError: no EMG in that part.
     """
     emg = np.asarray(emg_mv, dtype=np.float64)
     first, last = (min(edge * rate_hz / 1000, emg.size) for edge in span_ms)
     counts = emg[math.floor(first) : math.ceil(last) + 1]
+    if not counts.size:
+        raise InvalidValueError("there is no EMG in the part that counts", got=span_ms, expected="a part of the sweep")
     if full_scale_mv is not None and np.abs(counts).max() >= NEARLY_FULL * full_scale_mv:
         return True
     level = np.median(emg)
@@ -259,9 +272,10 @@ def is_saturated(
 
 def _is_blanked(emg_mv: FloatArray, rate_hz: float, pulse_ms: float, span_ms: tuple[float, float]) -> bool:
     """Whether the amplifier held one value for a part of the MEP's window, much longer than before the pulse."""
-    before, first, last = (math.floor(edge_ms * rate_hz / 1000) for edge_ms in (pulse_ms, *span_ms))
+    quiet_ms = max(0.0, pulse_ms - MIN_BACKGROUND_MS - PULSE_GUARD_MS)  # a rig may fill up what it did not record
+    rest, before, first, last = (math.floor(edge_ms * rate_hz / 1000) for edge_ms in (quiet_ms, pulse_ms, *span_ms))
     held = _longest_run(np.diff(emg_mv[first : last + 1]) == 0)
-    at_rest = _longest_run(np.diff(emg_mv[:before]) == 0)
+    at_rest = _longest_run(np.diff(emg_mv[rest:before]) == 0)
     return held * 1000 / rate_hz >= BLANKED_MS and held > BLANKED_TIMES * at_rest
 
 
@@ -298,11 +312,12 @@ def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: 
 
 def _require_no_tap(sweep: Sweep) -> None:
     """Raise where a tap came with TMS alone: a response to both would be taken for one to the pulse."""
-    if sweep.t_hit_ms is not None:
+    hit_ms = sweep.t_hit_ms if sweep.t_valve_ms is None else _impact(sweep)[0]
+    if hit_ms is not None:
         raise DeviceError(
             "the device reports a tap where TMS alone was commanded",
-            got=f"an impact at {sweep.t_hit_ms:g} ms",
-            remedy="Does the valve stay open? Leave t_hit_ms out where nothing hits.",
+            got=f"an impact at {hit_ms:g} ms",
+            remedy="Does the valve stay open? Leave t_hit_ms and t_valve_ms out where nothing hits.",
         )
 
 
@@ -387,10 +402,11 @@ def _mep_mv(emg_mv: FloatArray, emg: Channel, timed: Trial, limits: SignalLimits
     pulse = _on_channel(timed.t_tms_ms, emg)
     shown = np.array([math.nan])
     hit, valve = _on_channel(timed.t_hit_ms, emg), _on_channel(timed.t_valve_ms, emg)
-    if not math.isnan(hit) and valve >= MIN_REST_MS:  # without rest before it, the tap cannot be found in the EMG
+    at_rest_ms = valve if valve >= MIN_REST_MS else float(np.fmin(hit, pulse))
+    if not math.isnan(hit) and at_rest_ms >= MIN_REST_MS:  # without rest, the tap cannot be found in the EMG
         # A trial without a response must not get the tap's amplitude: where the two coincide, rather too small.
         shown, coinciding = (
-            tap_artefact_times(emg_mv, emg.rate_hz, hit, valve_ms=valve, t_tms_ms=pulse, even_as_mep=even_as_mep)
+            tap_artefact_times(emg_mv, emg.rate_hz, hit, valve_ms=at_rest_ms, t_tms_ms=pulse, even_as_mep=even_as_mep)
             for even_as_mep in (False, True)
         )
         shown = np.where(np.isnan(shown), coinciding, shown)

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.signals.waveforms import as_waveforms, crossing_before, cut, first_true, per_waveform
+from isiw.signals.waveforms import as_waveforms, crossing_before, cut, first_true, level_and_noise, per_waveform
 from isiw.types import ArrayLike, BoolArray, FloatArray
 
 __all__ = [
@@ -146,12 +146,11 @@ def mep_onsets(
     pulse = per_waveform(t_tms_ms, waves)
     segment, times = _window(waves, rate_hz, pulse, (EARLIEST_ONSET_MS, window_ms[1]))
     rest = _quiet(waves, rate_hz, pulse, per_waveform(None, waves))
-    level = np.nanmedian(rest, axis=-1, keepdims=True)
-    noise = 1.4826 * np.nanmedian(np.abs(rest - level), axis=-1, keepdims=True)
+    level, noise = level_and_noise(rest)
     deviation = np.abs(segment - level)
     in_window = times - pulse[:, None] >= window_ms[0]
     amplitude = mep_amplitudes(waves, rate_hz, pulse, window_ms)[:, None]
-    sure = first_true(in_window & (deviation >= np.maximum(SURE_SHARE * amplitude, SURE_SD * noise)))
+    sure = first_true(in_window & (deviation > np.maximum(SURE_SHARE * amplitude, SURE_SD * noise)))
     onset = crossing_before(deviation, ONSET_SD * noise, sure)
     latency: FloatArray = times[:, 0] - pulse + onset * 1000 / rate_hz
     return latency

@@ -6,6 +6,7 @@ All of it works on many sweeps at once, one waveform a row, shape (n, w).
 from __future__ import annotations
 
 import math
+from numbers import Real
 
 import numpy as np
 
@@ -20,6 +21,7 @@ __all__ = [
     "cut",
     "first_true",
     "is_recording",
+    "level_and_noise",
     "per_waveform",
     "rest_level",
 ]
@@ -46,11 +48,16 @@ def as_waveforms(values: ArrayLike, rate_hz: float, name: str = "waveform") -> F
         The samples, shape (n, w); a single waveform becomes one row.
 
     Raises:
-        InvalidValueError: no samples, samples that are not finite, a waveform without any variation, or an impossible
-            rate.
+        InvalidValueError: no samples, waveforms of different lengths, samples that are not finite, a waveform without
+            any variation, or an impossible rate.
     """
-    waves = np.asarray(values, dtype=np.float64)
-    if not math.isfinite(rate_hz) or rate_hz < MIN_RATE_HZ:
+    try:
+        waves = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidValueError(
+            f"the {name} is no array of numbers", remedy="Are the sweeps of one length? Cut them to the shortest."
+        ) from error
+    if not (isinstance(rate_hz, Real) and math.isfinite(rate_hz) and rate_hz >= MIN_RATE_HZ):
         raise InvalidValueError(
             f"the {name}'s sampling rate is too low to measure anything",
             got=rate_hz,
@@ -80,8 +87,15 @@ def per_waveform(value: ArrayLike | None, waves: FloatArray) -> FloatArray:
     Args:
         value: one number for all, one a waveform, or None.
         waves: the waveforms, shape (n, w).
+
+    Raises:
+        InvalidValueError: neither one number nor one a waveform.
     """
     number = np.asarray(math.nan if value is None else value, dtype=np.float64)
+    if number.size not in {1, len(waves)}:
+        raise InvalidValueError(
+            "there must be one time for all sweeps, or one for each", got=number.size, expected=f"1 or {len(waves)}"
+        )
     return np.broadcast_to(number.reshape(-1) if number.ndim else number, waves.shape[:1]).astype(np.float64)
 
 
@@ -106,13 +120,27 @@ def rest_level(waves: FloatArray, stop: int, rate_hz: float) -> tuple[FloatArray
             got=f"{1000 * stop / rate_hz:.1f} ms",
             expected=f"at least {MIN_REST_MS:g} ms before the first stimulus",
         )
-    rest = waves[:, max(0, stop - round(REST_MS * rate_hz / 1000)) : stop]
-    level = np.median(rest, axis=-1, keepdims=True)
+    return level_and_noise(waves[:, max(0, stop - round(REST_MS * rate_hz / 1000)) : stop])
+
+
+def level_and_noise(rest: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Level and noise SD of waveforms at rest, robust against outliers.
+
+    Args:
+        rest: shape (n, w); NaN is passed over.
+
+    Returns:
+        Median and noise SD, each of shape (n, 1).
+    """
+    level = np.nanmedian(rest, axis=-1, keepdims=True)
     deviation = rest - level
-    mad = np.median(np.abs(deviation), axis=-1, keepdims=True)
+    size = np.abs(deviation)
+    mad = np.nanmedian(size, axis=-1, keepdims=True)
     # A coarse converter reads the same number most of the time; its MAD is 0, its RMS is not.
-    rms = np.sqrt(np.mean(deviation**2, axis=-1, keepdims=True))
-    return level, np.maximum(MAD_TO_SD * mad, 0.25 * rms)
+    rms = np.sqrt(np.nanmean(deviation**2, axis=-1, keepdims=True))
+    step = np.min(size, axis=-1, keepdims=True, where=size > 0, initial=math.inf)
+    coarse = np.where(np.isfinite(step), np.clip(rms, step / math.sqrt(12), step), 0.0)
+    return level, np.maximum(np.maximum(MAD_TO_SD * mad, 0.25 * rms), coarse)
 
 
 def cut(waves: FloatArray, start: IntArray, count: int) -> FloatArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, TypeAlias
 
-__all__ = ["ENOUGH_PAIRS", "NO_MEP", "TOO_FEW", "finding", "lacking"]
+__all__ = ["ENOUGH_PAIRS", "NO_MEP", "SURE", "TOO_FEW", "finding", "lacking", "rules_out"]
 
 ENOUGH_PAIRS: Final = 3
 """With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
@@ -15,6 +15,9 @@ TOO_FEW: Final = "Too few trials counted to speak of a window: most of what is b
 
 NO_MEP: Final = "No MEP was seen in any trial that counts, so nothing is known about a window."
 """What is said where every amplitude was below the detection limit."""
+
+SURE: Final = 0.95
+"""Probability from which on it is said outright that there is a window, or none; below it "probably", or undecided."""
 
 _Edge: TypeAlias = tuple[float | None, float | None, float | None]
 
@@ -29,6 +32,15 @@ def lacking(pairs: int | None, *, silent: bool) -> str | None:
     if silent:
         return NO_MEP
     return None if pairs is None or pairs >= ENOUGH_PAIRS else TOO_FEW
+
+
+def rules_out(probability: float | None) -> bool:
+    """Whether nothing reported means that there is none; with more probability than this it is undecided.
+
+    Args:
+        probability: that there is a window, or a depression; None where the method has none.
+    """
+    return probability is None or 1 - probability >= SURE
 
 
 def finding(
