@@ -22,6 +22,9 @@ __all__ = ["hyper_prior", "people_of", "usual_shares"]
 PARTICLES: Final = 500
 HYPER_DRAWS: Final = 20_000
 
+WITHIN_A_LAB: Final = 0.5
+"""The share of the variance between usual people that is between people of one lab."""
+
 
 class _Person(NamedTuple):
     blocks: dict[str, Block]
@@ -57,16 +60,17 @@ def _person(posterior: ParticlePosterior) -> _Person:
 
 
 def hyper_prior(prior: Prior, space: DesignSpace) -> dict[str, HyperPrior]:
-    """Labs differ as people in general do, and people of one lab as usual people do.
+    """Of the variance between usual people, one part is between labs, and the other between the people of a lab.
 
     Args:
         prior: what is believed of people in general.
         space: the design space of the sessions.
     """
     drawn = prior.sample(1, HYPER_DRAWS, torch.Generator().manual_seed(0), space).values[0].double().numpy()
-    usual_sd = prior.spreads.double().numpy()
+    sd = np.sqrt(WITHIN_A_LAB) * prior.spreads.double().numpy()
+    mean_sd = np.sqrt(drawn.var(0) - sd**2)  # people in general differ by more than usual ones
     return {
-        name: HyperPrior(drawn[:, own].mean(0), drawn[:, own].std(0), usual_sd[own])
+        name: HyperPrior(drawn[:, own].mean(0), mean_sd[own], sd[own])
         for name, own in ((name, columns(name)) for name in LATENT_BLOCKS)
     }
 

@@ -27,8 +27,8 @@ P_OUTSIDER: Final = 0.15
 SD_WEIGHT: Final = 3.0
 """As how many people the usual spread counts in the law's."""
 
-KINDS_WEIGHT: Final = 4.0
-"""As how many people the usual shares of kinds count in the lab's."""
+KINDS_WEIGHT: Final = 1.0
+"""As how many people the usual shares of kinds count: of one muscle and one rig, most people are of one kind."""
 
 
 class Block(NamedTuple):
@@ -51,7 +51,7 @@ class HyperPrior(NamedTuple):
     Args:
         mean: where the law's mean is expected.
         mean_sd: SD of the same from lab to lab.
-        sd: the usual SD over people.
+        sd: the usual SD over its people.
     """
 
     mean: FloatArray
