@@ -38,6 +38,9 @@ __all__ = [
 ]
 
 
+LEAST_DELAY_MS = 1.0
+"""No hammer hits so soon after its command, nor does a shock travel so fast: such a delay is in seconds."""
+
 MOST_MEP_MV = 1000.0
 """More than any amplifier of EMG gives [mV]: their inputs take some hundred millivolts to either side at most."""
 
@@ -139,7 +142,7 @@ def whole(what: str, value: object, **bounds: Unpack[Bounds]) -> int:
 
 
 def mean_and_sd(what: str, value: object) -> tuple[float, float]:
-    """The mean and the SD of a time, both positive [ms].
+    """The mean and the SD of a delay, both positive [ms].
 
     Args:
         what: their name, for the message.
@@ -154,6 +157,13 @@ def mean_and_sd(what: str, value: object) -> tuple[float, float]:
             f"{what} must be a mean and an SD [ms]", got=value, remedy="Give both, such as (183.1, 6.0)."
         )
     mean, sd = (number(what, each, above=0) for each in pair)
+    if mean < LEAST_DELAY_MS:
+        raise InvalidValueError(
+            f"{what} is shorter than any rig's",
+            got=(mean, sd),
+            expected="a mean and an SD in ms, such as (183.1, 6.0)",
+            remedy="Is it in seconds? Multiply by 1000.",
+        )
     return mean, sd
 
 

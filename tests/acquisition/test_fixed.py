@@ -101,6 +101,12 @@ def test_the_sweep_stays_at_each_isi_for_its_trials_and_begins_again_at_the_end(
     assert order == [k for k in (0, 20, 40, 60, 80, 100, 0) for _ in range(3)]
 
 
+def test_a_sweep_stays_at_one_isi_where_its_stops_lie_between_those_of_the_space() -> None:
+    isis_ms = torch.arange(0.0, 40.1, 4.0)
+    order = [int(IncrementalSweep(10.0, 3)(CountingPosterior(trial), isis_ms).argmax()) for trial in range(15)]
+    assert [order.count(index) for index in sorted(set(order))] == [3, 3, 3, 3, 3]
+
+
 @pytest.mark.parametrize("settings", [{"step_ms": 0.0}, {"trials_per_isi": 0}])
 def test_a_sweep_without_step_or_trials_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match="IncrementalSweep"):

@@ -35,6 +35,16 @@ def test_resuming_what_is_over_changes_nothing(finished: Path) -> None:
     assert run(finished, "--show").output == before
 
 
+def test_a_search_that_its_limit_ends_says_so_and_what_was_found(tmp_path: Path) -> None:
+    log = tmp_path / "t.mcap"
+    for arguments, code in ((("--max-pulses", 3), 1), (("--show",), 0), (("--resume",), 1)):
+        result = run(log, *arguments)
+        assert result.exit_code == code
+        assert "Resting motor threshold: " in result.output
+        assert "Ended by its limit of 3 pulses." in result.output
+        assert "Go on with" not in result.output
+
+
 def test_by_hand_the_highest_intensity_has_to_be_given(tmp_path: Path) -> None:
     result = run(tmp_path / "t.mcap", "--by-hand")
     assert result.exit_code == 1

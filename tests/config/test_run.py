@@ -18,7 +18,7 @@ from isiw.config.run import (
     true_window,
 )
 from isiw.devices.simulated import SimulatedDevice
-from isiw.errors import ConfigError, DeviceError
+from isiw.errors import ConfigError, DeviceError, StrategyError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from scripted import ScriptedDevice, scripted_strategy
@@ -59,13 +59,17 @@ def test_a_file_changes_what_it_names(config_file: WriteFile) -> None:
         ("[strategy.settings]\nmax_trails = 9", ["strategy.settings", "max_trails", "Did you mean max_trials?"]),
         ("[strategy.settings]\nmax_trials = 'all'", ["strategy.settings", "max_trials", "'all'", "whole number"]),
         ("seed = -1", ["value of seed", "-1"]),
+        ("log = 3", ["value of log", "3", "expected a path"]),
+        ('[device]\nfactory = "rig"', ["device.factory", "module:function, such as rig:make"]),
+        ("[space]\nlow_ms = '0'", ["space.low_ms", "expected a number"]),
+        ("[strategy.settings]\nhit_delay_ms = [0.183, 0.006]", ["hit_delay_ms", "in seconds? Multiply by 1000"]),
         ("[limits]\nmin_iti_s = nan", ["limits.min_iti_s", "nan"]),
         ("[subject]\nkind = 'real'", ["subject.kind", "'real'", "'simulated' or 'recorded'"]),
         ("[space]\nreference = 'coil'", ["space.reference", "'coil'", "'impact' or 'valve'"]),
         ("[strategy]\nname = 'foo'", ["session.toml", "value of strategy.name", "'foo'", "default or "]),
         ("[subject]\ncohort = 'foo'", ["session.toml", "value of subject.cohort", "'foo'", "nonresponder"]),
         ("[space]\nlow_ms = 10\nhigh_ms = 5", ["session.toml", "value of space", "(10.0, 5.0)", "low_ms < high_ms"]),
-        ("[space]\nlow_ms = nan", ["session.toml", "value of space", "DesignSpace.low_ms", "got nan"]),
+        ("[space]\nlow_ms = nan", ["session.toml", "value of space.low_ms", "got nan", "a finite number"]),
         ("[space]\nstep_ms = 0.3", ["session.toml", "value of space", "whole number of steps"]),
         ("[strategy.settings]\nmax_trials = 0", ["value of strategy.settings", "max_trials", "got 0", "at least 1"]),
         ("seed = = 7", ["session.toml", "not valid TOML", "line 1"]),
@@ -119,6 +123,36 @@ def test_a_length_of_rests_needs_blocks(config_file: WriteFile, section: str, bl
         load_config(config_file(f"[{section}]\nrest_s = 300.0\n"))
     config = load_config(config_file(f"[{section}]\nrest_s = 300.0\n{block} = 10\n"))
     assert getattr(config, section).rest_s == 300.0
+
+
+def test_a_period_needs_a_number_of_pulses_also_where_it_is_the_usual_one(config_file: WriteFile) -> None:
+    for text in ("[limits]\nperiod_s = 3600.0\n", "[limits]\nrest_s = 120.0\n", "[protocol]\nrest_s = 120.0\n"):
+        with pytest.raises(ConfigError, match=r"does nothing without"):
+            load_config(config_file(text))
+
+
+RIG = '[device]\nfactory = "rig:make"\n'
+
+
+@pytest.mark.parametrize("given", [{"subject": "simulated"}, {"subject": "recorded"}, {"data": Path("there")}])
+def test_who_asks_for_a_simulated_person_does_not_get_the_real_rig(
+    config_file: WriteFile, given: dict[str, Any]
+) -> None:
+    config = load_config(config_file(RIG))
+    assert config.with_overrides(seed=8, day=2).device is not None
+    with pytest.raises(ConfigError, match="device and subject exclude each other"):
+        config.with_overrides(**given)
+
+
+def test_a_file_with_a_device_names_no_subject_not_even_the_usual_one(config_file: WriteFile) -> None:
+    with pytest.raises(ConfigError, match="device and subject exclude each other"):
+        load_config(config_file(f'{RIG}[subject]\nkind = "simulated"\n'))
+
+
+def test_a_prior_for_a_strategy_that_learns_nothing_from_it_is_refused(tmp_path: Path) -> None:
+    config = RunConfig(log=tmp_path / "s.mcap").with_overrides(strategy="nr", prior=tmp_path / "lab.toml")
+    with pytest.raises(StrategyError, match="the strategy nr learns nothing from earlier sessions"):
+        session_for(config)
 
 
 def test_the_same_seed_makes_the_same_person() -> None:

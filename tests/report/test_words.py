@@ -70,13 +70,35 @@ def test_an_unusual_window_is_said_with_its_probability_once_it_is_worth_saying(
     [
         (0.05, "No window was found (probability of a window: 0.05). 4 pairs"),
         (0.07, "It is undecided whether there is a window (probability of a window: 0.07). 4 pairs"),
-        (None, "No window was found. 4 pairs"),
     ],
 )
 def test_no_window_is_a_finding_once_it_has_95_percent(
     record: SessionRecord, probability: float | None, said: str
 ) -> None:
     assert final_statement(with_estimate(record, segments_ms=(), probability=probability)).startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("grid_ms", "said"),
+    [
+        ((), "The method has no answer yet: it has not measured enough for one."),
+        ((0.0, 10.0), "No window was found at ISIs of 0–10 ms; the others have not been measured yet."),
+        ((0.0, 100.0, 200.0), "No window was found. 4 pairs"),
+    ],
+)
+def test_a_method_without_a_probability_says_what_it_has_measured(
+    record: SessionRecord, grid_ms: tuple[float, ...], said: str
+) -> None:
+    nothing = with_estimate(record, segments_ms=(), probability=None, grid_ms=grid_ms)
+    assert final_statement(nothing).startswith(said)
+
+
+def test_isis_that_are_expected_to_be_wrong_are_a_guess(record: SessionRecord) -> None:
+    said = final_statement(with_estimate(record, probability=0.69, expected_f1=0.4))
+    assert said.startswith(
+        "The tap probably enhances the MEP, but at which ISIs is not known well; the best guess is 33–93 ms after the "
+        "valve command (probability of a window: 0.69)."
+    )
 
 
 def test_a_method_without_a_probability_is_said_to_have_none(record: SessionRecord) -> None:

@@ -138,6 +138,16 @@ def test_a_pulse_that_is_early_within_the_tolerance_is_nobodys_fault(
     assert (watch.reason is not None) is paused
 
 
+def test_pulses_that_are_early_at_one_isi_for_ever_pause_the_session() -> None:
+    watch = Watch(SPACE, SignalLimits(), max_in_a_row=3)
+    for isi_ms in (0.0, 1.0):
+        for time in range(1, 10):
+            watch = watch.after(early(-1.0, isi_ms), Measurement(0.02, -1.0))
+            assert (watch.reason is not None) == (time == 9)
+        assert f"At {isi_ms:g} ms the pulse came before the impact 9 times in a row" in str(watch.reason)
+    assert watch.seen().after(early(-1.0, 1.0), Measurement(0.02, -1.0)).reason is None
+
+
 def test_a_fault_of_trials_that_count_is_shown_once() -> None:
     watch = Watch(SPACE, SignalLimits(background_uv=1000.0), max_in_a_row=3)
     loud = [

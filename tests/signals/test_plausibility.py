@@ -29,6 +29,13 @@ def test_a_slip_is_refused_and_named(isi_ms: float | None, mep_mv: float, slip: 
         require_plausible(isi_ms, mep_mv, 100.0, IMPACT_SPACE)
 
 
+@pytest.mark.parametrize(("isi_ms", "mep_mv"), [(30.0, 0.02), (300.0, 0.02), (11.0, 1.5)])
+def test_after_an_isi_near_0_was_asked_no_amplitude_is_taken_for_it(isi_ms: float, mep_mv: float) -> None:
+    doubt = require_plausible(isi_ms, mep_mv, 0.0, IMPACT_SPACE)
+    assert doubt is not None
+    assert doubt.kind is DoubtKind.ISI_OFF
+
+
 def test_an_isi_far_from_the_one_asked_is_a_doubt(space: DesignSpace) -> None:
     doubt = require_plausible(180.0, 0.02, 100.0, space)
     assert doubt is not None

@@ -21,11 +21,12 @@ from isiw.strategy.stopping import (
     Progress,
     SmallGain,
     StopDecision,
+    StoppingRule,
     looks_back,
     stimuli_left,
 )
 from isiw.strategy.strategy import Strategy
-from isiw.text.found import NO_MEP
+from isiw.text.found import NO_MEP, TOO_FEW
 from isiw.window import WindowEstimate
 
 
@@ -149,6 +150,17 @@ def test_before_ten_stimuli_nothing_is_known_of_what_ten_add() -> None:
 def test_no_window_is_never_concluded_from_data_without_an_mep() -> None:
     nothing = Progress(30, 30, WindowEstimate(0.01, None, silent=True))
     assert NoWindow()(nothing) == StopDecision(stop=False, reason=NO_MEP)
+
+
+@pytest.mark.parametrize("rule", [NoWindow(0.5), ExpectedF1(0.5, 0.0), CredibleWidth(100.0, min_probability=0.0)])
+@pytest.mark.parametrize(("pairs", "stop"), [(0, False), (2, False), (3, True), (None, True)])
+def test_nothing_is_concluded_from_what_was_believed_beforehand(
+    rule: StoppingRule, pairs: int | None, *, stop: bool
+) -> None:
+    believed = WindowEstimate(0.2, None, edge_samples_ms=np.array(edges_with_width(5.0)), expected_f1=0.9, pairs=pairs)
+    decision = rule(Progress(9, 9, believed))
+    assert decision.stop == stop
+    assert (decision.reason == TOO_FEW) == (not stop)
 
 
 def test_any_of_gives_the_reason_of_the_first_rule_that_stops() -> None:

@@ -79,7 +79,7 @@ def test_toml_values_make_the_same_study_again() -> None:
         (TOML.replace("= 40", "= 1"), r"particles must be a whole number from 2 to 100000; got 1"),
         (TOML.replace("= 40", '= "many"'), r"particles must be a whole number from 2 to 100000; got 'many'"),
         (TOML.replace("settings =", "setings ="), r"strategies.0.setings is unknown.*Did you mean settings"),
-        (TOML + 'space = "head"', r"the value of space cannot be used; got 'head'"),
+        (TOML + 'space = "head"', r"the value of space cannot be used; got 'head'; expected .*valve"),
         (TOML.replace('name = "even"', 'label = "a/b", name = "even"'), r"a label is part of a file's name; got 'a/b'"),
     ],
 )

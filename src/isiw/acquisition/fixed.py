@@ -99,10 +99,10 @@ class IncrementalSweep:
         check_wholes(self, "trials_per_isi", least=1)
 
     def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
-        """Score ISIs by their distance [ms] from the one whose turn it is, negative, shape (1, t)."""
-        stops = int((isi_ms[-1] - isi_ms[0]) / self.step_ms) + 1
-        turn = posterior.trials // self.trials_per_isi % stops
-        return -(isi_ms - (isi_ms[0] + turn * self.step_ms)).abs().unsqueeze(0)
+        """Score the ISI nearest to the one whose turn it is 1 and all others 0, shape (1, t)."""
+        stops_ms = torch.arange(float(isi_ms[0]), float(isi_ms[-1]) + 1e-6, self.step_ms)
+        wanted_ms = stops_ms[posterior.trials // self.trials_per_isi % len(stops_ms)]
+        return _only(int((isi_ms - wanted_ms).abs().argmin()), isi_ms)
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ def serve(
 ) -> None:
     """Serve sessions over HTTP to MATLAB, LabVIEW or any other software of this computer."""
     with errors_reported("The server has ended; its sessions go on once they are resumed."):
-        given = token_file.read_text(encoding="utf-8").strip() if token_file else os.environ.get(TOKEN)
+        given = _token(token_file) if token_file else os.environ.get(TOKEN)
         settings = isiw.server.ServerSettings(
             folder, host, port, certificate=certificate, key=key, **({} if given is None else {"token": given})
         )
@@ -42,3 +42,12 @@ def serve(
             show("token: as given" if given is not None else f"token: {settings.token}")
 
         isiw.server.serve(settings, ready)
+
+
+def _token(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8").strip()
+    except UnicodeDecodeError as error:
+        raise isiw.errors.ConfigError(
+            "the token's file is no text", got=str(file), remedy="Write the token into a file of its own."
+        ) from error

@@ -69,7 +69,12 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
             refuse_ignored("nobody is simulated where a stimulator is set by hand", cohort=cohort, seed=seed)
         if not show_only:
             given = {name: value for name, value in settings.items() if value is not None}
-            _run(isiw.session.resume_threshold(log) if resume else _begun(log, by_hand=by_hand, **given))
+            recorder = isiw.session.resume_threshold(log) if resume else _begun(log, by_hand=by_hand, **given)
+            try:
+                _run(recorder)
+            except isiw.errors.LimitExceededError:
+                _say_what_is_there(log)
+                raise
         _say_what_is_there(log)
 
 
@@ -112,12 +117,19 @@ def _say_what_is_there(log: Path) -> None:
     record = isiw.session.read_threshold(log)
     search = isiw.session.search_of(record)
     decision = search.decision()
+    given, most = isiw.session.pulses_given(record), record.header.limits.max_pulses
     show(f"\n{search.estimate()}", style="bold")
-    show(f"Ended: {decision.reason}" if decision.stop else f"Not over: {decision.reason} Go on with: {_resuming(log)}")
+    if decision.stop:
+        show(f"Ended: {decision.reason}")
+    elif given >= most:
+        show(f"Ended by its limit of {counted(most, 'pulse')}. {decision.reason}")
+        show("For more pulses begin a new log with --max-pulses.")
+    else:
+        show(f"Not over: {decision.reason} Go on with: {_resuming(log)}")
     person = isiw.session.simulated_person(record.header)
     if person is not None:
         show(f"The simulated person's true threshold is {person.rmt_pct_mso:.1f} % MSO.")
-    show(f"{counted(isiw.session.pulses_given(record), 'pulse')}, learnt from {len(search.pulses)}. Log: {record.path}")
+    show(f"{counted(given, 'pulse')}, learnt from {len(search.pulses)}. Log: {record.path}")
     for loss in record.losses:
         show(loss, style="red")
     if record.losses:

@@ -38,7 +38,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, DeviceInfo
 from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
-from isiw.errors import ConfigError
+from isiw.errors import ConfigError, StrategyError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import RUN_KEY
 from isiw.models.particles.prior import Prior
@@ -73,6 +73,14 @@ LEAST_PCT = 3.0
 """Nobody stimulates with so low an intensity; 1.2 is meant as 120 %."""
 
 
+_TOGETHER = (
+    ("protocol", "rest_s", "block_trials"),
+    ("limits", "rest_s", "max_block_pulses"),
+    ("limits", "period_s", "max_period_pulses"),
+)
+"""Sections, and keys that mean something only together: how long, and after or with how many."""
+
+
 class RunConfig(Section):
     """The whole configuration of `isiw run`; with a device, nobody is simulated."""
 
@@ -91,11 +99,12 @@ class RunConfig(Section):
 
     @model_validator(mode="after")
     def _one_person(self) -> Self:
-        if self.device is not None and self.subject != SubjectConfig():
+        if self.device is not None and "subject" in self.model_fields_set:
             raise ConfigError(
                 "device and subject exclude each other",
                 expected="a device of your own, or a simulated subject",
-                remedy="Remove [subject], and give the person's code as visit.subject.",
+                remedy="To stimulate, remove [subject] and leave out --subject and --data; the person's code is "
+                "visit.subject. To simulate, remove [device].",
             )
         return self
 
@@ -130,15 +139,21 @@ class RunConfig(Section):
             day: the number of the person's visit, from 1.
             operator: who runs the session.
         """
-        values = self.model_dump()
-        given = {"seed": seed, "log": log, "prior": prior, "after": after or None}
-        values |= {key: value for key, value in given.items() if value is not None}
-        about = {"kind": subject, "data": data}
-        values["subject"] |= {key: value for key, value in about.items() if value is not None}
-        visit = {"day": day, "operator": operator}
-        values["visit"] |= {key: value for key, value in visit.items() if value is not None}
-        values["strategy"] |= {} if strategy is None else {"name": strategy}
+        values = self.model_dump(exclude_unset=True)  # what nobody set is not known to be wanted
+        values |= _given(seed=seed, log=log, prior=prior, after=after or None)
+        sections = {
+            "subject": _given(kind=subject, data=data),
+            "visit": _given(day=day, operator=operator),
+            "strategy": _given(name=strategy),
+        }
+        for name, given in sections.items():
+            if given:
+                values[name] = values.get(name, {}) | given
         return _validated(values, "the command line")
+
+
+def _given(**values: object) -> dict[str, object]:
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def load_config(path: str | Path | None = None) -> RunConfig:
@@ -157,7 +172,7 @@ def load_config(path: str | Path | None = None) -> RunConfig:
         values["device"] = {"folder": Path(path).resolve().parent} | values["device"]
     config = _validated(values, str(path))
     _require_percent(config.visit)
-    _require_blocks(config)
+    _require_whole(values)
     return config
 
 
@@ -173,15 +188,16 @@ def _require_percent(visit: VisitConfig) -> None:
             )
 
 
-def _require_blocks(config: RunConfig) -> None:
-    for section, block in (("protocol", "block_trials"), ("limits", "max_block_pulses")):
-        part = getattr(config, section)
-        if part.rest_s != type(part)().rest_s and getattr(part, block) is None:
+def _require_whole(values: Mapping[str, Any]) -> None:
+    """Raise where half of a limit is set, which would limit nothing."""
+    for section, key, other in _TOGETHER:
+        table = values.get(section, {})
+        if key in table and table.get(other) is None:
             raise ConfigError(
-                f"{section}.rest_s does nothing without {section}.{block}",
-                got=part.rest_s,
-                expected="the length of the rests between blocks [s], and after how many trials they come",
-                remedy=f"Set {section}.{block}, or remove {section}.rest_s.",
+                f"{section}.{key} does nothing without {section}.{other}",
+                got=table[key],
+                expected="both of them, or neither",
+                remedy=f"Set {section}.{other}, or remove {section}.{key}.",
             )
 
 
@@ -306,6 +322,11 @@ def _settings_for(config: RunConfig, device: DeviceInfo) -> dict[str, Any]:
         raise ConfigError(
             "strategy.settings.prior and a prior from earlier sessions exclude each other",
             remedy="Give only one of them.",
+        )
+    if not known_settings(config.strategy.name, {"prior": True}):
+        raise StrategyError(
+            f"the strategy {config.strategy.name} learns nothing from earlier sessions",
+            remedy="Leave out the prior and the earlier sessions, or choose another strategy, such as default.",
         )
     return settings | {"prior": _taught(config, device)}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -9,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 
 from isiw.checks import choice
 from isiw.design import DesignSpace
+from isiw.errors import ConfigError
 from isiw.strategy.catalogue import list_strategies, settings_for
 from isiw.subjects.cohorts import COHORTS
 from isiw.types import Reference
@@ -51,6 +53,8 @@ class SubjectConfig(Section):
 
 class SpaceConfig(Section):
     """The design space, as in `isiw.DesignSpace`."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     low_ms: float = 0.0
     high_ms: float = 500.0
@@ -106,10 +110,21 @@ class LimitsConfig(Section):
 class DeviceConfig(Section):
     """A lab's own rig: what makes it, with which settings; a log never names it."""
 
-    factory: str = Field(pattern=r"^[\w.]+:\w+$")
+    factory: str
     settings: dict[str, Any] = Field(default_factory=dict)
     folder: Path | None = None
     timeout_s: float = Field(default=TIMEOUT_S, gt=0.0, allow_inf_nan=False)
+
+    @field_validator("factory")
+    @classmethod
+    def _named(cls, factory: str) -> str:
+        if not re.fullmatch(r"[\w.]+:\w+", factory):
+            raise ConfigError(
+                "a factory is named by its module and its function",
+                got=factory,
+                expected="module:function, such as rig:make",
+            )
+        return factory
 
 
 class VisitConfig(Section):

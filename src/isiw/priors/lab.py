@@ -11,7 +11,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 import isiw
-from isiw.checks import check_probabilities
+from isiw.checks import check_probabilities, whole
 from isiw.errors import LogError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares, ShapeShares
@@ -136,7 +136,9 @@ def learn(
         LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person
             twice, or sessions that count ISIs from different events, or are of rigs with different hit delays, or of
             which some are simulated and others are not.
+        InvalidValueError: a seed that is no whole number from 0 on.
     """
+    seed = whole("seed", seed, least=0)
     if isinstance(logs, str | Path):
         raise LogError("logs must be a list of paths", got=str(logs), remedy=f'Write ["{logs}"] for a single one.')
     records = [read_session(path) for path in logs]

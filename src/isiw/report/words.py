@@ -39,6 +39,12 @@ TRIAL_HEADINGS = ("trial", "asked", "outcome", "realised")
 WORTH_SAYING = 0.1
 """Probability from which on an unusual window is mentioned."""
 
+A_GUESS = 0.5
+"""Expected F1 below which the reported ISIs are a guess: most of them are as probably outside."""
+
+MOST_OF_THE_RANGE = 0.9
+"""The share of the range from which on a sweep has covered it."""
+
 UNUSUAL = 0.9
 """Probability from which on a person is told to be unlike most."""
 
@@ -132,13 +138,30 @@ def finding_sentence(estimate: Estimate, space: DesignSpace) -> str:
         space: says which event an ISI counts from.
     """
     window, probability = estimate.window, estimate.probability
-    chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
+    if probability is None:
+        return _without_probability(estimate, space)
+    chance = f" (probability of a window: {probability:.2f})"
     if window is None:
         is_none = rules_out(probability)
         return f"No window was found{chance}." if is_none else f"It is undecided whether there is a window{chance}."
-    who = "By this method, which gives no probability, the tap" if probability is None else "The tap"
-    likely = "" if probability is None or probability >= SURE else " probably"
-    return f"{who}{likely} enhances the MEP at ISIs of {window} {_AFTER[space.reference]}{chance}."
+    enhances = f"The tap {'' if probability >= SURE else 'probably '}enhances the MEP"
+    isis = f"{window} {_AFTER[space.reference]}{chance}"
+    if estimate.expected_f1 is not None and estimate.expected_f1 < A_GUESS:
+        return f"{enhances}, but at which ISIs is not known well; the best guess is {isis}."
+    return f"{enhances} at ISIs of {isis}."
+
+
+def _without_probability(estimate: Estimate, space: DesignSpace) -> str:
+    """The same, of a method that gives none."""
+    if estimate.window is not None:
+        isis = f"{estimate.window} {_AFTER[space.reference]}"
+        return f"By this method, which gives no probability, the tap enhances the MEP at ISIs of {isis}."
+    if not estimate.grid_ms:
+        return "The method has no answer yet: it has not measured enough for one."
+    first_ms, last_ms = estimate.grid_ms[0], estimate.grid_ms[-1]
+    if last_ms - first_ms < MOST_OF_THE_RANGE * (space.high_ms - space.low_ms):
+        return f"No window was found at ISIs of {first_ms:g}–{last_ms:g} ms; the others have not been measured yet."
+    return "No window was found."
 
 
 def _edges(estimate: Estimate, space: DesignSpace) -> str:
@@ -223,10 +246,10 @@ def counts_sentence(record: SessionRecord) -> str:
     if unknown:
         mistrials["outcome unknown"] += unknown
     told, given = len(record.table.told), len(record.table) + unknown
-    pairs = f"{given} pairs of stimuli were delivered"
+    pairs = "1 pair of stimuli was delivered" if given == 1 else f"{given} pairs of stimuli were delivered"
     if controls := _controls(record):
         pairs = f"{given} stimuli were delivered, {controls} among them"
-    parts = [f"{pairs}; {told} count"]
+    parts = [f"{pairs}; {told} {'counts' if told == 1 else 'count'}"]
     if mistrials:
         parts.append("mistrials: " + ", ".join(f"{count} {reason}" for reason, count in mistrials.items()))
     if excluded:

@@ -44,7 +44,8 @@ class ServerSettings:
         key: the file of its key.
 
     Raises:
-        ConfigError: another address without certificate and key, or a host that is no address.
+        ConfigError: another address without certificate and key, one of these that is not there, or a host that is no
+            address.
         InvalidValueError: no port, or a token that cannot be used.
     """
 
@@ -60,6 +61,9 @@ class ServerSettings:
         check_wholes(self, "port", least=0, most=65535)
         if (self.certificate is None) != (self.key is None):
             raise ConfigError("a certificate and its key belong together", remedy="Give both files, or neither.")
+        for path in filter(None, (self.certificate, self.key)):
+            if not path.is_file():
+                raise ConfigError("the file of a certificate, or of its key, is not there", got=str(path))
         if not self.address.is_loopback and self.certificate is None:
             raise ConfigError(
                 "other computers may reach the server only with TLS",

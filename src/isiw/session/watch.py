@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer
-from isiw.signals.faults import likely_fault, too_early_by_chance
+from isiw.signals.faults import likely_fault, remedy_for, too_early_by_chance
 from isiw.signals.judgement import SignalLimits
 from isiw.signals.plausibility import DoubtKind, doubt_of, doubts_of
-from isiw.trials import Trial, TrialTable
+from isiw.trials import MistrialReason, Trial, TrialTable
 
 __all__ = ["Watch"]
+
+EARLY_TIMES: Final = 3
+"""So many times as often as other mistrials in a row: a strategy that is free to asks elsewhere before."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,8 @@ class Watch:
         max_in_a_row: how many trials in a row may be rejected, or show a faulty rig.
         detection_limit_mv: what an amplitude of 0 is known to be below [mV]; None where nobody has said.
         in_a_row: how many there have been.
+        early_ms: the ISI at which pulses came before the impact by chance [ms].
+        early: how many in a row there.
         meps_mv: the amplitudes told [mV].
         settled: doubts that a person has seen.
         shown: the remedy of the fault that the latest trial shows although it counts.
@@ -36,6 +42,8 @@ class Watch:
     max_in_a_row: int
     detection_limit_mv: float | None = None
     in_a_row: int = 0
+    early_ms: float | None = None
+    early: int = 0
     meps_mv: tuple[float, ...] = ()
     settled: frozenset[DoubtKind] = frozenset()
     shown: str | None = None
@@ -52,7 +60,7 @@ class Watch:
         overlooked = self.overlooked
         if self.shown is not None and self.in_a_row >= self.max_in_a_row:
             overlooked |= {self.shown}
-        return replace(self, in_a_row=0, shown=None, overlooked=overlooked, reason=None)
+        return replace(self, in_a_row=0, early=0, shown=None, overlooked=overlooked, reason=None)
 
     def after(self, trial: Trial, answer: Answer) -> Watch:
         """The same after one more trial.
@@ -62,7 +70,7 @@ class Watch:
             answer: what the device answered.
         """
         if too_early_by_chance(trial, self.space):
-            return self
+            return self._after_early(trial)
         fault = likely_fault(answer, trial, self.signals)
         if fault is None or (trial.reason is None and fault.remedy in self.overlooked):
             learned = replace(self, in_a_row=0, shown=None, reason=None)
@@ -71,7 +79,19 @@ class Watch:
             said = f"{count} trials in a row were rejected: {fault}" if trial.reason else f"{fault}"
             shown = None if trial.reason else fault.remedy
             learned = replace(self, in_a_row=count, shown=shown, reason=said if count >= self.max_in_a_row else None)
+        learned = replace(learned, early_ms=None, early=0)
         return learned if trial.mep_mv is None or not trial.told else _with_amplitude(learned, trial.mep_mv)
+
+    def _after_early(self, trial: Trial) -> Watch:
+        """The same after a pulse that came before the impact by chance: at one ISI that does not happen for ever."""
+        early = self.early + 1 if trial.commanded_isi_ms == self.early_ms else 1
+        reason = None
+        if early >= EARLY_TIMES * self.max_in_a_row:
+            reason = (
+                f"At {trial.commanded_isi_ms:g} ms the pulse came before the impact {early} times in a row. "
+                f"{remedy_for(MistrialReason.TMS_BEFORE_IMPACT)} Or begin the space at a larger ISI."
+            )
+        return replace(self, early_ms=trial.commanded_isi_ms, early=early, reason=reason)
 
 
 def _with_amplitude(watch: Watch, mep_mv: float) -> Watch:

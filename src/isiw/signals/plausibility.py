@@ -148,7 +148,7 @@ def require_plausible(
 
 def _require_in_place(isi_ms: float, mep_mv: float | None, asked_ms: float, space: DesignSpace) -> None:
     """Raise where the ISI that was asked is in the amplitude's place, or in seconds."""
-    if mep_mv is not None and not off_by(mep_mv, asked_ms, space):
+    if mep_mv is not None and mep_mv > abs(isi_ms) and not off_by(mep_mv, asked_ms, space):
         raise InvalidValueError(
             "the ISI and the amplitude seem to be swapped",
             got=(isi_ms, mep_mv),

@@ -10,7 +10,6 @@ from typing import Protocol, runtime_checkable
 
 from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.errors import InvalidValueError
-from isiw.text.found import NO_MEP
 from isiw.window import WindowEstimate
 
 __all__ = [
@@ -137,6 +136,8 @@ class CredibleWidth:
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
+        if progress.estimate.too_little is not None:
+            return StopDecision(stop=False, reason=progress.estimate.too_little)
         intervals = progress.estimate.robust_interval(self.level, self.min_share)
         if intervals is None:
             return StopDecision(stop=False, reason="The edges have no credible intervals.")
@@ -171,8 +172,8 @@ class NoWindow:
         """Decide whether to stop."""
         if progress.estimate.probability is None:
             return StopDecision(stop=False, reason="The probability of a window is not known.")
-        if progress.estimate.silent:
-            return StopDecision(stop=False, reason=NO_MEP)
+        if progress.estimate.too_little is not None:
+            return StopDecision(stop=False, reason=progress.estimate.too_little)
         absent = 1.0 - progress.estimate.probability
         if absent >= self.probability:
             return StopDecision(stop=True, reason=f"There is no window, with probability {absent:.2f}.")
@@ -202,6 +203,8 @@ class ExpectedF1:
         estimate = progress.estimate
         if estimate.expected_f1 is None or estimate.probability is None:
             return StopDecision(stop=False, reason="The F1 to be expected is not known.")
+        if estimate.too_little is not None:
+            return StopDecision(stop=False, reason=estimate.too_little)
         expected = f"an F1 of {estimate.expected_f1:.2f} is expected"
         if self.f1 < 1.0 and estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
             return StopDecision(stop=True, reason=f"The window is known: {expected}.")

@@ -24,7 +24,7 @@ import pandas as pd
 
 from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
-from isiw.errors import InvalidValueError
+from isiw.errors import ConfigError, InvalidValueError
 from isiw.strategy.catalogue import settings_for
 from isiw.strategy.settings.common import settings_values
 from isiw.studies.batch import simulate_batch
@@ -246,7 +246,11 @@ def study_from(values: Mapping[str, Any], source: str) -> Study:
     if isinstance(plain.get("strategies"), list):
         plain["strategies"] = [_strategy_values(strategy) for strategy in plain["strategies"]]
     if isinstance(plain.get("space"), str):
-        plain["space"] = _SPACES.get(plain["space"], plain["space"])
+        if plain["space"] not in _SPACES:
+            names = ", ".join(f'"{name}"' for name in _SPACES)
+            what = f"{source}: the value of space cannot be used"
+            raise ConfigError(what, got=plain["space"], expected=f"{names} or a table of keys and values")
+        plain["space"] = _SPACES[plain["space"]]
     return checked(Study, plain, source)
 
 

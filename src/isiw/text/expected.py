@@ -23,6 +23,7 @@ _KINDS: Final = {
     "list": "a list",
     "mapping": "a table of keys and values",
     "model": "a table of keys and values",
+    "path": "a path",
     "string": "text",
     "tuple": "a list",
 }

@@ -39,7 +39,7 @@ class SweepModel:
     """The mean MEP of each ISI in turn.
 
     Args:
-        step_ms: from one ISI to the next [ms].
+        step_ms: from one ISI to the next [ms]; where that is none of the space's, the next multiple of its step.
         trials_per_isi: trials at each.
         discarded: the first trials at each ISI, which a startle may have enlarged, are left out.
         rule: the window is the run of ISIs about the largest mean whose means exceed the `"baseline"` or the 0.135
@@ -105,10 +105,15 @@ class SweepPosterior:
         return self.told.trials
 
     @cached_property
+    def _step_ms(self) -> float:
+        """From one ISI to the next [ms]: the model's step, or the next multiple of the space's."""
+        return self.space.step_ms * math.ceil(self.model.step_ms / self.space.step_ms - 1e-9)
+
+    @cached_property
     def _stops_ms(self) -> FloatArray:
         """The ISIs of one sweep [ms]."""
-        stops = math.floor((self.space.high_ms - self.space.low_ms) / self.model.step_ms + 1e-9) + 1
-        return self.space.low_ms + self.model.step_ms * np.arange(stops, dtype=np.float64)
+        stops = math.floor((self.space.high_ms - self.space.low_ms) / self._step_ms + 1e-9) + 1
+        return self.space.low_ms + self._step_ms * np.arange(stops, dtype=np.float64)
 
     def proposed_isis_ms(self) -> Tensor:
         """One sweep, from where it has come to; see `ProposesIsi`."""
@@ -121,7 +126,7 @@ class SweepPosterior:
         per_isi, discarded = self.model.trials_per_isi, self.model.discarded
         kept = np.arange(len(trials.isi_ms)) % per_isi >= discarded
         mep_mv, last = self.model.floor.excess_mv(trials.mep_mv[kept], 0.0), len(self._stops_ms) - 1
-        stop = ((trials.isi_ms[kept] - self.space.low_ms) / self.model.step_ms).round().clip(0, last).astype(np.int64)
+        stop = ((trials.isi_ms[kept] - self.space.low_ms) / self._step_ms).round().clip(0, last).astype(np.int64)
         count = np.bincount(stop, minlength=last + 1)
         # A stop that has only a stray trial or two of its neighbours would be the largest mean too often.
         done = count >= max(2, (per_isi - discarded) // 2)

@@ -220,9 +220,14 @@ class ParticlePosterior:
 
 def _require_device(name: str) -> None:
     try:
-        torch.device(name)
+        torch.Generator(device=name)
     except (RuntimeError, TypeError) as error:
-        raise InvalidValueError("the torch device is unknown", got=name, expected="such as cpu, cuda or mps") from error
+        raise InvalidValueError(
+            "there is no such torch device here",
+            got=name,
+            expected="such as cpu, cuda or mps",
+            remedy="Leave it out: cpu.",
+        ) from error
 
 
 def _each(person: Person, function: Callable[[Tensor], Tensor]) -> Person:
