@@ -155,6 +155,8 @@ class Strategy:
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], on the grid; the same until the next `tell`, or until its trial was lost three times.
 
+        A method that plans its ISIs ahead, such as a sweep, repeats one however often its trial was lost.
+
         Args:
             deadline_s: answer within this time [s]: past it with an evenly spaced ISI, and a `fallback_reason`.
                 None and infinity are no deadline.
