@@ -85,6 +85,7 @@ def test_a_malformed_body_is_refused_in_words_and_begins_nothing(
         ({"protocol": {"iti_s": [9.0, 5.0]}}, "protocol", "ascend"),
         ({"visit": {"day": 0}}, "visit.day", "greater than"),
         ({"seed": True}, "seed", "expected a whole number"),
+        ({"limits": {"period_s": 60.0}}, None, "limits.period_s does nothing without limits.max_period_pulses"),
         ({"visit": 5}, "visit", "expected a table"),
     ],
 )

@@ -33,6 +33,7 @@ from isiw.config.sections import (
     StrategyConfig,
     SubjectConfig,
     VisitConfig,
+    require_together,
 )
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, DeviceInfo
@@ -71,14 +72,6 @@ SESSIONS = Path("isiw-sessions")
 
 LEAST_PCT = 3.0
 """Nobody stimulates with so low an intensity; 1.2 is meant as 120 %."""
-
-
-_TOGETHER = (
-    ("protocol", "rest_s", "block_trials"),
-    ("limits", "rest_s", "max_block_pulses"),
-    ("limits", "period_s", "max_period_pulses"),
-)
-"""Sections, and keys that mean something only together: how long, and after or with how many."""
 
 
 class RunConfig(Section):
@@ -172,7 +165,7 @@ def load_config(path: str | Path | None = None) -> RunConfig:
         values["device"] = {"folder": Path(path).resolve().parent} | values["device"]
     config = _validated(values, str(path))
     _require_percent(config.visit)
-    _require_whole(values)
+    require_together(values)
     return config
 
 
@@ -185,19 +178,6 @@ def _require_percent(visit: VisitConfig) -> None:
                 got=intensity_pct,
                 expected=f"at least {LEAST_PCT:g}",
                 remedy="Multiply it by 100: 90 for 90 %.",
-            )
-
-
-def _require_whole(values: Mapping[str, Any]) -> None:
-    """Raise where half of a limit is set, which would limit nothing."""
-    for section, key, other in _TOGETHER:
-        table = values.get(section, {})
-        if key in table and table.get(other) is None:
-            raise ConfigError(
-                f"{section}.{key} does nothing without {section}.{other}",
-                got=table[key],
-                expected="both of them, or neither",
-                remedy=f"Set {section}.{other}, or remove {section}.{key}.",
             )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -25,10 +26,19 @@ __all__ = [
     "StrategyConfig",
     "SubjectConfig",
     "VisitConfig",
+    "require_together",
 ]
 
 TIMEOUT_S = 30.0
 """How long a device may take for one delivery [s], where the file does not say."""
+
+
+_TOGETHER = (
+    ("protocol", "rest_s", "block_trials"),
+    ("limits", "rest_s", "max_block_pulses"),
+    ("limits", "period_s", "max_period_pulses"),
+)
+"""Sections, and keys that mean something only together: how long, and after or with how many."""
 
 
 class Section(BaseModel):
@@ -141,3 +151,23 @@ class VisitConfig(Section):
     def noted(self) -> Visit:
         """What is noted about the visit."""
         return Visit(**self.model_dump(exclude={"subject"}))
+
+
+def require_together(values: Mapping[str, Any]) -> None:
+    """Check that no half of a limit is set, which would limit nothing.
+
+    Args:
+        values: a configuration's sections, as they were given.
+
+    Raises:
+        ConfigError: there is one.
+    """
+    for section, key, other in _TOGETHER:
+        table = values.get(section)
+        if isinstance(table, Mapping) and key in table and table.get(other) is None:
+            raise ConfigError(
+                f"{section}.{key} does nothing without {section}.{other}",
+                got=table[key],
+                expected="both of them, or neither",
+                remedy=f"Set {section}.{other}, or remove {section}.{key}.",
+            )

@@ -11,7 +11,7 @@ from fastapi import Request
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig
+from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig, require_together
 from isiw.errors import IsiwError
 from isiw.log.schema import MOST_TRIALS
 from isiw.server.refusals import Refusal
@@ -164,10 +164,13 @@ def _read(kind: type[_Kind], content_type: str, body: bytes) -> _Kind:
         raise Refusal(
             415, "UnsupportedMediaType", "the body is of an unknown type", got=media_type, expected=f"{JSON} or {FORM}"
         )
+    body = body or b"{}"
     try:
-        return kind.model_validate_json(body or b"{}", strict=True)
+        request = kind.model_validate_json(body, strict=True)
     except ValidationError as error:
         raise _refused(kind, error.errors()[0]) from error
+    require_together(json.loads(body))  # a request does not know which of its fields were sent
+    return request
 
 
 def _form_as_json(kind: type[BaseModel], body: bytes) -> bytes:

@@ -132,12 +132,12 @@ def level_and_noise(rest: FloatArray) -> tuple[FloatArray, FloatArray]:
     Returns:
         Median and noise SD, each of shape (n, 1).
     """
-    level = np.nanmedian(rest, axis=-1, keepdims=True)
-    deviation = rest - level
-    size = np.abs(deviation)
-    mad = np.nanmedian(size, axis=-1, keepdims=True)
+    median, mean = (np.nanmedian, np.nanmean) if np.isnan(rest).any() else (np.median, np.mean)
+    level = median(rest, axis=-1, keepdims=True)
+    size = np.abs(rest - level)
+    mad = median(size, axis=-1, keepdims=True)
     # A coarse converter reads the same number most of the time; its MAD is 0, its RMS is not.
-    rms = np.sqrt(np.nanmean(deviation**2, axis=-1, keepdims=True))
+    rms = np.sqrt(mean(size**2, axis=-1, keepdims=True))
     step = np.min(size, axis=-1, keepdims=True, where=size > 0, initial=math.inf)
     coarse = np.where(np.isfinite(step), np.clip(rms, step / math.sqrt(12), step), 0.0)
     return level, np.maximum(np.maximum(MAD_TO_SD * mad, 0.25 * rms), coarse)
