@@ -66,6 +66,9 @@ def test_a_window_between_two_isis_of_the_space_is_one_still() -> None:
     early, late = Window(32, 38), Window(82, 88)
     assert f1(early, early, coarse) == 1
     assert f1(early, late, coarse) == f1(early, None, coarse) == f1(None, late, coarse) == 0
+    apart = Window(12, 84, ((12, 14), (82, 84)))
+    assert f1(apart, Window(45, 55), coarse) == 0
+    assert f1(apart, Window(8, 11), coarse) == pytest.approx(2 / 3)
     assert f1(Window(300, 380), None, coarse) == 1  # outside the space there is nothing to be found
 
 

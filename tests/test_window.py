@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -185,7 +186,8 @@ def test_an_estimate_is_printed_with_its_probability_medians_and_intervals() -> 
 def test_an_estimate_is_printed_without_what_it_does_not_have() -> None:
     assert str(WindowEstimate(None, Window(10, 40))) == "Window: 10–40 ms"
     no_window = WindowEstimate(0.2, None, 10.0, 40.0, edge_samples_ms=np.array([[10.0, 40.0]]))
-    assert str(no_window) == "Window: none (probability of a window: 0.20)"
+    assert str(no_window) == "Window: undecided (probability of a window: 0.20)"
+    assert str(replace(no_window, probability=0.03)) == "Window: none (probability of a window: 0.03)"
 
 
 def test_the_robust_interval_is_the_hull_over_probable_hypotheses() -> None:

@@ -34,8 +34,8 @@ def f1(estimate: WindowEstimate | Window | None, truth: Window | None, space: De
     Args:
         estimate: the estimate, or the reported window; None is "there is no window".
         truth: the true window; None where there is none.
-        space: the design space whose grid counts. A window between two of its ISIs counts as the nearer one; what lies
-            outside the space does not count.
+        space: the design space whose grid counts. A window that lies between its ISIs counts as the nearest ones; what
+            lies outside the space does not count.
     """
     window = estimate.window if isinstance(estimate, WindowEstimate) else estimate
     return float(f1_of_masks(_on_grid(window, space), _on_grid(truth, space)))
@@ -48,7 +48,8 @@ def _on_grid(window: Window | None, space: DesignSpace) -> BoolArray:
         return np.zeros(len(grid_ms), dtype=bool)
     mask = window.mask(grid_ms)
     if not mask.any() and space.low_ms <= window.start_ms <= window.end_ms <= space.high_ms:
-        mask[np.abs(grid_ms - 0.5 * (window.start_ms + window.end_ms)).argmin()] = True
+        middles_ms = [0.5 * (start_ms + end_ms) for start_ms, end_ms in window.segments]
+        mask[[np.abs(grid_ms - middle_ms).argmin() for middle_ms in middles_ms]] = True
     return mask
 
 

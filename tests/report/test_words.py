@@ -82,7 +82,7 @@ def test_no_window_is_a_finding_once_it_has_95_percent(
     ("grid_ms", "said"),
     [
         ((), "The method has no answer yet: it has not measured enough for one."),
-        ((0.0, 10.0), "No window was found at ISIs of 0–10 ms; the others have not been measured yet."),
+        ((0.0, 10.0), "No window was found at the ISIs measured so far, 0–10 ms."),
         ((0.0, 100.0, 200.0), "No window was found. 4 pairs"),
     ],
 )

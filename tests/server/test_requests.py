@@ -99,6 +99,12 @@ def test_a_plan_that_cannot_be_is_refused_by_the_name_of_its_field(
     assert not (folder / "b.mcap.part").exists()
 
 
+def test_a_misspelt_field_is_told_before_the_one_that_is_missing_because_of_it(client: httpx.Client) -> None:
+    error = refused(client.post("/sessions", json={"idd": "a"}), 422, "InvalidValueError")
+    assert error["field"] == "idd"
+    assert "is unknown" in error["message"]
+
+
 def test_a_protocol_with_control_trials_is_refused_as_ask_answers_with_an_isi(client: httpx.Client) -> None:
     plan = {**PLAN, "id": "c", "protocol": {"tms_alone": 0.1}}
     assert "control trials" in refused(client.post("/sessions", json=plan), 422, "InvalidValueError")["message"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ from isiw.session.watch import Watch
 from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Trial
+from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Trial, TrialTable
 from scripted import ScriptedDevice, scripted_strategy
 from wrong_rigs import NAMED, SPACE, WRONG, rig
 
@@ -140,8 +141,10 @@ def test_a_pulse_that_is_early_within_the_tolerance_is_nobodys_fault(
 
 def test_pulses_that_are_early_at_one_isi_for_ever_pause_the_session() -> None:
     watch = Watch(SPACE, SignalLimits(), max_in_a_row=3)
+    alone = Trial(0, Status.ACCEPTED, None, mep_mv=0.1)
     for isi_ms in (0.0, 1.0):
         for time in range(1, 10):
+            watch = watch.after(replace(alone, mep_mv=0.1 + time / 100), Measurement(0.1, None))
             watch = watch.after(early(-1.0, isi_ms), Measurement(0.02, -1.0))
             assert (watch.reason is not None) == (time == 9)
         assert f"At {isi_ms:g} ms the pulse came before the impact 9 times in a row" in str(watch.reason)
@@ -162,6 +165,10 @@ def test_a_fault_of_trials_that_count_is_shown_once() -> None:
     for trial in loud[3:]:
         watch = watch.after(trial, answer)
         assert watch.reason is None
+    resumed = Watch(SPACE, watch.signals, max_in_a_row=3).resumed(TrialTable(()), watch.seen_reasons)
+    for trial in loud[3:]:
+        resumed = resumed.after(trial, answer)
+        assert resumed.reason is None
     lost = Trial(0, Status.MISTRIAL, 40.0, MistrialReason.ISI_OFF, isi_ms=90.0)
     for _ in range(3):
         watch = watch.after(lost, Measurement(0.1, 90.0))

@@ -83,7 +83,7 @@ def test_the_reflex_of_a_tap_whose_impact_nobody_measures_is_no_fault() -> None:
     assert likely_fault(sweep, trial) is None
 
 
-@pytest.mark.parametrize(("at_ms", "accused"), [(400.0, False), (300.0, True)])
+@pytest.mark.parametrize(("at_ms", "accused"), [(400.0, False), (412.0, False), (550.0, False), (300.0, True)])
 def test_the_click_of_the_valve_is_not_taken_for_the_pulse(at_ms: float, *, accused: bool) -> None:
     times_ms = np.arange(4500) / 5.0
     emg_mv = 0.0015 * np.random.default_rng(1).standard_normal(4500)

@@ -331,6 +331,26 @@ def test_a_tap_that_shows_in_the_acceleration_of_tms_alone_is_an_error() -> None
         judge(sweep_of(), Stimulus(0, None), IMPACT)
 
 
+def test_tms_alone_needs_no_acceleration_that_an_impact_could_be_found_in() -> None:
+    whole = sweep_of()
+    unknown = with_channel(whole, "acceleration", unit="counts")
+    for alone in (unknown, replace(whole, t_valve_ms=5.0), replace(whole, t_valve_ms=-100.0)):
+        assert judge(alone, Stimulus(0, None), IMPACT).reason is None
+
+
+def test_what_moves_the_hammer_after_the_pulse_is_no_tap() -> None:
+    alone = judge(sweep_of(t_tms_ms=600.0), Stimulus(0, None), IMPACT)  # the impact is at 680 ms
+    assert (alone.reason, alone.isi_ms) == (None, None)
+
+
+def test_a_coarse_amplifiers_quiet_trials_are_not_taken_for_blanked_ones() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        emg = np.round(rng.normal(0.0, 0.0015, 5000) / 0.005) * 0.005
+        quiet = with_channel(sweep_of(t_valve_ms=None, t_hit_ms=680.0), "emg", emg)
+        assert judge(quiet, PAIR, IMPACT).reason is not MistrialReason.MISSING_CHANNEL
+
+
 def test_a_pulse_that_was_to_come_before_the_impact_counts() -> None:
     early = replace(sweep_of(t_tms_ms=650.0), t_hit_ms=680.0)
     space = DesignSpace(-50, 100, reference="impact")

@@ -70,6 +70,13 @@ def test_the_noise_of_a_coarse_converter_is_not_zero() -> None:
     assert noise.item() == pytest.approx(np.sqrt(0.1))
 
 
+def test_a_glitch_in_an_otherwise_constant_rest_is_no_converters_step() -> None:
+    wave = np.zeros((1, 1000))
+    wave[0, 500] = 50.0
+    _, noise = rest_level(wave, 1000, 5000.0)
+    assert noise.item() == pytest.approx(0.25 * 50.0 / np.sqrt(1000))
+
+
 def test_the_rest_that_is_read_is_the_last_200_ms_before_the_stimulus() -> None:
     wave = np.concatenate([np.full(1000, 100.0), np.zeros(1000), np.full(500, 7.0)])[None]
     level, _ = rest_level(wave + 1e-9 * np.arange(2500), 2000, 5000.0)

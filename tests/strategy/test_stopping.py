@@ -175,6 +175,12 @@ def test_any_of_goes_on_with_all_reasons() -> None:
     assert all(rule(progress(3)).reason in decision.reason for rule in rules)
 
 
+def test_what_several_rules_say_is_said_once() -> None:
+    few = Progress(2, 2, WindowEstimate(0.5, None, pairs=2, expected_f1=0.5))
+    decision = AnyOf((NoWindow(), ExpectedF1(), Budget(9)))(few)
+    assert decision.reason == f"{TOO_FEW} 7 stimuli are left."
+
+
 def test_any_of_no_rules_would_never_stop_and_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="at least one rule"):
         AnyOf(())

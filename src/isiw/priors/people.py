@@ -68,7 +68,7 @@ def hyper_prior(prior: Prior, space: DesignSpace) -> dict[str, HyperPrior]:
     """
     drawn = prior.sample(1, HYPER_DRAWS, torch.Generator().manual_seed(0), space).values[0].double().numpy()
     sd = np.sqrt(WITHIN_A_LAB) * prior.spreads.double().numpy()
-    mean_sd = np.sqrt(drawn.var(0) - sd**2)  # people in general differ by more than usual ones
+    mean_sd = np.sqrt(np.maximum(drawn.var(0) - sd**2, sd**2))  # all else by which people in general differ
     return {
         name: HyperPrior(drawn[:, own].mean(0), mean_sd[own], sd[own])
         for name, own in ((name, columns(name)) for name in LATENT_BLOCKS)

@@ -160,7 +160,7 @@ def _without_probability(estimate: Estimate, space: DesignSpace) -> str:
         return "The method has no answer yet: it has not measured enough for one."
     first_ms, last_ms = estimate.grid_ms[0], estimate.grid_ms[-1]
     if last_ms - first_ms < MOST_OF_THE_RANGE * (space.high_ms - space.low_ms):
-        return f"No window was found at ISIs of {first_ms:g}–{last_ms:g} ms; the others have not been measured yet."
+        return f"No window was found at the ISIs measured so far, {first_ms:g}–{last_ms:g} ms."
     return "No window was found."
 
 

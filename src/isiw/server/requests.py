@@ -15,7 +15,7 @@ from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, Visi
 from isiw.errors import IsiwError
 from isiw.log.schema import MOST_TRIALS
 from isiw.server.refusals import Refusal
-from isiw.text.expected import UNKNOWN, expected_instead, known_keys
+from isiw.text.expected import UNKNOWN, expected_instead, first_to_tell, known_keys
 from isiw.visit import VisitProtocol
 
 __all__ = [
@@ -168,7 +168,7 @@ def _read(kind: type[_Kind], content_type: str, body: bytes) -> _Kind:
     try:
         request = kind.model_validate_json(body, strict=True)
     except ValidationError as error:
-        raise _refused(kind, error.errors()[0]) from error
+        raise _refused(kind, first_to_tell(error.errors())) from error
     require_together(json.loads(body))  # a request does not know which of its fields were sent
     return request
 

@@ -171,6 +171,7 @@ class Session(Judging):
         open_log: Callable[[Header], LogWriter],
         first_records: Sequence[Record],
         earlier_s: Callable[[], Sequence[float]] = tuple,
+        pauses: Sequence[str] = (),
     ) -> None:
         """Begin where another run ended; `isiw.resume` does this for you.
 
@@ -180,11 +181,12 @@ class Session(Judging):
             open_log: opens the log that goes on, with that header.
             first_records: what it holds next.
             earlier_s: says how long ago each stimulus before was [s].
+            pauses: why it paused before.
         """
         self._journal.trials, self._header = trials, header
         self._open_log, self._first_records = open_log, first_records
         self._own_earlier_s, self._resumed = earlier_s, True
-        self._steps.delivery.watch = self._steps.delivery.watch.resumed(trials)
+        self._steps.delivery.watch = self._steps.delivery.watch.resumed(trials, pauses)
 
     def run(self, *, progress: bool | None = None, keys: bool = True) -> SessionResult:
         """Run to the end, and close the log whatever happens.

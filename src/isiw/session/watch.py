@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -14,8 +15,8 @@ from isiw.trials import MistrialReason, Trial, TrialTable
 
 __all__ = ["Watch"]
 
-EARLY_TIMES: Final = 3
-"""So many times as often as other mistrials in a row: a strategy that is free to asks elsewhere before."""
+EARLY_IN_A_ROW: Final = 9
+"""By chance, pulses are early at one ISI some times in a row; a strategy that is free to asks elsewhere before."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,7 @@ class Watch:
         early: how many in a row there.
         meps_mv: the amplitudes told [mV].
         settled: doubts that a person has seen.
-        shown: the remedy of the fault that the latest trial shows although it counts.
-        overlooked: the remedies of such faults that a person has seen and went on; they are said once.
+        seen_reasons: why it paused before, as a person has seen; of trials that count, the same fault is said once.
         reason: why to pause now, and what to do; None where there is no reason.
     """
 
@@ -46,21 +46,24 @@ class Watch:
     early: int = 0
     meps_mv: tuple[float, ...] = ()
     settled: frozenset[DoubtKind] = frozenset()
-    shown: str | None = None
-    overlooked: frozenset[str] = frozenset()
+    seen_reasons: frozenset[str] = frozenset()
     reason: str | None = None
 
-    def resumed(self, trials: TrialTable) -> Watch:
-        """The same after earlier trials, whose doubts whoever resumes the session has seen."""
+    def resumed(self, trials: TrialTable, reasons: Iterable[str]) -> Watch:
+        """The same after earlier trials; whoever resumes the session has seen their doubts and its pauses.
+
+        Args:
+            trials: what was delivered before.
+            reasons: why it paused.
+        """
         meps_mv = tuple(trial.mep_mv for trial in trials.told if trial.mep_mv is not None)
-        return replace(self, meps_mv=meps_mv, settled=doubts_of(meps_mv, self.detection_limit_mv))
+        settled = doubts_of(meps_mv, self.detection_limit_mv)
+        return replace(self, meps_mv=meps_mv, settled=settled, seen_reasons=frozenset(reasons))
 
     def seen(self) -> Watch:
         """The same after a person has seen the reason and went on."""
-        overlooked = self.overlooked
-        if self.shown is not None and self.in_a_row >= self.max_in_a_row:
-            overlooked |= {self.shown}
-        return replace(self, in_a_row=0, early=0, shown=None, overlooked=overlooked, reason=None)
+        seen = self.seen_reasons if self.reason is None else self.seen_reasons | {self.reason}
+        return replace(self, in_a_row=0, early=0, seen_reasons=seen, reason=None)
 
     def after(self, trial: Trial, answer: Answer) -> Watch:
         """The same after one more trial.
@@ -72,21 +75,21 @@ class Watch:
         if too_early_by_chance(trial, self.space):
             return self._after_early(trial)
         fault = likely_fault(answer, trial, self.signals)
-        if fault is None or (trial.reason is None and fault.remedy in self.overlooked):
-            learned = replace(self, in_a_row=0, shown=None, reason=None)
+        if fault is None or (trial.reason is None and any(fault.remedy in seen for seen in self.seen_reasons)):
+            learned = replace(self, in_a_row=0, reason=None)
         else:
             count = self.in_a_row + 1
             said = f"{count} trials in a row were rejected: {fault}" if trial.reason else f"{fault}"
-            shown = None if trial.reason else fault.remedy
-            learned = replace(self, in_a_row=count, shown=shown, reason=said if count >= self.max_in_a_row else None)
-        learned = replace(learned, early_ms=None, early=0)
+            learned = replace(self, in_a_row=count, reason=said if count >= self.max_in_a_row else None)
+        if trial.commanded_isi_ms is not None:  # a control trial says nothing about an ISI
+            learned = replace(learned, early_ms=None, early=0)
         return learned if trial.mep_mv is None or not trial.told else _with_amplitude(learned, trial.mep_mv)
 
     def _after_early(self, trial: Trial) -> Watch:
         """The same after a pulse that came before the impact by chance: at one ISI that does not happen for ever."""
         early = self.early + 1 if trial.commanded_isi_ms == self.early_ms else 1
         reason = None
-        if early >= EARLY_TIMES * self.max_in_a_row:
+        if early >= EARLY_IN_A_ROW:
             reason = (
                 f"At {trial.commanded_isi_ms:g} ms the pulse came before the impact {early} times in a row. "
                 f"{remedy_for(MistrialReason.TMS_BEFORE_IMPACT)} Or begin the space at a larger ISI."

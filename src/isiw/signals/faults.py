@@ -31,9 +31,6 @@ DRIVEN_MS = 25.0
 PULSE_SPAN_MS = (-2.0, 50.0)
 """When the pulse and what it evokes are in the EMG [ms after the pulse]."""
 
-CLICK_MS = 10.0
-"""How long a valve that switches is in the EMG."""
-
 TAP_SPAN_MS = 60.0
 LATEST_HIT_MS = 300.0
 """From the valve command to the impact, in any rig that is believed in."""
@@ -170,11 +167,10 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
         return None
     steepest_ms = steepest_edge(emg)
     spans = [(trial.t_tms_ms + PULSE_SPAN_MS[0], trial.t_tms_ms + PULSE_SPAN_MS[1])]
-    if trial.t_hit_ms is not None:
-        spans.append((trial.t_hit_ms - 2.0, trial.t_hit_ms + TAP_SPAN_MS))
-    if trial.t_valve_ms is not None:
-        last_ms = CLICK_MS if trial.t_hit_ms is not None else LATEST_HIT_MS + TAP_SPAN_MS
-        spans.append((trial.t_valve_ms - 2.0, trial.t_valve_ms + last_ms))
+    begins = [ms for ms in (trial.t_valve_ms, trial.t_hit_ms) if ms is not None]
+    if begins:  # the valve switches on and off before the hit
+        hit_ms = begins[0] + LATEST_HIT_MS if trial.t_hit_ms is None else trial.t_hit_ms
+        spans.append((begins[0] - 2.0, hit_ms + TAP_SPAN_MS))
     if steepest_ms is None or any(first <= steepest_ms <= last for first, last in spans):
         return None
     return Fault(

@@ -35,6 +35,9 @@ REST_MS = 200.0
 
 MAD_TO_SD = 1.4826  # of a normal distribution
 
+MORE_THAN_A_GLITCH = 0.005
+"""The share of samples at rest that differ from the median, from which on the least of it is a converter's step."""
+
 
 def as_waveforms(values: ArrayLike, rate_hz: float, name: str = "waveform") -> FloatArray:
     """Waveforms as a float array, checked to be recordings at all.
@@ -139,7 +142,8 @@ def level_and_noise(rest: FloatArray) -> tuple[FloatArray, FloatArray]:
     # A coarse converter reads the same number most of the time; its MAD is 0, its RMS is not.
     rms = np.sqrt(mean(size**2, axis=-1, keepdims=True))
     step = np.min(size, axis=-1, keepdims=True, where=size > 0, initial=math.inf)
-    coarse = np.where(np.isfinite(step), np.clip(rms, step / math.sqrt(12), step), 0.0)
+    is_coarse = (size > 0).mean(axis=-1, keepdims=True) >= MORE_THAN_A_GLITCH
+    coarse = np.where(is_coarse, np.clip(rms, step / math.sqrt(12), step), 0.0)
     return level, np.maximum(np.maximum(MAD_TO_SD * mad, 0.25 * rms), coarse)
 
 

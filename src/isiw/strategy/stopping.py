@@ -286,7 +286,8 @@ class AnyOf:
         for decision in decisions:
             if decision.stop:
                 return decision
-        return StopDecision(stop=False, reason=" ".join(decision.reason for decision in decisions))
+        reasons = dict.fromkeys(decision.reason for decision in decisions)  # what several rules say is said once
+        return StopDecision(stop=False, reason=" ".join(reasons))
 
 
 def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:

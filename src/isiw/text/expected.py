@@ -9,7 +9,7 @@ from typing import Any, Final, get_args, get_type_hints
 
 from pydantic_core import ErrorDetails
 
-__all__ = ["UNKNOWN", "expected_instead", "known_keys"]
+__all__ = ["UNKNOWN", "expected_instead", "first_to_tell", "known_keys"]
 
 UNKNOWN: Final = {"extra_forbidden", "unexpected_keyword_argument"}
 """Pydantic's types of error for a key that there is not."""
@@ -39,6 +39,15 @@ def expected_instead(error: ErrorDetails) -> str:
     if kind in _KINDS and fault in {"type", "parsing", "from_float", "attributes_type"}:
         return _KINDS[kind]
     return error["msg"].removeprefix("Input should be ")
+
+
+def first_to_tell(errors: Sequence[ErrorDetails]) -> ErrorDetails:
+    """Of several errors the one to tell: a key that was misspelt before the one that is missing because of it.
+
+    Args:
+        errors: as pydantic found them, at least one.
+    """
+    return next((error for error in errors if error["type"] in UNKNOWN), errors[0])
 
 
 def known_keys(kind: Any, section: Sequence[int | str]) -> list[str]:

@@ -10,7 +10,7 @@ __all__ = ["ENOUGH_PAIRS", "NO_MEP", "SURE", "TOO_FEW", "finding", "lacking", "r
 ENOUGH_PAIRS: Final = 3
 """With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
 
-TOO_FEW: Final = "Too few trials counted to speak of a window: most of what is believed was believed beforehand."
+TOO_FEW: Final = "Fewer than three pairs of stimuli count so far, too few to speak of a window."
 """What is said instead."""
 
 NO_MEP: Final = "No MEP was seen in any trial that counts, so nothing is known about a window."
@@ -60,7 +60,8 @@ def finding(
         depressed: the reported ISIs that depress the MEP, and the probability of any; None where nobody looked.
     """
     chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
-    lines = [f"Window: {'none' if window is None else window}{chance}"]
+    nothing = "none" if rules_out(probability) else "undecided"
+    lines = [f"Window: {nothing if window is None else window}{chance}"]
     for name, edge in (("Start", start), ("End", end)):
         median, low, high = ("" if edge_ms is None else _edge(edge_ms) for edge_ms in edge)
         if window is not None and low:

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
 from isiw.errors import ConfigError, IsiwError
-from isiw.text.expected import UNKNOWN, expected_instead, known_keys
+from isiw.text.expected import UNKNOWN, expected_instead, first_to_tell, known_keys
 
 __all__ = ["checked", "parsed", "read_toml"]
 
@@ -70,9 +70,7 @@ def checked(kind: type[_T], values: Mapping[str, Any], source: str) -> _T:
     try:
         return cast("_T", dict(_strict(kind).model_validate({"values": values}))["values"])
     except ValidationError as error:
-        found = error.errors()
-        # A key that was misspelt is reported before the one that is missing because of it.
-        raise _explained(kind, next((e for e in found if e["type"] in UNKNOWN), found[0]), source) from error
+        raise _explained(kind, first_to_tell(error.errors()), source) from error
 
 
 def _strict(kind: type) -> type[BaseModel]:
