@@ -271,6 +271,7 @@ def test_a_depression_that_is_less_probable_than_none_is_not_reported() -> None:
 def test_an_estimate_says_where_the_mep_is_depressed_only_where_that_was_looked_for() -> None:
     found = WindowEstimate(0.9, Window(50, 80), depressed=Window(10, 35), depressed_probability=0.7)
     assert str(found).endswith("Depressed: 10–35 ms (probability of it: 0.70)")
-    nowhere = WindowEstimate(0.9, Window(50, 80), depressed_probability=0.1)
-    assert str(nowhere).endswith("Depressed: nowhere (probability of it: 0.10)")
+    nowhere = WindowEstimate(0.9, Window(50, 80), depressed_probability=0.04)
+    assert str(nowhere).endswith("Depressed: nowhere (probability of it: 0.04)")
+    assert str(replace(nowhere, depressed_probability=0.1)).endswith("Depressed: undecided (probability of it: 0.10)")
     assert "epressed" not in str(WindowEstimate(0.9, Window(50, 80)))

@@ -18,7 +18,7 @@ import pandas as pd
 
 from isiw.checks import choice, number, whole
 from isiw.errors import InvalidValueError
-from isiw.signals.plausibility import LARGEST_MV, implausible_amplitude
+from isiw.signals.plausibility import LARGEST_MV, require_amplitude
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
@@ -112,10 +112,7 @@ def _require_amplitudes(mep_mv: FloatArray) -> None:
     """Raise where these are no peak-to-peak amplitudes in mV."""
     if mep_mv.min(initial=0.0) < 0:
         raise InvalidValueError("an amplitude is negative", got=float(mep_mv.min()), expected="peak-to-peak amplitudes")
-    wrong = implausible_amplitude(float(mep_mv.max(initial=0.0)))
-    if wrong is not None:
-        what, _, remedy = wrong.partition(". ")
-        raise InvalidValueError(f"the largest amplitude cannot be a MEP's: {what}", remedy=remedy)
+    require_amplitude(float(mep_mv.max(initial=0.0)))
 
 
 def response_threshold_mv(alone_mv: ArrayLike, false_share: float = 0.05) -> float:

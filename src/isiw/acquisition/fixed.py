@@ -100,9 +100,9 @@ class IncrementalSweep:
 
     def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
         """Score the ISI nearest to the one whose turn it is 1 and all others 0, shape (1, t)."""
-        stops_ms = torch.arange(float(isi_ms[0]), float(isi_ms[-1]) + 1e-6, self.step_ms)
-        wanted_ms = stops_ms[posterior.trials // self.trials_per_isi % len(stops_ms)]
-        return _only(int((isi_ms - wanted_ms).abs().argmin()), isi_ms)
+        stops = int((isi_ms[-1] - isi_ms[0]) / self.step_ms) + 1
+        turn = posterior.trials // self.trials_per_isi % stops
+        return _only(int((isi_ms - (isi_ms[0] + turn * self.step_ms)).abs().argmin()), isi_ms)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from isiw.trials import MistrialReason, Trial, TrialTable
 __all__ = ["Watch"]
 
 EARLY_IN_A_ROW: Final = 9
-"""By chance, pulses are early at one ISI some times in a row; a strategy that is free to asks elsewhere before."""
+"""By chance a pulse is early at one ISI a few times in a row; after three, strategies that may choose ask elsewhere."""
 
 
 @dataclass(frozen=True)

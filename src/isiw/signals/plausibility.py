@@ -25,6 +25,7 @@ __all__ = [
     "implausible_scale",
     "is_silent",
     "off_by",
+    "require_amplitude",
     "require_plausible",
 ]
 
@@ -91,6 +92,20 @@ def implausible_amplitude(mep_mv: float) -> str | None:
     return None
 
 
+def require_amplitude(mep_mv: float) -> None:
+    """Refuse an amplitude that no muscle gives.
+
+    Args:
+        mep_mv: peak-to-peak amplitude [mV].
+
+    Raises:
+        InvalidValueError: it cannot be a MEP's in mV.
+    """
+    if (wrong := implausible_amplitude(mep_mv)) is not None:
+        what, _, remedy = wrong.partition(". ")
+        raise InvalidValueError(f"the amplitude cannot be a MEP's: {what}", got=mep_mv, remedy=remedy)
+
+
 def implausible_scale(meps_mv: Sequence[float]) -> str | None:
     """Why amplitudes of single pulses to a muscle at rest cannot be in mV, and the likely slip; None where they can.
 
@@ -136,10 +151,8 @@ def require_plausible(
     odd = isi_ms is not None and asked_ms is not None and off_by(isi_ms, asked_ms, space)
     if odd and isi_ms is not None and asked_ms is not None:
         _require_in_place(isi_ms, mep_mv, asked_ms, space)
-    wrong = None if mep_mv is None else implausible_amplitude(mep_mv)
-    if wrong is not None:
-        what, _, remedy = wrong.partition(". ")
-        raise InvalidValueError(f"the amplitude cannot be a MEP's: {what}", got=mep_mv, remedy=remedy)
+    if mep_mv is not None:
+        require_amplitude(mep_mv)
     if not odd:
         return None
     text = f"The realised ISI of {isi_ms:g} ms is far from the {asked_ms:g} ms that were asked. Is it counted from the "

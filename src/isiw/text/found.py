@@ -68,7 +68,8 @@ def finding(
             lines.append(f"{name}: {median}, 90 % interval {low} to {high}")
     segment, anywhere = depressed
     if anywhere is not None:
-        lines.append(f"Depressed: {'nowhere' if segment is None else segment} (probability of it: {anywhere:.2f})")
+        nowhere = "nowhere" if rules_out(anywhere) else "undecided"
+        lines.append(f"Depressed: {nowhere if segment is None else segment} (probability of it: {anywhere:.2f})")
     return "\n".join(lines)
 
 

@@ -226,7 +226,7 @@ def _require_device(name: str) -> None:
             "there is no such torch device here",
             got=name,
             expected="such as cpu, cuda or mps",
-            remedy="Leave it out: cpu.",
+            remedy="Leave the device out to use the cpu.",
         ) from error
 
 
