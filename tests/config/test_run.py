@@ -149,9 +149,10 @@ def test_a_file_with_a_device_names_no_subject_not_even_the_usual_one(config_fil
         load_config(config_file(f'{RIG}[subject]\nkind = "simulated"\n'))
 
 
-def test_a_prior_for_a_strategy_that_learns_nothing_from_it_is_refused(tmp_path: Path) -> None:
-    config = RunConfig(log=tmp_path / "s.mcap").with_overrides(strategy="nr", prior=tmp_path / "lab.toml")
-    with pytest.raises(StrategyError, match="the strategy nr learns nothing from earlier sessions"):
+@pytest.mark.parametrize("name", ["nr", "gp-ei", "parametric-mi", "supra-threshold"])
+def test_a_prior_for_a_strategy_that_learns_nothing_from_it_is_refused(tmp_path: Path, name: str) -> None:
+    config = RunConfig(log=tmp_path / "s.mcap").with_overrides(strategy=name, prior=tmp_path / "lab.toml")
+    with pytest.raises(StrategyError, match=f"the strategy {name} learns nothing from earlier sessions"):
         session_for(config)
 
 

@@ -31,16 +31,17 @@ def test_the_table_has_a_line_a_session_with_its_window_and_intervals(record: Se
     assert second.startswith("2 ")
 
 
-@pytest.mark.parametrize(("probability", "said"), [(0.03, "none"), (0.25, "undecided")])
+@pytest.mark.parametrize(("probability", "said"), [(0.03, "none"), (0.25, "undecided"), (None, "none")])
 def test_where_no_window_is_reported_it_may_still_be_undecided(
-    record: SessionRecord, probability: float, said: str
+    record: SessionRecord, probability: float | None, said: str
 ) -> None:
     update = {"segments_ms": (), "probability": probability}
     entries = tuple(e.model_copy(update=update) if isinstance(e, Estimate) else e for e in record.history)
     open_still = type(record)(record.path, record.header, entries, {}, (), True)
-    assert comparison_table([open_still]).splitlines()[1].endswith(f"{probability}       {said}")
+    chance, column = (f" (P(window) = {probability})", probability) if probability else ("", "–   ")
+    assert comparison_table([open_still]).splitlines()[1].endswith(f"{column}       {said}")
     words = [text.get_text() for text in comparison_figure([open_still]).axes[0].texts]
-    assert words == [f"{'no window' if said == 'none' else said} (P(window) = {probability})"]
+    assert words == [f"{'no window' if said == 'none' else said}{chance}"]
 
 
 def test_a_session_in_which_too_little_was_measured_says_so(record: SessionRecord) -> None:

@@ -47,7 +47,7 @@ from isiw.priors import after, read_lab_prior
 from isiw.session.loop import Session
 from isiw.session.updates import SessionUpdate
 from isiw.signals.judgement import SignalLimits
-from isiw.strategy.catalogue import known_settings, make_strategy
+from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
 from isiw.text.toml_files import checked, read_toml
@@ -303,11 +303,13 @@ def _settings_for(config: RunConfig, device: DeviceInfo) -> dict[str, Any]:
             "strategy.settings.prior and a prior from earlier sessions exclude each other",
             remedy="Give only one of them.",
         )
-    if not known_settings(config.strategy.name, {"prior": True}):
+    try:
+        settings_for(config.strategy.name, prior=Prior())
+    except StrategyError as error:  # no prior, or that of another model
         raise StrategyError(
             f"the strategy {config.strategy.name} learns nothing from earlier sessions",
             remedy="Leave out the prior and the earlier sessions, or choose another strategy, such as default.",
-        )
+        ) from error
     return settings | {"prior": _taught(config, device)}
 
 

@@ -66,7 +66,7 @@ def comparison_figure(records: Sequence[SessionRecord], names: Sequence[str] | N
 def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
     last = record.estimates[-1] if record.estimates and record.rests_on_data else None
     if last is None or last.window is None:
-        said = "too little was measured" if last is None else f"{_nothing(last)} ({_chance(last)})"
+        said = "too little was measured" if last is None else _nothing(last)
         axes.annotate(said, (0.02, line), xycoords=("axes fraction", "data"), va="center", fontsize=8, color=FAINT)
         return
     for start_ms, end_ms in last.window.segments:
@@ -82,7 +82,8 @@ def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
 
 
 def _nothing(estimate: Estimate) -> str:
-    return "no window" if rules_out(estimate.probability) else "undecided"
+    nothing, chance = "no window" if rules_out(estimate.probability) else "undecided", _chance(estimate)
+    return f"{nothing} ({chance})" if chance else nothing
 
 
 def _chance(estimate: Estimate) -> str:
