@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
+import isiw
 from isiw.cli import app
 from isiw.studies import Failure, open_store
 from isiw.studies.store import Store
@@ -65,6 +66,25 @@ def test_run_of_a_folder_goes_on_with_it(folder: Path) -> None:
     assert result.exit_code == 0, result.output
     assert "1/1" in result.output
     assert len(open_store(folder).rows()) == 8
+
+
+def test_the_file_in_a_folder_of_results_means_that_folder(folder: Path) -> None:
+    result = study("run", folder / "study.toml", "--workers", 1)
+    assert result.exit_code == 0, result.output
+    assert "Nothing is left to run." in result.output
+    assert not (folder / "study.study").exists()
+
+
+@pytest.mark.parametrize("of_a_copy", [False, True])
+def test_the_study_of_a_folder_can_be_changed_and_begun_in_another(folder: Path, *, of_a_copy: bool) -> None:
+    kept = folder / "study.toml"
+    versions = isiw.__version__, "0.0.1"
+    kept.write_text(kept.read_text().replace("people = 2", "people = 1").replace(*versions))
+    assert "another version" in study("run", folder).output
+    source = shutil.copy(kept, folder.with_name("copy.toml")) if of_a_copy else folder
+    result = study("run", source, "--out", folder.with_name("anew"), "--workers", 1)
+    assert result.exit_code == 0, result.output
+    assert "2 sessions are in" in result.output
 
 
 def test_run_of_another_study_into_the_folder_is_refused(plan: Path, folder: Path) -> None:

@@ -28,7 +28,13 @@ Folder = Annotated[Path, typer.Argument(help="The folder of a study.", **NO_DEFA
 
 @app.command()
 def run(
-    source: Annotated[Path, typer.Argument(help="A study (TOML), or the folder of one to go on with.", **NO_DEFAULT)],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help="A study (TOML), or the folder of one, to go on with it, or with --out to begin anew.",
+            **NO_DEFAULT,
+        ),
+    ],
     out: Annotated[
         Path | None, typer.Option(help="The folder of its results; by default beside it, as NAME.study.", **NO_DEFAULT)
     ] = None,
@@ -40,16 +46,13 @@ def run(
 ) -> None:
     """Run a study, or what is left of it."""
     with errors_reported():
-        studies = isiw.studies
-        begun = source.is_dir()
-        folder = source if begun and out is None else out or source.with_name(f"{source.stem}.study")
-        plan = studies.open_store(source).study if begun else studies.load_study(source)
-        store = studies.begin_store(plan, folder)
+        studies, store = isiw.studies, _store(source, out)
+        folder = store.folder
         processes = (os.cpu_count() or 1) if workers is None else workers
         executor = studies.DaskCluster(scheduler) if scheduler else studies.Processes(processes)
         kept = f"Interrupted. All that is finished is kept; go on with: isiw study run {folder}"
         with errors_reported(kept), _bar(store.left(retry=retry)) as on_done:
-            studies.conduct(plan, folder, executor, retry=retry, on_done=on_done)
+            studies.conduct(store.study, folder, executor, retry=retry, on_done=on_done)
         _say_what_is_there(store)
 
 
@@ -85,6 +88,16 @@ def summary(folder: Folder) -> None:
         for name in isiw.plots.STUDY_PICTURES:
             target = folder / f"summary_{name}.svg"
             show(f"picture: {isiw.plots.save_study_plot(table, target, picture=name, overwrite=True)}")
+
+
+def _store(source: Path, out: Path | None) -> Store:
+    """The folder to run: that of a study that was begun, or one for the study of a file or of another folder."""
+    if source.name == "study.toml" and (source.parent / "parts").is_dir():
+        source = source.parent
+    if source.is_dir() and out in {None, source}:
+        return isiw.studies.open_store(source)
+    plan = isiw.studies.load_study(source / "study.toml" if source.is_dir() else source)
+    return isiw.studies.begin_store(plan, out or source.with_name(f"{source.stem}.study"))
 
 
 @contextmanager

@@ -219,12 +219,15 @@ class Study:
 
 
 def load_study(path: str | Path) -> Study:
-    """Read a study from a TOML file.
+    """Read a study from a TOML file; that of a folder of results will do, too.
 
     Raises:
         ConfigError: it cannot be read, or has an unknown key or a bad value; the message names file, key and value.
     """
-    return study_from(read_toml(path), str(path))
+    values = read_toml(path)
+    for of_the_folder in ("checksum", "versions"):
+        values.pop(of_the_folder, None)
+    return study_from(values, str(path))
 
 
 def _several(values: Any) -> tuple[Any, ...]:
