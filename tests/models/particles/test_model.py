@@ -350,7 +350,7 @@ def test_invalid_moves_are_refused(wrong: dict[str, Any]) -> None:
 def test_mutual_information_agrees_with_brute_force_within_its_error(isi_ms: float) -> None:
     # 25600 MEPs drawn from the law itself, each weighed under its own sample and under all 128; three standard errors.
     posterior = after(ParticleModel(thinned=128), [(100.0, 0.01), (250.0, 0.09), (280.0, 0.12), (400.0, 0.012)])
-    person = posterior._thinned.person  # noqa: SLF001 - the samples that the score is of
+    person = posterior.sample.person
     draws, samples = 200, person.present.shape[1]
     level = levels(person, torch.tensor([[isi_ms]]))
     gain = log_gain(person.response, torch.tensor([float(posterior.trials)]))

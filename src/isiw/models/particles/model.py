@@ -15,13 +15,13 @@ from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import levels
 from isiw.models.particles.noise import Response, draw_log_mep, log_gain, recruits
+from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Person, Prior
 from isiw.models.particles.shapes import Shape
 from isiw.models.particles.swarm import Moving, Swarm, taken
 from isiw.models.protocol import Observation, SimulatedPerson, Tensor
 from isiw.models.randomness import SIMULATED, step_generator, systematic
-from isiw.models.shared.history import observed
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Enhancement, Window, WindowEstimate
@@ -89,7 +89,7 @@ class ParticleModel:
 
     def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The posterior after one more trial."""
-        after = self.reweighted(posterior, observation)
+        after = posterior.told(observation)
         generator = step_generator(self.device, posterior.seed, after.trials)
         target = WindowTarget(self.prior, posterior.space)
         return replace(after, swarm=after.swarm.moved(target, self.moves, generator))
@@ -106,20 +106,9 @@ class ParticleModel:
         window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
         return SimulatedPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
 
-    def reweighted(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
-        """The same particles, weighted by one more trial as well.
-
-        Args:
-            posterior: what is believed before it.
-            observation: the trial.
-        """
-        known = self.detection_limit_mv, self.response_threshold_mv
-        trial = observed(observation, *known, order=posterior.trials).to(self.device, torch.float32)
-        return replace(posterior, swarm=posterior.swarm.told(trial, posterior.person))
-
 
 @dataclass(frozen=True, eq=False)
-class ParticlePosterior:
+class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
     """What is believed about b people.
 
     Args:
@@ -128,21 +117,6 @@ class ParticlePosterior:
         seed: seed of all randomness.
         swarm: the particles.
     """
-
-    model: ParticleModel
-    space: DesignSpace
-    seed: int
-    swarm: Swarm[Latents]
-
-    @property
-    def trouble(self) -> str | None:
-        """What is wrong with the particles; see `ReportsTrouble`."""
-        return self.swarm.trouble
-
-    @property
-    def trials(self) -> int:
-        """How many trials of each person it has been told."""
-        return self.swarm.trials
 
     @cached_property
     def person(self) -> Person:
@@ -157,39 +131,16 @@ class ParticlePosterior:
         return replace(self, swarm=self.swarm.times(torch.where(latents.present, ratio, 0.0)))
 
     @cached_property
-    def _thinned(self) -> PersonSample:
+    def sample(self) -> PersonSample:
+        """The particles that represent all of them where every candidate ISI is scored."""
         picks = systematic(self.swarm.log_weights, self.model.thinned)
         return PersonSample(_each(self.person, lambda x: taken(x, picks)), self.space, self.trials)
 
-    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
-        """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
-        return self._thinned.outcome_mass(isi_ms.to(self.swarm.log_weights.device))
-
-    def window_masks(self, isi_ms: Tensor) -> Tensor:
-        """Sampled windows; see `SamplesWindows`."""
-        return self._thinned.window_masks(isi_ms.to(self.swarm.log_weights.device))
-
-    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
-        """Sampled profiles; see `SamplesProfiles`."""
-        return self._thinned.expected_mep_mv(isi_ms.to(self.swarm.log_weights.device))
-
-    def baselines_mv(self) -> Tensor:
-        """Sampled baselines; see `SamplesProfiles`."""
-        return self._thinned.baselines_mv()
-
-    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> ParticlePosterior:
-        """The same particles, weighted by an imagined trial; see `Conditions`."""
-        return self.model.reweighted(self, Observation.of(isi_ms, mep_mv))
-
-    def log_evidence(self) -> Tensor:
-        """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
-        return self.swarm.evidence
-
     def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
         """Between which amplitudes the next MEP lies; see `PredictsMeps`."""
-        isi_ms = profile_grid(self.space).to(self.swarm.log_weights.device)
+        isi_ms = profile_grid(self.space).to(self.device)
         shares = 0.5 + 0.5 * torch.tensor([-level, level], device=isi_ms.device)
-        low_mv, high_mv = self._thinned.mep_quantiles_mv(isi_ms, shares)[person].T.double().cpu().numpy()
+        low_mv, high_mv = self.sample.mep_quantiles_mv(isi_ms, shares)[person].T.double().cpu().numpy()
         return low_mv, high_mv
 
     def estimate(self, person: int = 0) -> WindowEstimate:
@@ -199,7 +150,7 @@ class ParticlePosterior:
         latents = Latents(*(taken(x[one], picks) for x in self.swarm.latents))
         sample = PersonSample(self.model.prior.person(latents), self.space)
         grid = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=latents.values.device)
-        thinned = PersonSample(_each(self._thinned.person, lambda x: x[one]), self.space)
+        thinned = PersonSample(_each(self.sample.person, lambda x: x[one]), self.space)
         profiles_mv = thinned.expected_mep_mv(profile_grid(self.space).to(grid.device))
         profiles = SampledProfiles(profiles_mv[0], thinned.baselines_mv()[0])
         hypotheses = SampledHypotheses(self.model.prior.hypothesis(latents)[0], self.model.prior.hypotheses)

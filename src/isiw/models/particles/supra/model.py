@@ -13,6 +13,7 @@ import torch
 
 from isiw.checks import MOST_OF_A_KIND, check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.prior import Person
 from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
@@ -20,7 +21,6 @@ from isiw.models.particles.supra.prior import SupraLatents, SupraPrior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.randomness import step_generator
-from isiw.models.shared.history import observed
 from isiw.models.windows import SampledProfiles, best_window, profile_grid, sampled_estimate
 from isiw.window import WindowEstimate
 
@@ -68,25 +68,14 @@ class SupraModel:
 
     def update(self, posterior: SupraPosterior, observation: Observation) -> SupraPosterior:
         """The posterior after one more trial."""
-        after = self.reweighted(posterior, observation)
+        after = posterior.told(observation)
         generator = step_generator("cpu", posterior.seed, after.trials)
         target = SupraTarget(self.prior, posterior.space)
         return replace(after, swarm=after.swarm.moved(target, self.moves, generator))
 
-    def reweighted(self, posterior: SupraPosterior, observation: Observation) -> SupraPosterior:
-        """The same particles, weighted by one more trial as well.
-
-        Args:
-            posterior: what is believed before it.
-            observation: the trial.
-        """
-        known = self.detection_limit_mv, self.response_threshold_mv
-        trial = observed(observation, *known, order=posterior.trials).to("cpu", torch.float32)
-        return replace(posterior, swarm=posterior.swarm.told(trial, posterior.person))
-
 
 @dataclass(frozen=True, eq=False)
-class SupraPosterior:
+class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
     """What is believed about b people.
 
     Args:
@@ -96,69 +85,31 @@ class SupraPosterior:
         swarm: the particles.
     """
 
-    model: SupraModel
-    space: DesignSpace
-    seed: int
-    swarm: Swarm[SupraLatents]
-
-    @property
-    def trouble(self) -> str | None:
-        """What is wrong with the particles; see `ReportsTrouble`."""
-        return self.swarm.trouble
-
-    @property
-    def trials(self) -> int:
-        """How many trials of each person it has been told."""
-        return self.swarm.trials
-
     @cached_property
     def person(self) -> Person:
         """What the particles mean."""
         return self.model.prior.person(self.swarm.latents)
 
-    def _sample(self, size: int, order: int) -> SupraSample:
-        return SupraSample(self.model.prior.person(self.swarm.picked(size)), self.space, order)
-
     @cached_property
-    def _thinned(self) -> SupraSample:
+    def sample(self) -> SupraSample:
+        """The particles that represent all of them where every candidate ISI is scored."""
         return self._sample(self.model.thinned, self.trials)
 
     @cached_property
     def _all(self) -> SupraSample:
         return self._sample(self.model.particles, 0)
 
-    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
-        """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
-        return self._thinned.outcome_mass(isi_ms)
-
-    def window_masks(self, isi_ms: Tensor) -> Tensor:
-        """Sampled windows; see `SamplesWindows`."""
-        return self._thinned.window_masks(isi_ms)
+    def _sample(self, size: int, order: int) -> SupraSample:
+        return SupraSample(self.model.prior.person(self.swarm.picked(size)), self.space, order)
 
     def depressed_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled depressed segments; see `SamplesDepression`."""
-        return self._thinned.depressed_masks(isi_ms)
-
-    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
-        """Sampled profiles; see `SamplesProfiles`."""
-        return self._thinned.expected_mep_mv(isi_ms)
-
-    def baselines_mv(self) -> Tensor:
-        """Sampled baselines; see `SamplesProfiles`."""
-        return self._thinned.baselines_mv()
-
-    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> SupraPosterior:
-        """The same particles, weighted by an imagined trial; see `Conditions`."""
-        return self.model.reweighted(self, Observation.of(isi_ms, mep_mv))
-
-    def log_evidence(self) -> Tensor:
-        """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
-        return self.swarm.evidence
+        return self.sample.depressed_masks(isi_ms)
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person, and the segment in which the tap depresses the MEP."""
         grid = torch.tensor(self.space.grid_ms, dtype=torch.float32)
-        profiles_mv, baselines_mv = self._thinned.expected_mep_mv(profile_grid(self.space)), self.baselines_mv()
+        profiles_mv, baselines_mv = self.sample.expected_mep_mv(profile_grid(self.space)), self.baselines_mv()
         profiles = SampledProfiles(profiles_mv[person], baselines_mv[person])
         estimate = sampled_estimate(self._all.window_masks(grid)[person], profiles, self.space)
         depressed = self._all.depressed_masks(grid)[person]
