@@ -70,6 +70,7 @@ def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv: list[float], kind
         [0.008, 0.01, 0.009, 1.5, 0.9, 1.2],
         [0.0027, 0.0008, 0.002],
         [0.08, 5.0, 2.0, 0.1],
+        [2.4, 3.6, 2.9],
     ],
 )
 def test_usual_amplitudes_are_not_doubted(meps_mv: list[float]) -> None:

@@ -38,7 +38,7 @@ AT_REST_MV = 2e-3
 """EMG at rest has hardly ever less, since the noise of electrodes and amplifier alone has a few µV peak-to-peak; an MEP
 of up to 2 mV that is told in V has less."""
 
-SMALL_MV, LARGE_MV = 8e-4, 2.0
+SMALL_MV, LARGE_MV = 8e-4, 4.0
 """Of several in a row, the largest is never smaller, and their geometric mean is hardly ever larger from the start."""
 
 JUMP = 300.0
@@ -231,7 +231,7 @@ def _doubt_of_scale(earlier: Sequence[float], last: Sequence[float]) -> Doubt | 
     if usual_mv < LARGE_MV:
         return None
     if not earlier:
-        text = f"The first {IN_A_ROW} amplitudes are {usual_mv:.2g} mV in the mean, large for any muscle."
+        text = f"The first {IN_A_ROW} amplitudes are {usual_mv:.2g} mV in the mean, more than most muscles give."
         return Doubt(DoubtKind.LARGE, f"{text} Are they in µV? Divide by 1000.")
     before_mv = statistics.median(earlier)
     if usual_mv < JUMP * before_mv:
