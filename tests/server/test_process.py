@@ -50,6 +50,23 @@ def test_a_killed_server_loses_nothing_and_a_new_one_resumes_by_the_id(tmp_path:
     assert "came too late" in record.events[-1].text
 
 
+def test_a_session_whose_server_was_killed_can_be_closed_at_once_and_its_log_is_finished(tmp_path: Path) -> None:
+    with server(tmp_path) as (process, url), client_at(url) as client:
+        session = created(client)
+        told(client, session, 2)
+        done(client.post(f"{session}/ask"))
+        process.kill()
+        process.wait()
+    with client_of(tmp_path) as client:
+        for _ in range(2):
+            closed = done(client.post(f"{session}/close"))
+            assert (closed["open"], closed["trials"], closed["open_trial"]) == (False, 3, None)
+    record = read_session(tmp_path / "P07.mcap")
+    assert record.finished
+    assert [trial.reason for trial in record.table] == [None, None, "outcome unknown"]
+    assert not (tmp_path / "P07.mcap.part").exists()
+
+
 @pytest.mark.slow
 def test_a_server_that_is_told_to_end_closes_its_logs(tmp_path: Path) -> None:
     with server(tmp_path) as (process, url), client_at(url) as client:

@@ -123,13 +123,17 @@ class Sessions:
     def close(self, name: str) -> SessionAnswer:
         """Close a session; one that is closed already stays so.
 
+        One that was open when its server was killed is resumed first, so that its log is finished, too.
+
         Args:
             name: its id.
 
         Raises:
             Refusal: there is no such session, or it is busy.
-            LogError: its log cannot be closed.
+            IsiwError: its log cannot be closed, or, after a server was killed, not gone on with.
         """
+        if name not in self._open and part_of(self._existing(name)).exists():
+            self.resume(name)
         with suppress(_NotOpenError), self._driving_if_open(name) as session:
             return session.close()
         return self.stands(name)
