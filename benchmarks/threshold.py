@@ -106,7 +106,7 @@ def threshold_row(cohort: str, way: Way, n: int, seed: int) -> dict[str, object]
         "mean error": f"{error.mean():.2f} ± {error.sem():.2f}",
         "95th percentile": f"{error.quantile(0.95):.2f}",
         "bias": f"{rows['error'].mean():+.2f}",
-        "90 % interval has the truth": "–" if rows["covered"].isna().all() else f"{rows['covered'].mean():.2f}",
+        "90 % interval contains it": "–" if rows["covered"].isna().all() else f"{rows['covered'].mean():.2f}",
         "no number": int(error.isna().sum()),
     }
 

@@ -66,7 +66,7 @@ def test_a_tense_muscle_is_not_at_rest_where_the_trial_was_lost_for_another_reas
 def test_a_device_that_only_repeats_what_was_wanted_is_not_taken_for_exact(record: SessionRecord) -> None:
     _, said, detail = answer(record, "timing")
     assert said == "as the device says"
-    assert "no time of a pulse or a hit to check that by" in detail
+    assert "no pulse or hit time to check it against" in detail
 
 
 def test_a_muscle_that_was_never_at_rest_is_not_unknown(record: SessionRecord) -> None:

@@ -79,7 +79,9 @@ def test_usual_amplitudes_are_not_doubted(meps_mv: list[float]) -> None:
 
 @pytest.mark.parametrize("meps_mv", [[0.0011], [0.0, 0.0015, 0.0012]])
 def test_pulses_whose_amplitudes_are_all_below_the_emg_at_rest_may_be_in_volts(meps_mv: list[float]) -> None:
-    assert "Is it in V?" in (implausible_scale(meps_mv) or "")
+    slip = implausible_scale(meps_mv)
+    assert slip is not None
+    assert "Is it in V?" in slip.remedy
 
 
 @pytest.mark.parametrize("meps_mv", [[], [0.0], [0.002], [0.008, 0.0005], [0.0005, 0.008]])

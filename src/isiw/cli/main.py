@@ -84,7 +84,7 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
     ] = None,
     after: Annotated[
         list[Path] | None,
-        typer.Option(help="The log of an earlier session of the same person; of several, the first one first."),
+        typer.Option(help="The log of an earlier session of the same person; repeat it for several, earliest first."),
     ] = None,
     day: Annotated[
         int | None, typer.Option(help="The number of the person's visit, for the log.", **NO_DEFAULT)
@@ -117,9 +117,9 @@ def resume(
     data: Data = None,
     lost_pulses: Annotated[
         int | None,
-        typer.Option(help="Where the log's end is missing: the pulses given that are not in it.", **NO_DEFAULT),
+        typer.Option(help="If the end of the log is missing: how many pulses it lacks.", **NO_DEFAULT),
     ] = None,
-    verify: Annotated[bool, typer.Option(help="Check that the strategy asks again what the log says it asked.")] = True,  # noqa: FBT002 - a flag of the command line
+    verify: Annotated[bool, typer.Option(help="Check that the strategy chooses the same ISIs as in the log.")] = True,  # noqa: FBT002 - a flag of the command line
     live: Live = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Go on with a session that was interrupted: in its space and with its strategy, within the limits of CONFIG."""

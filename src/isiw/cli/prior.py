@@ -28,7 +28,7 @@ LabFile = Annotated[Path, typer.Argument(help="A lab's prior (TOML).", **NO_DEFA
 def learn(
     logs: Annotated[list[Path], typer.Argument(help="The logs of sessions, one a person.", **NO_DEFAULT)],
     output: Annotated[Path, typer.Option("--output", "-o", help="Where to: .toml")],
-    again: Annotated[bool, typer.Option(help="Take further sessions of a person as further people.")] = False,  # noqa: FBT002 - a flag
+    again: Annotated[bool, typer.Option(help="Count a second session of the same person as another person.")] = False,  # noqa: FBT002 - a flag
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 0,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag
 ) -> None:

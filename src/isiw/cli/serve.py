@@ -21,7 +21,7 @@ TOKEN = "ISIW_TOKEN"  # noqa: S105 - the variable's name
 @app.command()
 def serve(
     folder: Annotated[Path, typer.Argument(help="Where the logs are; made where it is missing.", **NO_DEFAULT)],
-    host: Annotated[str, typer.Option(help="The address to listen at; another than this needs TLS.")] = "127.0.0.1",
+    host: Annotated[str, typer.Option(help="The address to listen on; any but 127.0.0.1 needs TLS.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="The port; 0 for any that is free.")] = 8473,
     token_file: Annotated[
         Path | None,

@@ -46,7 +46,7 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
     subject: Annotated[str | None, typer.Option(help="The person's code, for the log.", **NO_DEFAULT)] = None,
     cohort: Annotated[
         str | None,
-        typer.Option(help="Of a simulated person: whose recruitment curve; default recruitment.", **NO_DEFAULT),
+        typer.Option(help="The cohort that a simulated person comes from; default recruitment.", **NO_DEFAULT),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Of a simulated person; default 0.", **NO_DEFAULT)] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the log, as it was begun.")] = False,  # noqa: FBT002 - a flag

@@ -165,7 +165,7 @@ def _what_it_is(record: SessionRecord) -> dict[str, Any]:
 
 def _what_came_of_it(record: SessionRecord) -> dict[str, Any]:
     counts = {
-        "delivered": len(record.table) + len(record.unknown),
+        "delivered": record.given,
         "told": len(record.table.told),
         "mistrials": sum(trial.reason is not None for trial in record.table),
     }

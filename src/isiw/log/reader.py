@@ -36,7 +36,7 @@ from isiw.signals.plausibility import is_silent
 from isiw.strategy.stopping import StopDecision
 from isiw.text.found import lacking
 from isiw.text.toml_files import parsed
-from isiw.trials import Channel, Trial, TrialTable
+from isiw.trials import Channel, Stimulus, Trial, TrialTable
 
 __all__ = ["Records", "SessionRecord", "of_production", "read_any", "read_salvaged", "read_session", "require_records"]
 
@@ -162,6 +162,16 @@ class SessionRecord:
         return tuple(
             intents.get(number, Intent(trial=number, isi_ms=None)) for number in range(last + 1) if number not in known
         )
+
+    @property
+    def unknown_trials(self) -> tuple[Trial, ...]:
+        """The mistrials that `unknown` stimuli are."""
+        return tuple(Trial.unknown(Stimulus(lost.trial, lost.isi_ms, lost.tap_alone)) for lost in self.unknown)
+
+    @property
+    def given(self) -> int:
+        """How many stimuli were delivered, or may have been."""
+        return len(self.table) + len(self.unknown)
 
     def sweep(self, trial: int) -> dict[str, Channel]:
         """The waveforms of one trial, by channel."""

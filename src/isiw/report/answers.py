@@ -42,15 +42,10 @@ def answers(record: SessionRecord) -> list[Answer]:
 
 
 def _lost(record: SessionRecord) -> Answer:
-    given, lost = _given(record), [str(number) for number, *_ in lost_rows(record)]
+    given, lost = record.given, [str(number) for number, *_ in lost_rows(record)]
     named = ", ".join(lost[:MOST_NAMED]) + (f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else "")
     answer = f"{len(lost)} of {given}: {'trial' if len(lost) == 1 else 'trials'} {named}" if lost else "none"
     return Answer("Which trials were lost, and why?", answer, counts_sentence(record))
-
-
-def _given(record: SessionRecord) -> int:
-    """How many stimuli were given, or may have been."""
-    return len(record.table) + len(record.unknown)
 
 
 def _timing(record: SessionRecord) -> Answer:
@@ -65,7 +60,7 @@ def _timing(record: SessionRecord) -> Answer:
             f"No trial that counts has a realised ISI. {_listed(rejected)}",
         )
     if not any(errors_ms) and not is_timed:
-        detail = "It reports every ISI as it was wanted, and no time of a pulse or a hit to check that by."
+        detail = "The device reports every ISI exactly as commanded, and no pulse or hit time to check it against."
         answer = _verdict(record, len(rejected), 0) if rejected else "as the device says"
         return Answer(question, answer, f"{detail} {_listed(rejected)}")
     tolerance_ms = record.header.signals.tolerance_ms(record.header.space)
@@ -103,7 +98,7 @@ def _not_for(record: SessionRecord, reasons: frozenset[MistrialReason]) -> list[
 
 def _verdict(record: SessionRecord, wrong: int, known: int) -> str:
     """Whether it was right in all trials, as far as is known."""
-    given = _given(record)
+    given = record.given
     if wrong:
         return f"not in {wrong} of {given} trials"
     if not known:

@@ -38,7 +38,7 @@ def nothing_measured(record: SessionRecord) -> str | None:
     """
     if record.rests_on_data:
         return None
-    given, told = len(record.table) + len(record.unknown), len(record.table.told)
+    given, told = record.given, len(record.table.told)
     if record.is_silent:
         return f"{NO_MEP} The amplitudes of all {told} trials that count are 0. {_LOOK}"
     if told:

@@ -54,7 +54,7 @@ def _remark(trial: Trial) -> str:
         return f"accepted by the operator; had been: {trial.overruled}"
     if trial.reason is not None and trial.mep_mv is not None:
         return f"{1e3 * trial.mep_mv:.0f} µV were measured"
-    return "does not teach" if trial.tap_alone and trial.counts else ""
+    return "nothing is learnt from a tap alone" if trial.tap_alone and trial.counts else ""
 
 
 def lost_rows(record: SessionRecord) -> list[tuple[int, str, str]]:
@@ -64,13 +64,8 @@ def lost_rows(record: SessionRecord) -> list[tuple[int, str, str]]:
         record: the session.
     """
     said = {event.trial: event.text for event in record.events if event.kind == "exclusion"}
-    rows = [(t.index, asked(t), _why(t, said.get(t.index, ""))) for t in record.table if not t.counts]
-    rows += [(intent.trial, _isi(intent.isi_ms), "outcome unknown") for intent in record.unknown]
-    return sorted(rows)
-
-
-def _isi(isi_ms: float | None) -> str:
-    return "–" if isi_ms is None else f"{isi_ms:.4g} ms"
+    lost = [trial for trial in (*record.table, *record.unknown_trials) if not trial.counts]
+    return sorted((t.index, asked(t), _why(t, said.get(t.index, ""))) for t in lost)
 
 
 def _why(trial: Trial, said: str) -> str:
@@ -99,7 +94,7 @@ def counted_rows(record: SessionRecord) -> list[Counted]:
     unknown = sum(trial.reason is MistrialReason.OUTCOME_UNKNOWN for trial in record.table) + len(record.unknown)
     shortest_s = _shortest_s(record)
     return [
-        Counted("stimuli delivered", f"{len(record.table) + len(record.unknown)}", f"at most {limits.max_pulses}"),
+        Counted("stimuli delivered", f"{record.given}", f"at most {limits.max_pulses}"),
         Counted("of them with an unknown outcome", f"{unknown}", ""),
         Counted("shortest time between two stimuli", "not known" if shortest_s is None else f"{shortest_s:.2f} s",
                 f"at least {limits.min_iti_s:g} s"),

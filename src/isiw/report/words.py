@@ -18,7 +18,6 @@ from isiw.session.progress import asked, outcome
 from isiw.session.recorder import OWN_LOOP
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.text.found import SURE, rules_out
-from isiw.trials import Stimulus, Trial
 from isiw.window import MIN_EXCESS_MV, Window
 
 __all__ = [
@@ -245,7 +244,7 @@ def counts_sentence(record: SessionRecord) -> str:
     unknown = len(record.unknown)
     if unknown:
         mistrials["outcome unknown"] += unknown
-    told, given = len(record.table.told), len(record.table) + unknown
+    told, given = len(record.table.told), record.given
     pairs = "1 pair of stimuli was delivered" if given == 1 else f"{given} pairs of stimuli were delivered"
     if controls := _controls(record):
         pairs = f"{given} stimuli were delivered, {controls} among them"
@@ -310,8 +309,7 @@ def trial_rows(record: SessionRecord) -> list[tuple[str, ...]]:
     Args:
         record: the session.
     """
-    unknown = [Trial.unknown(Stimulus(intent.trial, intent.isi_ms, intent.tap_alone)) for intent in record.unknown]
-    trials = sorted([*record.table, *unknown], key=lambda trial: trial.index)
+    trials = sorted([*record.table, *record.unknown_trials], key=lambda trial: trial.index)
     return [(str(t.index), asked(t), outcome(t), _isi(t.isi_ms)) for t in trials]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 from isiw import checks
@@ -36,7 +36,7 @@ def learn(strategy: Strategy, trial: Trial) -> None:
         strategy.count_mistrial()
 
 
-def relearned(strategy: Strategy, trials: TrialTable) -> Strategy:
+def relearned(strategy: Strategy, trials: Iterable[Trial]) -> Strategy:
     """The same strategy, told all trials anew.
 
     Args:

@@ -12,11 +12,11 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent, StrategyRecipe
 from isiw.log.verdicts import VERDICTS, under
 from isiw.session.header import versions
-from isiw.session.journal import learn
+from isiw.session.journal import learn, relearned
 from isiw.strategy.catalogue import make_strategy, settings_for
 from isiw.strategy.strategy import Strategy
 from isiw.text import plain
-from isiw.trials import Stimulus, Trial, TrialTable
+from isiw.trials import Trial, TrialTable
 
 __all__ = ["Replayed", "replay", "resumption_text", "strategy_of", "warn_where_differing"]
 
@@ -86,10 +86,8 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
         elif isinstance(entry, Event) and entry.kind in VERDICTS:
             # In the order of telling, in which a trial that was lost stands behind later ones.
             told = [under(trial, entry) for trial in told]
-            strategy = strategy.restarted()
-            for trial in told:
-                learn(strategy, trial)
-    unknown = tuple(Trial.unknown(Stimulus(i.trial, i.isi_ms, i.tap_alone)) for i in record.unknown)
+            strategy = relearned(strategy, told)
+    unknown = record.unknown_trials
     for trial in unknown:
         learn(strategy, trial)
     table = TrialTable(tuple(sorted((*told, *unknown), key=lambda trial: trial.index)))

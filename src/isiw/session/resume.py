@@ -206,8 +206,7 @@ def with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> SessionR
         raise InvalidValueError(
             "lost_pulses is for a log whose end is missing, and this one's is there", got=lost_pulses
         )
-    known = len(record.table) + len(record.unknown)
-    return dataclasses.replace(record, delivered=known + lost_pulses)
+    return dataclasses.replace(record, delivered=record.given + lost_pulses)
 
 
 def _require_end(record: SessionRecord) -> None:

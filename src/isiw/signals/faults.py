@@ -207,7 +207,7 @@ def _fault_of_level(trial: Trial) -> Fault | None:
         )
     wrong = None if trial.mep_mv is None else implausible_amplitude(trial.mep_mv)
     if trial.reason is MistrialReason.IMPLAUSIBLE and wrong is not None:
-        return Fault(f"the amplitude cannot be a MEP's: {wrong.partition('. ')[0]}", wrong.partition(". ")[2])
+        return Fault(*wrong)
     return None
 
 

@@ -11,6 +11,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final, NamedTuple
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
@@ -19,6 +20,7 @@ from isiw.text.found import ENOUGH_PAIRS
 __all__ = [
     "Doubt",
     "DoubtKind",
+    "Slip",
     "doubt_of",
     "doubts_of",
     "implausible_amplitude",
@@ -76,37 +78,36 @@ class Doubt:
     text: str
 
 
-def implausible_amplitude(mep_mv: float) -> str | None:
-    """Why an amplitude cannot be a MEP's in mV, and the likely slip; None where it can, as 0 always can.
+class Slip(NamedTuple):
+    """Why an amplitude cannot be true.
+
+    Args:
+        what: what is wrong, as a sentence without a full stop.
+        remedy: the likely slip and what to do, in full sentences.
+    """
+
+    what: str
+    remedy: str
+
+
+_NO_MEP: Final = "the amplitude cannot be an MEP's"
+_IN_VOLT: Final = "Is it in V? Multiply by 1000; an amplitude below the detection limit is 0."
+
+
+def implausible_amplitude(mep_mv: float) -> Slip | None:
+    """Why an amplitude cannot be an MEP's in mV, and the likely slip; None where it can, as 0 always can.
 
     Args:
         mep_mv: peak-to-peak amplitude [mV].
     """
     if 0 < mep_mv < SMALLEST_MV:
-        return (
-            f"{mep_mv:.2g} mV is less than any amplifier's noise. Is it in V? Multiply by 1000; "
-            "an amplitude below the detection limit is 0."
-        )
+        return Slip(f"{_NO_MEP}: {mep_mv:.2g} mV is less than any amplifier's noise", _IN_VOLT)
     if mep_mv > LARGEST_MV:
-        return f"{mep_mv:.4g} mV is more than any muscle gives. Is it in µV? Divide by 1000."
+        return Slip(f"{_NO_MEP}: {mep_mv:.4g} mV is more than any muscle gives", "Is it in µV? Divide by 1000.")
     return None
 
 
-def require_amplitude(mep_mv: float) -> None:
-    """Refuse an amplitude that no muscle gives.
-
-    Args:
-        mep_mv: peak-to-peak amplitude [mV].
-
-    Raises:
-        InvalidValueError: it cannot be a MEP's in mV.
-    """
-    if (wrong := implausible_amplitude(mep_mv)) is not None:
-        what, _, remedy = wrong.partition(". ")
-        raise InvalidValueError(f"the amplitude cannot be a MEP's: {what}", got=mep_mv, remedy=remedy)
-
-
-def implausible_scale(meps_mv: Sequence[float]) -> str | None:
+def implausible_scale(meps_mv: Sequence[float]) -> Slip | None:
     """Why amplitudes of single pulses to a muscle at rest cannot be in mV, and the likely slip; None where they can.
 
     Once one of them is as large as EMG at rest the scale is believed, and smaller ones may be a quiet sweep.
@@ -117,10 +118,22 @@ def implausible_scale(meps_mv: Sequence[float]) -> str | None:
     largest_mv = max(meps_mv, default=0.0)
     if not 0 < largest_mv < AT_REST_MV:
         return None
-    return (
-        f"{largest_mv:.2g} mV is less than EMG at rest has. Is it in V? Multiply by 1000; "
-        "an amplitude below the detection limit is 0."
-    )
+    return Slip(f"{_NO_MEP}: {largest_mv:.2g} mV is less than EMG at rest has", _IN_VOLT)
+
+
+def require_amplitude(mep_mv: float, slip: Slip | None = None) -> None:
+    """Refuse an amplitude that no muscle gives.
+
+    Args:
+        mep_mv: peak-to-peak amplitude [mV].
+        slip: what else is known to be wrong with it.
+
+    Raises:
+        InvalidValueError: it cannot be an MEP's in mV.
+    """
+    slip = implausible_amplitude(mep_mv) or slip
+    if slip is not None:
+        raise InvalidValueError(slip.what, got=mep_mv, remedy=slip.remedy)
 
 
 def off_by(isi_ms: float, asked_ms: float, space: DesignSpace) -> bool:

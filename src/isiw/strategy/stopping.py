@@ -177,7 +177,7 @@ class NoWindow:
         absent = 1.0 - progress.estimate.probability
         if absent >= self.probability:
             return StopDecision(stop=True, reason=f"There is no window, with probability {absent:.2f}.")
-        return StopDecision(stop=False, reason=f"No window has probability {absent:.2f}.")
+        return StopDecision(stop=False, reason=f"The probability that there is no window is {absent:.2f}.")
 
 
 @dataclass(frozen=True)
@@ -205,10 +205,10 @@ class ExpectedF1:
             return StopDecision(stop=False, reason="The F1 to be expected is not known.")
         if estimate.too_little is not None:
             return StopDecision(stop=False, reason=estimate.too_little)
-        expected = f"an F1 of {estimate.expected_f1:.2f} is expected"
+        expected = f"an expected F1 of {estimate.expected_f1:.2f}"
         if self.f1 < 1.0 and estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
-            return StopDecision(stop=True, reason=f"The window is known: {expected}.")
-        return StopDecision(stop=False, reason=f"Of the window as it is known, {expected}.")
+            return StopDecision(stop=True, reason=f"The window is known, with {expected}.")
+        return StopDecision(stop=False, reason=f"The window as it is known so far has {expected}.")
 
 
 @dataclass(frozen=True)

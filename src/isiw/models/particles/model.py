@@ -95,7 +95,7 @@ class ParticleModel:
         return replace(after, swarm=after.swarm.moved(target, self.moves, generator))
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
-        """Draw one person from the prior, and a MEP at each ISI; see `SimulatesPeople`."""
+        """Draw one person from the prior, and an MEP at each ISI; see `SimulatesPeople`."""
         generator = step_generator(self.device, seed, SIMULATED)
         person = self.prior.person(self.prior.sample(1, 1, generator, space))
         isis_ms = torch.as_tensor(isi_ms, dtype=torch.float32, device=self.device).unsqueeze(0)

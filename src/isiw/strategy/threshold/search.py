@@ -8,8 +8,7 @@ from dataclasses import asdict, is_dataclass
 from typing import Any, Final
 
 from isiw.checks import choice, number
-from isiw.errors import InvalidValueError
-from isiw.signals.plausibility import implausible_amplitude, implausible_scale
+from isiw.signals.plausibility import implausible_scale, require_amplitude
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.bayes import BayesThreshold
 from isiw.strategy.threshold.hunting import MaximumLikelihood
@@ -25,7 +24,7 @@ from isiw.strategy.threshold.pulses import (
 from isiw.strategy.threshold.relative import FiveOfTen
 from isiw.text.toml_files import checked
 
-__all__ = ["METHODS", "ThresholdSearch", "list_threshold_methods", "make_threshold_search", "require_plausible"]
+__all__ = ["METHODS", "ThresholdSearch", "list_threshold_methods", "make_threshold_search"]
 
 METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen]]] = {
     "bayes": BayesThreshold,
@@ -56,24 +55,6 @@ def make_threshold_search(name: str, space: IntensityRange, **settings: Any) -> 
     """
     choice("the method", name, METHODS)
     return ThresholdSearch(name, checked(METHODS[name], settings, f"the settings of {name}"), space)
-
-
-def require_plausible(mep_mv: float) -> None:
-    """Raise where an amplitude cannot be an MEP's.
-
-    Args:
-        mep_mv: the amplitude [mV].
-
-    Raises:
-        InvalidValueError: it cannot; the message names the likely slip of unit.
-    """
-    _refuse(mep_mv, implausible_amplitude(number("mep_mv", mep_mv, least=0)))
-
-
-def _refuse(mep_mv: float, wrong: str | None) -> None:
-    if wrong is not None:
-        what, _, remedy = wrong.partition(". ")
-        raise InvalidValueError(f"the amplitude cannot be an MEP's: {what}", got=mep_mv, remedy=remedy)
 
 
 class ThresholdSearch:
@@ -134,9 +115,9 @@ class ThresholdSearch:
         """
         self.space.require(intensity_pct_mso)
         if mep_mv is not None:
-            require_plausible(mep_mv)
+            mep_mv = number("mep_mv", mep_mv, least=0)
             told_mv = [pulse.mep_mv for pulse in self.pulses if pulse.mep_mv is not None]
-            _refuse(mep_mv, implausible_scale([*told_mv, mep_mv]))
+            require_amplitude(mep_mv, implausible_scale([*told_mv, mep_mv]))
         return Pulse(intensity_pct_mso, mep_mv, response)
 
     def estimate(self) -> ThresholdEstimate:
