@@ -15,7 +15,14 @@ from isiw.studies import Failure, Processes
 from isiw.subjects import SimulatedSubject
 
 
-def logged_session(subject: SimulatedSubject, name: str, seed: int, trials: int, folder: Path) -> Path:
+def logged_session(
+    subject: SimulatedSubject,
+    name: str,
+    seed: int,
+    trials: int,
+    folder: Path,
+    hit_delay_ms: tuple[float, float] | None = None,
+) -> Path:
     """Run a session of so many trials with the default, from the valve command, and return its log.
 
     Args:
@@ -24,11 +31,12 @@ def logged_session(subject: SimulatedSubject, name: str, seed: int, trials: int,
         seed: of the trials and the strategy.
         trials: how many.
         folder: where the log is written.
+        hit_delay_ms: what the rig states of it, mean and SD [ms]; None where it states nothing.
     """
     respond = partial(subject.begin(seed).respond, reference="valve")
-    device = isiw.SimulatedDevice(isiw.SimulatedPerson(respond, "valve"))
+    device = isiw.SimulatedDevice(isiw.SimulatedPerson(respond, "valve", hit_delay_ms=hit_delay_ms))
     never = {"stop_width_ms": 1e-3, "stop_no_window": 1.0, "stop_expected_f1": 1.0, "stop_gain": 0.0}
-    strategy = isiw.make_strategy(seed=seed, max_trials=trials, **never)
+    strategy = isiw.make_strategy(seed=seed, max_trials=trials, hit_delay_ms=hit_delay_ms, **never)
     return isiw.Session(device, strategy, log=folder / f"{name}.mcap", subject=name).run().log
 
 

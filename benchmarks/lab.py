@@ -1,10 +1,11 @@
 """The eleventh person of a lab: what ten sessions of its own people are worth.
 
     python benchmarks/lab.py --labs 20 --seed 100000 --out benchmarks/results/lab
+    python benchmarks/lab.py --labs 20 --seed 100000 --stated --out benchmarks/results/lab_stated
 
 In each lab ten people are measured with the default, and a prior is learnt from their logs; then other people of the
 lab, and people who do not belong there, are measured with the built-in prior, with the learnt one, and with a prior
-that was told the lab's law.
+that was told the lab's law. With `--stated` the lab's rig states its hit delay, in earlier sessions and in later ones.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ import typer
 import isiw
 from acquisition import facts_of
 from earlier import logged_session, measured, write
-from isiw.models.particles.laws import Floor, Muscle, NoiseShares, ShapeShares
+from isiw.models.particles.laws import Floor, Muscle, NoiseShares
 from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
+from isiw.models.particles.profile import ShapeShares
 from isiw.models.shared.scales import Scale
 from isiw.priors import LabPrior
 from isiw.studies import SimulatedSession, simulate
@@ -45,6 +47,7 @@ class Unit:
         people: how many are measured then.
         misfits: how many people of `odd` are measured then.
         trials: of each session that is measured then.
+        stated: whether the lab's rig states its hit delay.
     """
 
     name: str
@@ -52,6 +55,7 @@ class Unit:
     people: int
     misfits: int
     trials: int
+    stated: bool
 
 
 def told(law: Lab) -> Prior:
@@ -84,13 +88,15 @@ def told(law: Lab) -> Prior:
 def examine(unit: Unit) -> pd.DataFrame:
     """All sessions with later people of one lab; columns as in `isiw.studies.simulate`, and the kind of `people`."""
     torch.set_num_threads(1)
+    law = lab(unit.name, unit.seed)
+    hit_delay_ms = law.hit_delay_ms if unit.stated else None
     with tempfile.TemporaryDirectory() as folder:
         logs = [
-            logged_session(person, f"P{number}", unit.seed + number, EARLIER_TRIALS, Path(folder))
+            logged_session(person, f"P{number}", unit.seed + number, EARLIER_TRIALS, Path(folder), hit_delay_ms)
             for number, person in enumerate(cohort(unit.name, LEARNT, unit.seed))
         ]
         learnt = isiw.priors.learn(logs).joined()
-    priors = {"built-in": Prior(), "learnt": learnt, "told": told(lab(unit.name, unit.seed))}
+    priors = {"built-in": Prior(), "learnt": learnt, "told": told(law)}
     own = [(unit.name, number) for number in range(LEARNT, LEARNT + unit.people)]
     odd = [("odd", number) for number in range(unit.misfits)]
     marks = tuple(mark for mark in MARKS if mark <= unit.trials)
@@ -98,7 +104,14 @@ def examine(unit: Unit) -> pd.DataFrame:
     for label, prior in priors.items():
         for name, person in own + odd:
             session = SimulatedSession(
-                "default", name, person, unit.seed, unit.trials, marks, settings=(("prior", prior),), label=label
+                "default",
+                name,
+                person,
+                unit.seed,
+                unit.trials,
+                marks,
+                settings=(("prior", prior), ("hit_delay_ms", hit_delay_ms)),
+                label=label,
             )
             rows.append(simulate(session).assign(lab=unit.name, people="misfits" if name == "odd" else "own"))
     return pd.concat(rows, ignore_index=True)
@@ -112,19 +125,20 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
     return table.join(covered).reset_index()
 
 
-def main(
+def main(  # noqa: PLR0913, PLR0917 - the options of the command line
     kinds: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(LABS),
     labs: Annotated[int, typer.Option(help="Labs of each kind.")] = 20,
     people: Annotated[int, typer.Option(help="New people of each lab.")] = 10,
     misfits: Annotated[int, typer.Option(help="People of `odd` in each lab.")] = 5,
     trials: Annotated[int, typer.Option(help="Trials of each new session.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the first lab.")] = 100_000,
+    stated: Annotated[bool, typer.Option("--stated", help="The labs' rigs state their hit delay.")] = False,  # noqa: FBT002 - a flag of the command line
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("lab"),
 ) -> None:
     """Measure the eleventh person of a lab."""
     seeds = range(seed, seed + 100 * labs, 100)  # people have seeds of their own
-    units = [Unit(kind, s, people, misfits, trials) for kind in kinds.split(",") for s in seeds]
+    units = [Unit(kind, s, people, misfits, trials, stated) for kind in kinds.split(",") for s in seeds]
     rows = measured(examine, units, workers, out)
     write(summary(rows), facts_of("benchmarks/lab.py", seed, people), out)
 

@@ -15,10 +15,12 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ArrayLike", "BoolArray", "FloatArray", "IntArray", "Reference"]
+__all__ = ["ArrayLike", "BoolArray", "Conditioning", "FloatArray", "IntArray", "Reference"]
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
 
 Reference: TypeAlias = Literal["impact", "valve"]
+
+Conditioning: TypeAlias = Literal["tap", "electrical"]

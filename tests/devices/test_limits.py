@@ -78,22 +78,22 @@ def test_an_isi_off_the_grid_is_refused(isi_ms: float) -> None:
 
 
 def test_nothing_came_before_the_first_stimulus() -> None:
-    assert LIMITS.earliest_s([]) == -math.inf
+    assert LIMITS.earliest_s([], 100.0) == 105.0
 
 
 def test_after_a_whole_block_the_next_stimulus_waits_for_a_rest() -> None:
     limits = Limits(0, 200, min_iti_s=5.0, max_block_pulses=3, rest_s=60.0)
-    assert limits.earliest_s([0.0, 5.0]) == 10.0
-    assert limits.earliest_s([0.0, 5.0, 10.0]) == 70.0
-    assert limits.earliest_s([0.0, 5.0, 10.0, 70.0]) == 75.0
-    assert limits.earliest_s([0.0, 60.0, 65.0]) == 70.0  # the block began at 60 s
+    assert limits.earliest_s([0.0, 5.0], -100.0) == 10.0
+    assert limits.earliest_s([0.0, 5.0, 10.0], -100.0) == 70.0
+    assert limits.earliest_s([0.0, 5.0, 10.0, 70.0], -100.0) == 75.0
+    assert limits.earliest_s([0.0, 60.0, 65.0], -100.0) == 70.0  # the block began at 60 s
 
 
 def test_no_period_holds_more_stimuli_than_its_limit() -> None:
     limits = Limits(0, 200, min_iti_s=5.0, max_period_pulses=3, period_s=100.0)
-    assert limits.earliest_s([0.0, 5.0]) == 10.0
-    assert limits.earliest_s([0.0, 5.0, 10.0]) == 100.0
-    assert limits.earliest_s([0.0, 5.0, 10.0, 100.0]) == 105.0
+    assert limits.earliest_s([0.0, 5.0], -100.0) == 10.0
+    assert limits.earliest_s([0.0, 5.0, 10.0], -100.0) == 100.0
+    assert limits.earliest_s([0.0, 5.0, 10.0, 100.0], -100.0) == 105.0
 
 
 @pytest.mark.parametrize("coil_c", [None, 40.1, 99.0])

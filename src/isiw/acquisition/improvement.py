@@ -14,6 +14,7 @@ import numpy as np
 import torch
 
 from isiw.acquisition.lookahead import lookahead
+from isiw.acquisition.protocol import ForeseesProfiles
 from isiw.checks import check_numbers
 from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesProfiles, Tensor
 
@@ -27,10 +28,6 @@ __all__ = [
     "thompson",
     "upper_confidence_bound",
 ]
-
-
-class _ProfilePosterior(PredictsOutcomes, SamplesProfiles, Protocol):
-    """A posterior of profiles that predicts the next MEP."""
 
 
 class _CountedProfiles(Posterior, SamplesProfiles, Protocol):
@@ -83,7 +80,7 @@ def thompson(posterior: _CountedProfiles, isi_ms: Tensor, seed: int = 0) -> Tens
     return profiles[torch.arange(people), torch.as_tensor(rng.integers(samples, size=people))]
 
 
-def knowledge_gradient(posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
+def knowledge_gradient(posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
     """By how much the next MEP is expected to raise the largest posterior mean [mV], shape (b, t).
 
     Args:
@@ -150,6 +147,6 @@ class KnowledgeGradient:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
 
-    def __call__(self, posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
         return knowledge_gradient(posterior, isi_ms)

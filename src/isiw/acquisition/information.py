@@ -12,6 +12,7 @@ from typing import ClassVar, Protocol
 import torch
 
 from isiw.acquisition.lookahead import expected_variance_reduction
+from isiw.acquisition.protocol import ForeseesWindows
 from isiw.checks import check_wholes
 from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesDepression, SamplesWindows, Tensor
 
@@ -26,8 +27,8 @@ __all__ = [
 ]
 
 
-class _WindowPosterior(Posterior, PredictsOutcomes, SamplesWindows, Protocol):
-    """A posterior that has all that is needed here."""
+class _CountedWindows(Posterior, ForeseesWindows, Protocol):
+    """A posterior of windows that predicts the next MEP, and knows how many trials there were."""
 
 
 def _entropy(mass: Tensor) -> Tensor:
@@ -47,7 +48,7 @@ def mutual_information(posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
     return _entropy(mass.mean(dim=1)) - _entropy(mass).mean(dim=1)
 
 
-def window_information(posterior: _WindowPosterior, isi_ms: Tensor, cells: int = 5) -> Tensor:
+def window_information(posterior: ForeseesWindows, isi_ms: Tensor, cells: int = 5) -> Tensor:
     """Mutual information of the next MEP and the window alone [nat], shape (b, t).
 
     The window is described as precisely as the samples allow: the quantile cell of its start and of its end, or that
@@ -83,7 +84,7 @@ def _quantile_cell(edge: Tensor, found: Tensor, cells: int) -> Tensor:
     )
 
 
-def window_gain(posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+def window_gain(posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
     """Expected reduction of the summed variance of membership in the window, shape (b, t).
 
     Where a posterior has depressed segments too, membership in them counts as much.
@@ -126,7 +127,7 @@ class WindowInformation:
     def __post_init__(self) -> None:
         check_wholes(self, "cells", least=2)
 
-    def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
         return window_information(posterior, isi_ms, self.cells)
 
@@ -137,7 +138,7 @@ class WindowGain:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
-    def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
         return window_gain(posterior, isi_ms)
 
@@ -152,6 +153,6 @@ class Alternating:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
-    def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: _CountedWindows, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
         return mutual_information(posterior, isi_ms) if posterior.trials % 2 else window_gain(posterior, isi_ms)

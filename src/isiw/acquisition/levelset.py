@@ -8,11 +8,12 @@ Expected feasibility: [Bichon2008], here integrated over the range and one step 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import torch
 
 from isiw.acquisition.lookahead import lookahead
+from isiw.acquisition.protocol import ForeseesProfiles
 from isiw.checks import check_numbers
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, Tensor
 from isiw.window import EDGE_LEVEL
@@ -20,10 +21,6 @@ from isiw.window import EDGE_LEVEL
 __all__ = ["IntegratedFeasibility", "Straddle", "expected_feasibility", "integrated_feasibility_reduction", "straddle"]
 
 _INV_SQRT_2PI = 0.3989422804014327
-
-
-class _ProfilePosterior(PredictsOutcomes, SamplesProfiles, Protocol):
-    """A posterior of profiles that predicts the next MEP."""
 
 
 def _margins_mv(posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
@@ -67,7 +64,7 @@ def _density(z: Tensor) -> Tensor:
     return _INV_SQRT_2PI * torch.exp(-0.5 * z.square())
 
 
-def integrated_feasibility_reduction(posterior: _ProfilePosterior, isi_ms: Tensor, band_sd: float = 2.0) -> Tensor:
+def integrated_feasibility_reduction(posterior: ForeseesProfiles, isi_ms: Tensor, band_sd: float = 2.0) -> Tensor:
     """By how much the next MEP is expected to reduce the summed expected feasibility [mV], shape (b, t).
 
     Args:
@@ -125,6 +122,6 @@ class IntegratedFeasibility:
     def __post_init__(self) -> None:
         check_numbers(self, "band_sd", above=0)
 
-    def __call__(self, posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
         return integrated_feasibility_reduction(posterior, isi_ms, self.band_sd)

@@ -6,9 +6,17 @@ from typing import Any, Protocol, runtime_checkable
 
 import torch
 
-from isiw.models.protocol import Tensor
+from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
 
-__all__ = ["AcquisitionFunction", "best_candidate"]
+__all__ = ["AcquisitionFunction", "ForeseesProfiles", "ForeseesWindows", "best_candidate"]
+
+
+class ForeseesProfiles(PredictsOutcomes, SamplesProfiles, Protocol):
+    """A posterior of profiles that predicts the next MEP."""
+
+
+class ForeseesWindows(PredictsOutcomes, SamplesWindows, Protocol):
+    """A posterior of windows that predicts the next MEP."""
 
 
 @runtime_checkable

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import torch
 
 from isiw.acquisition.lookahead import expected_variance_reduction
+from isiw.acquisition.protocol import ForeseesWindows
 from isiw.checks import check_wholes
 from isiw.models.protocol import PredictsOutcomes, SamplesWindows, Tensor
 
 __all__ = ["TwoStep", "two_step_gain"]
-
-
-class _WindowPosterior(PredictsOutcomes, SamplesWindows, Protocol):
-    """A posterior of windows that predicts the next MEP."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +41,7 @@ class TwoStep:
     def __post_init__(self) -> None:
         check_wholes(self, "shortlist", "groups", "stride", least=1)
 
-    def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
         mass, masks = posterior.outcome_mass(isi_ms), posterior.window_masks(isi_ms)
         return two_step_gain(mass, masks, self.shortlist, self.groups, self.stride)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import torch
 
 from isiw.acquisition.lookahead import expected_variance_reduction
+from isiw.acquisition.protocol import ForeseesProfiles, ForeseesWindows
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
 
 __all__ = [
@@ -20,14 +21,6 @@ __all__ = [
 ]
 
 
-class _ProfilePosterior(PredictsOutcomes, SamplesProfiles, Protocol):
-    """A posterior of profiles that predicts the next MEP."""
-
-
-class _WindowPosterior(PredictsOutcomes, SamplesWindows, Protocol):
-    """A posterior of windows that predicts the next MEP."""
-
-
 def profile_variance(posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
     """Posterior variance of the expected MEP at each ISI [mV²], shape (b, t).
 
@@ -38,7 +31,7 @@ def profile_variance(posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
     return posterior.profiles_mv(isi_ms).var(dim=1, correction=0)
 
 
-def integrated_variance_reduction(posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
+def integrated_variance_reduction(posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
     """Expected reduction of the profile's variance, summed over the candidates [mV²], shape (b, t).
 
     The best ISI is the one of least integrated posterior variance: qNIPV of BoTorch with one point [Seo2000], for any
@@ -51,7 +44,7 @@ def integrated_variance_reduction(posterior: _ProfilePosterior, isi_ms: Tensor) 
     return expected_variance_reduction(posterior.outcome_mass(isi_ms), posterior.profiles_mv(isi_ms))
 
 
-def edge_variance_reduction(posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+def edge_variance_reduction(posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
     """Expected reduction of the summed variance of start and end of the window, given that there is one, shape (b, t).
 
     Edges are counted in candidates, so that the score does not depend on the range; an edge beyond the range counts as
@@ -89,7 +82,7 @@ class IntegratedVariance:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
 
-    def __call__(self, posterior: _ProfilePosterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
         return integrated_variance_reduction(posterior, isi_ms)
 
@@ -100,6 +93,6 @@ class EdgeVariance:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
-    def __call__(self, posterior: _WindowPosterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
         return edge_variance_reduction(posterior, isi_ms)

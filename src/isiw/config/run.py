@@ -268,7 +268,8 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
     log = config.log or fresh_log_path(config)
     device = device_for(config)
     info = device.describe()
-    settings = known_settings(config.strategy.name, {"hit_delay_ms": info.hit_delay_ms}) | _settings_for(config, info)
+    known = {"hit_delay_ms": info.hit_delay_ms, "conditioning": info.conditioning}
+    settings = known_settings(config.strategy.name, known) | _settings_for(config, info)
     return Session(
         device,
         make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),

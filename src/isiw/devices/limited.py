@@ -73,7 +73,7 @@ class LimitedDevice:
         self._delivered = delivered
         now_s = clock.now_s()
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
-        self._made_s, self._not_before_s = now_s, now_s + self._limits.min_iti_s
+        self._made_s = now_s
         self._staged = False
         self._one_at_a_time = threading.Lock()
 
@@ -94,8 +94,7 @@ class LimitedDevice:
 
     def wait_s(self) -> float:
         """How long until the interval, the rest and the period allow the next delivery [s]."""
-        earliest_s = max(self._not_before_s, self._limits.earliest_s(self._times_s))
-        return max(0.0, earliest_s - self._clock.now_s())
+        return max(0.0, self._limits.earliest_s(self._times_s, self._made_s) - self._clock.now_s())
 
     def check(self, stimulus: Stimulus) -> None:
         """Raise where this stimulus must not be delivered now.

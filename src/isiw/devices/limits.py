@@ -150,15 +150,16 @@ class Limits:
                 remedy="Nothing was delivered. Set the intensity back, then resume the session.",
             )
 
-    def earliest_s(self, times_s: Sequence[float]) -> float:
-        """When the next stimulus may come at the earliest [s]; minus infinity where any time will do.
+    def earliest_s(self, times_s: Sequence[float], since_s: float) -> float:
+        """When the next stimulus may come at the earliest [s].
 
         Args:
             times_s: when the earlier ones came [s], ascending, shape (n,).
+            since_s: when the session began, or went on [s]; it waits a whole interval before its first stimulus.
         """
         if not times_s:
-            return -math.inf
-        earliest = [times_s[-1] + self.min_iti_s]
+            return since_s + self.min_iti_s
+        earliest = [max(since_s, times_s[-1]) + self.min_iti_s]
         if self.max_block_pulses is not None and self._block_pulses(times_s) >= self.max_block_pulses:
             earliest.append(times_s[-1] + self.rest_s)
         if self.max_period_pulses is not None and len(times_s) >= self.max_period_pulses:

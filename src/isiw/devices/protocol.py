@@ -9,7 +9,7 @@ from typing import Protocol, TypeAlias, get_args, runtime_checkable
 from isiw.checks import check_choice, check_flags, check_numbers, mean_and_sd
 from isiw.errors import NotDelivered
 from isiw.trials import Measurement, Stimulus, Sweep
-from isiw.types import Reference
+from isiw.types import Conditioning, Reference
 
 __all__ = ["Answer", "Device", "DeviceInfo", "HasMemory", "Readiness", "ReportsReadiness", "require_staged"]
 
@@ -30,12 +30,14 @@ class DeviceInfo:
         detection_limit_mv: amplitudes below it are reported as 0 [mV]; None where there is no such limit.
         hit_delay_ms: from the valve command to the impact, mean and SD over people [ms]; `isiw timing LOG` measures it.
             None where it is not known, or where ISIs count from the impact.
+        conditioning: what it delivers first: a tap on the tendon, or an electrical pulse to the nerve, from which ISIs
+            count as from an impact.
         address: what it is connected to, such as "COM3"; no two sessions of a computer drive a device of one address.
         tap_alone: whether it can deliver a tap without the magnetic pulse, which `Stimulus.tap_alone` asks for.
 
     Raises:
-        InvalidValueError: an unknown reference, a detection limit or a hit delay that is not positive, or a word where
-            True or False is due.
+        InvalidValueError: an unknown reference or conditioning stimulus, a detection limit or a hit delay that is not
+            positive, or a word where True or False is due.
     """
 
     name: str
@@ -47,9 +49,11 @@ class DeviceInfo:
     hit_delay_ms: tuple[float, float] | None = None
     address: str = ""
     tap_alone: bool = False
+    conditioning: Conditioning = "tap"
 
     def __post_init__(self) -> None:
         check_choice(self, "reference", get_args(Reference))
+        check_choice(self, "conditioning", get_args(Conditioning))
         check_flags(self, "simulated", "tap_alone")
         check_numbers(self, "detection_limit_mv", above=0, optional=True)
         if self.hit_delay_ms is not None:

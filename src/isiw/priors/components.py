@@ -11,10 +11,11 @@ from typing import Final, TypeVar
 import torch
 
 from isiw.models.particles.latents import latents_of
-from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares, ShapeShares
+from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
 from isiw.models.particles.places import Place
+from isiw.models.particles.profile import ShapeShares
 from isiw.models.shared.scales import Scale
-from isiw.types import FloatArray, Reference
+from isiw.types import Conditioning, FloatArray, Reference
 
 __all__ = [
     "LATENT_BLOCKS",
@@ -48,6 +49,7 @@ def place(
     sd: FloatArray,
     reference: Reference,
     hit_delay_ms: tuple[float, float] | None = None,
+    conditioning: Conditioning = "tap",
 ) -> Place:
     """A law of start and log width.
 
@@ -57,9 +59,10 @@ def place(
         sd: shape (2,).
         reference: the event that the start counts from.
         hit_delay_ms: of the rig, where it is stated, mean and SD [ms].
+        conditioning: the conditioning stimulus.
     """
     (width,) = _log_scales(mean[1:], sd[1:])
-    return Place(share, Scale(float(mean[0]), float(sd[0])), width, reference, hit_delay_ms)
+    return Place(share, Scale(float(mean[0]), float(sd[0])), width, reference, hit_delay_ms, conditioning)
 
 
 def floor(share: float, mean: FloatArray, sd: FloatArray) -> Floor:

@@ -185,7 +185,8 @@ def _shares(kinds: Tensor, of: int) -> list[float]:
 
 
 def _places(latents: Latents, law: DayToDay, posterior: ParticlePosterior) -> tuple[Place, ...]:
-    rig = posterior.space.reference, posterior.model.prior.profile.start.hit_delay_ms
+    profile = posterior.model.prior.profile
+    rig = posterior.space.reference, profile.start.hit_delay_ms, profile.conditioning
     return tuple(place(law.p_stays * share, mean, sd, *rig) for share, mean, sd in _normals(latents, "place", law))
 
 

@@ -14,14 +14,15 @@ import isiw
 from isiw.checks import check_probabilities, whole
 from isiw.errors import LogError
 from isiw.log.reader import SessionRecord, read_session
-from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares, ShapeShares
+from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
 from isiw.models.particles.places import MOST_APART_MS, Place
 from isiw.models.particles.prior import Prior
+from isiw.models.particles.profile import ProfilePrior, ShapeShares
 from isiw.priors.components import beside, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.priors.people import hyper_prior, people_of, usual_shares
 from isiw.priors.population import Law, Population, learnt
-from isiw.priors.recall import recalled, require_meps, stated_hit_delay_ms
-from isiw.types import Reference
+from isiw.priors.recall import recalled, require_meps, stated_conditioning, stated_hit_delay_ms
+from isiw.types import Conditioning, Reference
 
 __all__ = ["LabPrior", "LearntSession", "learn"]
 
@@ -99,7 +100,14 @@ class LabPrior:
             usual: what is believed of people in general; by default the built-in prior.
         """
         usual = usual or Prior()
-        profile = replace(usual.profile, p_window=self.p_window, shapes=self.shapes, places=_given(self.place))
+        conditioning = usual.profile.conditioning if self.place is None else self.place.conditioning
+        profile = replace(
+            usual.profile,
+            p_window=self.p_window,
+            shapes=self.shapes,
+            places=_given(self.place),
+            conditioning=conditioning,
+        )
         return replace(
             usual,
             profile=profile,
@@ -134,8 +142,8 @@ def learn(
 
     Raises:
         LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person
-            twice, or sessions that count ISIs from different events, or are of rigs with different hit delays, or of
-            which some are simulated and others are not.
+            twice, or sessions that count ISIs from different events, or are of rigs with different hit delays or of
+            different conditioning stimuli, or of which some are simulated and others are not.
         InvalidValueError: a seed that is no whole number from 0 on.
     """
     seed = whole("seed", seed, least=0)
@@ -146,7 +154,8 @@ def learn(
         require_meps(record)
     sessions = tuple(_learnt_session(record) for record in records)
     _require_different(records, sessions, again=again)
-    prior, space = Prior(), records[0].header.space
+    conditioning, space = stated_conditioning(records[0]), records[0].header.space
+    prior = Prior(ProfilePrior(conditioning=conditioning))
     posteriors = []
     for record in records:
         posteriors.append(recalled(record, prior))
@@ -154,7 +163,7 @@ def learn(
     rng = np.random.default_rng(seed)
     population = learnt(people_of(posteriors), hyper_prior(prior, space), usual_shares(prior), rng)
     stated_ms = next(filter(None, map(stated_hit_delay_ms, records)), None)
-    return _lab_prior(population, prior, sessions, (space.reference, stated_ms))
+    return _lab_prior(population, prior, sessions, (space.reference, stated_ms, conditioning))
 
 
 def _learnt_session(record: SessionRecord) -> LearntSession:
@@ -179,6 +188,10 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
     if len(references) > 1:
         remedy = "Learn a prior from each kind of session."
         raise LogError("the sessions count ISIs from different events", got=sorted(references), remedy=remedy)
+    stimuli = {stated_conditioning(record) for record in records}
+    if len(stimuli) > 1:
+        remedy = "Learn a prior from each kind of session."
+        raise LogError("the sessions have different conditioning stimuli", got=sorted(stimuli), remedy=remedy)
     delays_ms = [stated_hit_delay_ms(record) for record in records]
     means_ms = [stated[0] for stated in delays_ms if stated is not None]
     if references == {"valve"} and means_ms and max(means_ms) - min(means_ms) > MOST_APART_MS:
@@ -202,7 +215,7 @@ def _lab_prior(
     population: Population,
     usual: Prior,
     sessions: tuple[LearntSession, ...],
-    rig: tuple[Reference, tuple[float, float] | None],
+    rig: tuple[Reference, tuple[float, float] | None, Conditioning],
 ) -> LabPrior:
     laws, shares = population.laws, population.shares
     return LabPrior(

@@ -10,8 +10,9 @@ from isiw.log.reader import SessionRecord
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
+from isiw.types import Conditioning
 
-__all__ = ["recalled", "require_meps", "stated_hit_delay_ms"]
+__all__ = ["recalled", "require_meps", "stated_conditioning", "stated_hit_delay_ms"]
 
 
 def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> ParticlePosterior:
@@ -69,11 +70,23 @@ def stated_hit_delay_ms(record: SessionRecord) -> tuple[float, float] | None:
     return None if stated is None else mean_and_sd("the session's hit_delay_ms", stated)
 
 
+def stated_conditioning(record: SessionRecord) -> Conditioning:
+    """The conditioning stimulus of a session, as its strategy was told, or as its device says.
+
+    Args:
+        record: the session.
+    """
+    told: Conditioning = record.header.strategy.settings.get("conditioning", record.header.device.conditioning)
+    return told
+
+
 def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
-    """The prior, told when the tap hits and whose MEPs these are, as far as prior, strategy or device say."""
+    """The prior, told what came when and whose MEPs these are, as far as prior, strategy or device say."""
     start = prior.profile.start
     delay_ms = stated_hit_delay_ms(record) or start.hit_delay_ms
-    profile = replace(prior.profile, start=replace(start, hit_delay_ms=delay_ms))
+    profile = replace(
+        prior.profile, start=replace(start, hit_delay_ms=delay_ms), conditioning=stated_conditioning(record)
+    )
     told = record.header.strategy.settings.get("muscle")
     known = told if told in {muscle.name for muscle in prior.muscles} else None
     return replace(prior, profile=profile, muscle=prior.muscle or known)

@@ -16,7 +16,7 @@ from isiw.log.durable import log_of
 from isiw.log.schema import Header, StrategyRecipe
 from isiw.strategy.strategy import Strategy
 
-__all__ = ["header_of", "require_parts", "versions"]
+__all__ = ["header_of", "header_with", "require_parts", "versions"]
 
 _PACKAGES = ("numpy", "torch", "botorch", "gpytorch")
 
@@ -57,12 +57,22 @@ def header_of(strategy: Strategy, **details: Any) -> Header:
     recipe, limit_mv = strategy.recipe, strategy.detection_limit_mv
     # Of a user's own objects nothing else is known; what is learnt from the log later needs to know it.
     known = {} if recipe.name or limit_mv is None else {"detection_limit_mv": limit_mv}
+    logged = StrategyRecipe(name=recipe.name, seed=recipe.seed, settings={**recipe.settings, **known})
+    return header_with(logged, space=strategy.space, **details)
+
+
+def header_with(recipe: StrategyRecipe, **details: Any) -> Header:
+    """The header of a session that begins now, with what it is made again from.
+
+    Args:
+        recipe: of its strategy.
+        **details: the other fields of `Header`.
+    """
     return Header(
         isiw_version=isiw.__version__,
         created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
         seed=recipe.seed,
-        strategy=StrategyRecipe(name=recipe.name, seed=recipe.seed, settings={**recipe.settings, **known}),
-        space=strategy.space,
+        strategy=recipe,
         versions={name: version for name, version in versions().items() if name != "isiw"},
         **details,
     )

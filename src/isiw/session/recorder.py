@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -115,20 +115,29 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     clock = clock or MonotonicClock()
     if not (resume and (path.exists() or part_of(path).exists())):
         return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
+    given = {"subject": subject, "visit": visit, "protocol": protocol, "limits": limits, "config": config}
+    unsaid = {name for name, value in given.items() if value is None or value == ""}
+    return _resumed(strategy, path, header, unsaid, lost_pulses, clock, on_doubt)
+
+
+def _resumed(
+    strategy: Strategy,
+    path: Path,
+    header: Header,
+    unsaid: Iterable[str],
+    lost_pulses: int | None,
+    clock: Clock,
+    on_doubt: Callable[[str], None] | None,
+) -> Recorder:
+    """The session of a log, from where it ends; what nobody said anew is as it was logged."""
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
     require_same_person(header, record.header)
     record = with_lost_pulses(record, lost_pulses)
     replayed = replay(record, strategy)
     warn_where_differing(replayed, record.header)
-    kept = {
-        "subject": header.subject or record.header.subject,
-        "visit": visit or record.header.visit,
-        "protocol": protocol or record.header.protocol,
-        "limits": limits or record.header.limits,
-        "config": record.header.config if config is None else header.config,
-    }
-    header = as_resumed(header.model_copy(update=kept), record.header, replayed)
+    logged = {name: getattr(record.header, name) for name in unsaid}
+    header = as_resumed(header.model_copy(update=logged), record.header, replayed)
     writer = LogWriter.continuing(path, salvaged, record.header, header)
     ages = ages_s(salvaged, len(replayed.trials))
     for trial in replayed.unknown:
@@ -250,8 +259,7 @@ class Recorder(Judging):
         """When limits and protocol allow a trial, by the clock [s]."""
         last_s = self._times_s[-1] if self._times_s else self._made_s
         return max(
-            self._made_s + self._limits.min_iti_s,
-            self._limits.earliest_s(self._times_s),
+            self._limits.earliest_s(self._times_s, self._made_s),
             last_s + self._protocol.interval_s(trial, self._seed),
         )
 

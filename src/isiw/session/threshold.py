@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import isiw
 from isiw.checks import number, text
 from isiw.design import VALVE_SPACE
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
@@ -22,7 +20,7 @@ from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Header, Intent, PulseOutcome, StrategyRecipe, ThresholdBelief
 from isiw.log.threshold import outcomes, read_threshold_salvaged
 from isiw.log.writer import LogWriter
-from isiw.session.header import require_parts, versions
+from isiw.session.header import header_with, require_parts
 from isiw.signals.judgement import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
@@ -65,17 +63,13 @@ def open_threshold(
     path = require_parts(log, search=(search, ThresholdSearch), device=(device, DeviceInfo))
     if search.pulses:
         raise InvalidValueError("the search knows of pulses that are not this log's", got=len(search.pulses))
-    header = Header(
-        isiw_version=isiw.__version__,
-        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+    header = header_with(
+        StrategyRecipe(name=f"threshold/{search.name}", seed=0, settings=search.settings),
         subject=text("subject", subject),
-        seed=0,
-        strategy=StrategyRecipe(name=f"threshold/{search.name}", seed=0, settings=search.settings),
         space=VALVE_SPACE,
         limits=Limits.of_space(VALVE_SPACE, min_iti_s=min_iti_s, max_pulses=max_pulses),
         device=device,
         signals=SignalLimits(),
-        versions={name: version for name, version in versions().items() if name != "isiw"},
         config=dict(config or {}),
         intensities=search.space,
     )
@@ -210,8 +204,7 @@ class ThresholdRecorder:
         if self._asked is None:
             self._limits.require_left(self.given)
             intensity = self.search.ask()
-            earliest_s = max(self._made_s + self._limits.min_iti_s, self._limits.earliest_s(self._times_s))
-            self._clock.sleep_s(earliest_s - self._clock.now_s())
+            self._clock.sleep_s(self._limits.earliest_s(self._times_s, self._made_s) - self._clock.now_s())
             now_s = self._clock.now_s()
             self._log.append(Intent(trial=self.given, isi_ms=None, t_s=now_s, intensity_pct_mso=intensity))
             self._log.sync()

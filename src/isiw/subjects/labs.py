@@ -78,7 +78,8 @@ class Lab:
         width_ms = float(np.clip(_log_normal(rng, self.width_ms), 40, 230))
         profile = PeakProfile(_normal(rng, self.start_ms), width_ms)
         subject = SimulatedSubject(profile, response, _normal(rng, self.hit_delay_ms), float(rng.uniform(1, 4)))
-        return replace(subject, input_correlation=float(rng.uniform(0, 0.2)))
+        correlation = float(rng.uniform(0, 0.2))
+        return replace(subject, input_correlation=correlation, stated_hit_delay_ms=self.hit_delay_ms)
 
 
 def lab(name: str, seed: int) -> Lab:

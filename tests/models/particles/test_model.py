@@ -12,13 +12,14 @@ from isiw.errors import InvalidValueError
 from isiw.metrics import covers
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import LATENTS
-from isiw.models.particles.laws import FOREARM, NoiseShares, ProfilePrior
+from isiw.models.particles.laws import FOREARM, NoiseShares
 from isiw.models.particles.likelihood import levels, total_log_likelihood
 from isiw.models.particles.model import ParticleModel, ParticlePosterior
 from isiw.models.particles.moves import Mover
 from isiw.models.particles.noise import NoiseKind, draw_log_mep, log_gain, log_likelihood
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Person, Prior
+from isiw.models.particles.profile import ProfilePrior
 from isiw.models.particles.swarm import Moving
 from isiw.models.protocol import (
     Observation,

@@ -6,10 +6,10 @@ import torch
 
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1
-from isiw.models.particles.laws import ProfilePrior
 from isiw.models.particles.model import ParticleModel
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Prior
+from isiw.models.particles.profile import ProfilePrior
 from isiw.models.protocol import Observation
 from isiw.models.shared.start import StartPrior
 from isiw.models.windows import profile_grid

@@ -17,15 +17,13 @@ from isiw.models.particles.laws import (
     Gain,
     Muscle,
     NoiseShares,
-    ProfilePrior,
     RectifiedPrior,
     SessionPrior,
-    ShapeShares,
     SwitchPrior,
-    Width,
 )
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Person, Prior
+from isiw.models.particles.profile import ProfilePrior, ShapeShares, Width
 from isiw.models.particles.shapes import ShapeKind
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.shared.scales import Scale

@@ -1,20 +1,15 @@
-"""What is believed of each part of a person before the first trial, and where each belief comes from.
+"""What is believed of a person's responses before the first trial, and where each belief comes from.
 
 The first of several laws is what is usual, the others say what else may be.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields
 from typing import Final
 
 from isiw.checks import check_numbers, check_probabilities, require_sum_of_one
-from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
-from isiw.models.particles.places import Place
 from isiw.models.shared.scales import Scale, check_scales
-from isiw.models.shared.start import StartPrior
 
 __all__ = [
     "FOREARM",
@@ -24,17 +19,23 @@ __all__ = [
     "Gain",
     "Muscle",
     "NoiseShares",
-    "ProfilePrior",
     "RectifiedPrior",
     "SessionPrior",
-    "ShapeShares",
     "SwitchPrior",
-    "Width",
     "check_laws",
+    "check_shares",
 ]
 
 
-def _check_shares(shares: object) -> None:
+def check_shares(shares: object) -> None:
+    """Check a dataclass all of whose fields are probabilities that sum to 1.
+
+    Args:
+        shares: the instance.
+
+    Raises:
+        InvalidValueError: they are no probabilities, or do not sum to 1.
+    """
     names = [f.name for f in fields(shares)]  # type: ignore[arg-type] # a dataclass
     check_probabilities(shares, *names)
     require_sum_of_one(f"the probabilities of {type(shares).__name__}", [getattr(shares, name) for name in names])
@@ -52,31 +53,6 @@ def check_laws(owner: object, *names: str) -> None:
     """
     for name in names:
         require_sum_of_one(f"the shares of {type(owner).__name__}.{name}", [law.share for law in getattr(owner, name)])
-
-
-@dataclass(frozen=True)
-class ShapeShares:
-    """Probabilities of the families of profiles, in the order of `ShapeKind`.
-
-    Most profiles pass a normality test (dissertation, 4.2: 8 of 11), the others are described in its outlook (8.1).
-
-    Args:
-        gaussian: of Gaussian profiles.
-        skewed: of skewed ones.
-        plateau: of flat-topped ones.
-        two_peak: of those with two peaks.
-
-    Raises:
-        InvalidValueError: probabilities that do not sum to 1.
-    """
-
-    gaussian: float = 0.68
-    skewed: float = 0.12
-    plateau: float = 0.08
-    two_peak: float = 0.12
-
-    def __post_init__(self) -> None:
-        _check_shares(self)
 
 
 @dataclass(frozen=True)
@@ -101,97 +77,7 @@ class NoiseShares:
     rectified: float = 0.02
 
     def __post_init__(self) -> None:
-        _check_shares(self)
-
-
-@dataclass(frozen=True)
-class Width:
-    """A law of the window's width.
-
-    Args:
-        share: its probability.
-        width_ms: the width.
-
-    Raises:
-        InvalidValueError: an invalid share or scale.
-    """
-
-    share: float
-    width_ms: Scale
-
-    def __post_init__(self) -> None:
-        check_probabilities(self, "share")
-        check_scales(self, "width_ms", tailed=False)
-
-
-@dataclass(frozen=True)
-class ProfilePrior:
-    """Of the facilitation by ISI.
-
-    Args:
-        p_window: probability that there is any facilitation.
-        shapes: probabilities of the families.
-        start: where windows start.
-        widths: how wide they are; 60–220 ms, mean 108 measured (dissertation, Table 4.1).
-        places: where and how wide they are as far as earlier sessions say; the rest of the probability is that of
-            `start` and `widths`.
-
-    Raises:
-        InvalidValueError: an invalid probability, widths whose shares do not sum to 1, places that leave nothing to the
-            rest, or that count from different events.
-    """
-
-    p_window: float = 0.72
-    shapes: ShapeShares = field(default_factory=ShapeShares, metadata={"shares": True})
-    start: StartPrior = field(default_factory=StartPrior)
-    widths: tuple[Width, ...] = (Width(0.7, Scale(100.0, 0.42)), Width(0.3, Scale(170.0, 0.5)))
-    places: tuple[Place, ...] = ()
-
-    def __post_init__(self) -> None:
-        check_probabilities(self, "p_window")
-        check_laws(self, "widths")
-        if self.p_place >= 1.0:
-            raise InvalidValueError("the shares of ProfilePrior.places must sum to less than 1", got=self.p_place)
-        if len(references := {place.reference for place in self.places}) > 1:
-            raise InvalidValueError("ProfilePrior.places must count from one event", got=sorted(references))
-
-    @property
-    def p_place(self) -> float:
-        """Probability that a window is where earlier sessions say."""
-        return math.fsum(place.share for place in self.places)
-
-    def as_usual(self, kept: float) -> ProfilePrior:
-        """The same with less probability of unusual starts and widths.
-
-        Args:
-            kept: the part of their probability that they keep.
-        """
-        first, *others = self.widths
-        less = tuple(replace(width, share=kept * width.share) for width in others)
-        usual = replace(first, share=1.0 - math.fsum(width.share for width in less))
-        return replace(self, start=self.start.as_usual(kept), widths=(usual, *less))
-
-    def require_space(self, space: DesignSpace) -> None:
-        """Check that the places mean something in a space.
-
-        Raises:
-            InvalidValueError: they count from another event than the space, or are of a rig with another hit delay.
-        """
-        if self.places and self.places[0].reference != space.reference:
-            raise InvalidValueError(
-                "the prior's places and the design space count ISIs from different events",
-                got=f"{space.reference} in the space",
-                expected=self.places[0].reference,
-                remedy="Use the prior with the kind of space that it was learnt in.",
-            )
-        delay_ms = self.start.hit_delay_ms
-        if others := [place.hit_delay_ms for place in self.places if not place.is_of_rig(delay_ms)]:
-            raise InvalidValueError(
-                "the prior was learnt on a rig with another hit delay, so its windows would be in the wrong place",
-                got=f"a hit delay of {delay_ms} ms",
-                expected=f"about {others[0]} ms",
-                remedy="Use the prior with the rig that it was learnt with, or count ISIs from the impact.",
-            )
+        check_shares(self)
 
 
 @dataclass(frozen=True)

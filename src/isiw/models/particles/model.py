@@ -119,11 +119,6 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
     """
 
     @cached_property
-    def person(self) -> Person:
-        """What the particles mean."""
-        return self.model.prior.person(self.swarm.latents)
-
-    @cached_property
     def as_usual(self) -> ParticlePosterior:
         """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
         latents, usual = self.swarm.latents, self.model.prior_where_asking

@@ -9,7 +9,7 @@ from typing import get_args
 from isiw.checks import check_choice, check_probabilities, mean_and_sd
 from isiw.models.particles.mixture import Mixture
 from isiw.models.shared.scales import Scale, check_scales
-from isiw.types import Reference
+from isiw.types import Conditioning, Reference
 
 __all__ = ["MOST_APART_MS", "Place", "mixture_of"]
 
@@ -27,9 +27,10 @@ class Place:
         width_ms: the width [ms].
         reference: the event that the start counts from.
         hit_delay_ms: mean and SD of the hit delay of the rig that it was learnt with [ms]; None where nobody stated it.
+        conditioning: the conditioning stimulus that it was learnt with.
 
     Raises:
-        InvalidValueError: an invalid share, scale, reference or hit delay.
+        InvalidValueError: an invalid share, scale, reference, hit delay or conditioning stimulus.
     """
 
     share: float
@@ -37,12 +38,14 @@ class Place:
     width_ms: Scale
     reference: Reference = "valve"
     hit_delay_ms: tuple[float, float] | None = None
+    conditioning: Conditioning = "tap"
 
     def __post_init__(self) -> None:
         check_probabilities(self, "share")
         check_scales(self, "start_ms", positive=False, tailed=False)
         check_scales(self, "width_ms", tailed=False)
         check_choice(self, "reference", get_args(Reference))
+        check_choice(self, "conditioning", get_args(Conditioning))
         if self.hit_delay_ms is not None:
             object.__setattr__(self, "hit_delay_ms", mean_and_sd("Place.hit_delay_ms", self.hit_delay_ms))
 

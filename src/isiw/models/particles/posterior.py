@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Generic, Protocol, Self, TypeVar
+from typing import Any, Generic, Protocol, Self, TypeVar
 
 import torch
 
@@ -19,9 +19,17 @@ from isiw.models.shared.history import observed
 __all__ = ["SwarmPosterior"]
 
 
+class _Prior(Protocol):
+    """What is asked of a prior over people."""
+
+    def person(self, latents: Any) -> Person: ...
+
+
 class _Model(Protocol):
     """What is asked of a model's settings."""
 
+    @property
+    def prior(self) -> _Prior: ...
     @property
     def detection_limit_mv(self) -> float: ...
     @property
@@ -57,9 +65,9 @@ class SwarmPosterior(ABC, Generic[M, L]):
     swarm: Swarm[L]
 
     @cached_property
-    @abstractmethod
     def person(self) -> Person:
         """What the particles mean."""
+        return self.model.prior.person(self.swarm.latents)
 
     @cached_property
     @abstractmethod

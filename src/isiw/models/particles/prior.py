@@ -25,7 +25,6 @@ from isiw.models.particles.laws import (
     Gain,
     Muscle,
     NoiseShares,
-    ProfilePrior,
     RectifiedPrior,
     SessionPrior,
     SwitchPrior,
@@ -34,6 +33,7 @@ from isiw.models.particles.laws import (
 from isiw.models.particles.mixture import JointMixture, Mixture, drawn
 from isiw.models.particles.noise import NoiseKind, Response, recruits
 from isiw.models.particles.places import mixture_of
+from isiw.models.particles.profile import ProfilePrior
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale
@@ -116,17 +116,17 @@ class Prior:
     def mixtures(self) -> dict[str, Mixture]:
         """What is believed of each block but the start, places aside."""
         switch, session = self.switch, self.session
-        often = [_plain(switch.switched_on), _plain(switch.switched_off)]
+        often = [switch.switched_on.law, switch.switched_off.law]
         return {
-            "width": _mixture([(w.share, [_log(w.width_ms)]) for w in self.profile.widths]),
+            "width": _mixture([(w.share, [w.width_ms.log_law]) for w in self.profile.widths]),
             "form": _mixture([(1.0, [(0.0, 1.0)])]),
-            "floor": _mixture([(f.share, [_log(f.median_mv), _log(f.log_sd)]) for f in self.floors]),
-            "session": _mixture([(1.0, [(0.0, session.drift_sd), _plain(session.startup)])]),
+            "floor": _mixture([(f.share, [f.median_mv.log_law, f.log_sd.log_law]) for f in self.floors]),
+            "session": _mixture([(1.0, [(0.0, session.drift_sd), session.startup.law])]),
             "gain": _mixture([(g.share, _of_gain(g)) for g in self.gains]),
-            "reliability": _mixture([(1.0, [_plain(switch.reliability)])]),
+            "reliability": _mixture([(1.0, [switch.reliability.law])]),
             "switch": _mixture([(size.share, [*often, *_of_gain(size)]) for size in switch.sizes]),
             "recruitment": _mixture([(m.share, _of_curve(m)) for m in self.possible_muscles]),
-            "rectified": _mixture([(1.0, [*_of_curve(self.rectified), _log(self.rectified.onset)])]),
+            "rectified": _mixture([(1.0, [*_of_curve(self.rectified), self.rectified.onset.log_law])]),
         }
 
     @cached_property
@@ -297,21 +297,13 @@ class Prior:
         )
 
 
-def _plain(scale: Scale) -> tuple[float, float]:
-    return scale.median, scale.sd
-
-
-def _log(scale: Scale) -> tuple[float, float]:
-    return math.log(scale.median), scale.sd
-
-
 def _of_gain(law: Gain) -> list[tuple[float, float]]:
-    return [_log(law.ratio), _log(law.cv)]
+    return [law.ratio.log_law, law.cv.log_law]
 
 
 def _of_curve(law: Muscle | RectifiedPrior) -> list[tuple[float, float]]:
     scales = (law.ratio, law.slope_per_pct, law.input_sd, law.sigma_y, law.boost_pct)
-    return [*map(_log, scales), _plain(law.rest_pct)]
+    return [*(scale.log_law for scale in scales), law.rest_pct.law]
 
 
 def _mixture(components: list[tuple[float, list[tuple[float, float]]]]) -> Mixture:

@@ -26,6 +26,16 @@ class Scale(NamedTuple):
     sd: float
     tail: float = 0.0
 
+    @property
+    def law(self) -> tuple[float, float]:
+        """Mean and SD of the quantity, tail aside."""
+        return self.median, self.sd
+
+    @property
+    def log_law(self) -> tuple[float, float]:
+        """Mean and SD of the natural logarithm of the positive quantity, tail aside."""
+        return math.log(self.median), self.sd
+
     def normal(self, z: Tensor) -> Tensor:
         """The quantity at some latents, same shape."""
         return self.median + self.sd * z + self.tail * z**3

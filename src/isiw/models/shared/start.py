@@ -13,7 +13,7 @@ from isiw.checks import ascending, check_numbers, check_probabilities, mean_and_
 from isiw.design import DesignSpace
 from isiw.models.protocol import Tensor
 
-__all__ = ["Span", "StartPrior"]
+__all__ = ["TAP_SPANS", "Span", "StartPrior"]
 
 BEFORE_MS: Final = 100.0
 """How far before the range a window may start."""
@@ -72,6 +72,10 @@ class Span:
         return Span(share * self.share, self.low_ms + mean_ms, self.high_ms + mean_ms, blur_ms)
 
 
+TAP_SPANS: Final = (Span(0.7, 0.0, 115.0), Span(0.3, -30.0, 260.0, 20.0))
+"""Where windows start after a tap."""
+
+
 @dataclass(frozen=True)
 class StartPrior:
     """Where windows start.
@@ -89,7 +93,7 @@ class StartPrior:
         InvalidValueError: shares that do not sum to 1, a hit delay that is not positive, or an invalid probability.
     """
 
-    spans: tuple[Span, ...] = (Span(0.7, 0.0, 115.0), Span(0.3, -30.0, 260.0, 20.0))
+    spans: tuple[Span, ...] = TAP_SPANS
     hit_delay_ms: tuple[float, float] | None = None
     p_robot: float = 0.5
     p_anywhere: float = 0.04

@@ -14,7 +14,6 @@ import torch
 from isiw.checks import MOST_OF_A_KIND, check_numbers, check_wholes
 from isiw.design import DesignSpace
 from isiw.models.particles.posterior import SwarmPosterior
-from isiw.models.particles.prior import Person
 from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraLatents, SupraPrior
@@ -84,11 +83,6 @@ class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
         seed: seed of all randomness.
         swarm: the particles.
     """
-
-    @cached_property
-    def person(self) -> Person:
-        """What the particles mean."""
-        return self.model.prior.person(self.swarm.latents)
 
     @cached_property
     def sample(self) -> SupraSample:

@@ -17,10 +17,11 @@ import torch
 
 from isiw.checks import check_probabilities
 from isiw.design import DesignSpace
-from isiw.models.particles.laws import Floor, SessionPrior, Width, check_laws
+from isiw.models.particles.laws import Floor, SessionPrior, check_laws
 from isiw.models.particles.mixture import JointMixture, Mixture
 from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.prior import Depression, Person
+from isiw.models.particles.profile import Width
 from isiw.models.particles.shapes import Shape, ShapeKind
 from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale, check_scales
@@ -173,7 +174,7 @@ class SupraPrior:
         session = [(0.0, self.session.drift_sd), (startup.median, startup.sd)]
         return (
             *(mixture for segment in (self.enhanced, self.depressed) for mixture in _of_segment(segment)),
-            Mixture.of([(f.share, [_log(f.median_mv), _log(f.log_sd)]) for f in self.floors], "cpu"),
+            Mixture.of([(f.share, [f.median_mv.log_law, f.log_sd.log_law]) for f in self.floors], "cpu"),
             Mixture.of([(1.0, session)], "cpu"),
             Mixture.of([(c.share, _of_curve(c)) for c in self.curves], "cpu"),
         )
@@ -248,17 +249,13 @@ def _apart(values: Tensor) -> Tensor:
 
 
 def _of_segment(segment: Segment) -> tuple[Mixture, Mixture]:
-    widths = Mixture.of([(width.share, [_log(width.width_ms)]) for width in segment.widths], "cpu")
-    return widths, Mixture.of([(1.0, [_log(segment.shift_pct)])], "cpu")
+    widths = Mixture.of([(width.share, [width.width_ms.log_law]) for width in segment.widths], "cpu")
+    return widths, Mixture.of([(1.0, [segment.shift_pct.log_law])], "cpu")
 
 
 def _of_curve(curve: Curve) -> list[tuple[float, float]]:
     scales = (curve.ratio, curve.slope_per_pct, curve.input_sd, curve.sigma_y)
-    return [*map(_log, scales), (curve.rest_pct.median, curve.rest_pct.sd)]
-
-
-def _log(scale: Scale) -> tuple[float, float]:
-    return math.log(scale.median), scale.sd
+    return [*(scale.log_law for scale in scales), curve.rest_pct.law]
 
 
 def _bell(start_ms: Tensor, log_width_ms: Tensor) -> Shape:
