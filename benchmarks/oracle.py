@@ -96,6 +96,7 @@ SPANS: Final[Mapping[str, Spans]] = {
     **dict.fromkeys(("other-rig", "steep", "flat", "weak", "rmt-off", "hand"), _USUAL),
     "late": _LATE,
     "very-wide": _VERY_WIDE,
+    "electrical": _any_with_any(_uniform(5, 50, 2), _log_normal(20.0, 0.3, 10.0, 40.0)),
     "odd": _either((5 / 7, _USUAL), (1 / 7, _LATE), (1 / 7, _VERY_WIDE)),
     "another-day": _either((0.65, _USUAL), (0.35, _SHIFTED)),  # second days are half of all, and .7 of them shifted
 }

@@ -1,6 +1,7 @@
 """The default on people whom its prior was written for, and on people off the map.
 
     python benchmarks/people.py --cohorts recruitment,gaussian,late --hit-delay stated --out benchmarks/results/people
+    python benchmarks/people.py --cohorts electrical --space impact --out benchmarks/results/people_electrical
 
 writes tables (Markdown) and their figures with versions, command and seeds (JSON): F1 and coverage by trial, what the
 stopping rule comes to, and how well the expected F1 foretells the actual one. Sessions are kept in a folder beside the
@@ -19,7 +20,7 @@ import pandas as pd
 import typer
 from rich.progress import Progress
 
-from acquisition import facts_of, run, run_oracle
+from acquisition import facts_of, run, run_oracle, space_of
 from isiw.models.particles.prior import Prior
 from isiw.studies import Study, StudyStrategy
 from zero_trials import without_any_trial
@@ -95,7 +96,8 @@ def main(
     people: Annotated[int, typer.Option(help="People a cohort.")] = 100,
     trials: Annotated[int, typer.Option(help="Trials a session.")] = 60,
     seed: Annotated[int, typer.Option(help="Seed of the cohorts.")] = 100_000,
-    hit_delay: Annotated[str, typer.Option(help="Whether the rig's hit delay is stated or unstated.")] = "stated",
+    hit_delay: Annotated[str, typer.Option(help="Whether what the rig knows is stated or unstated.")] = "stated",
+    space: Annotated[str, typer.Option(help="valve or impact, or with another high end [ms]: impact:100.")] = "valve",
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("people"),
 ) -> None:
@@ -110,6 +112,7 @@ def main(
         engine="batched",
         batch=25,
         hit_delay=hit_delay,  # type: ignore[arg-type] # checked by the study
+        space=space_of(space),
     )
     with Progress() as progress:
         rows = run(study, out.with_suffix(".study"), workers, progress)

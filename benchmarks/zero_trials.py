@@ -23,7 +23,7 @@ import isiw
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1, f1_of_masks
 from isiw.subjects.cohorts import COHORTS
-from isiw.types import BoolArray, FloatArray, IntArray
+from isiw.types import BoolArray, Conditioning, FloatArray, IntArray
 from isiw.window import Window
 
 OTHER_PEOPLE, OTHER_SEED = 1000, 10_000
@@ -81,14 +81,16 @@ def _fixed_window(cohort: str, people: int, seed: int, space: DesignSpace) -> di
 
 
 def before_any_trial(cohort: str, people: int, seed: int, space: DesignSpace) -> float:
-    """Mean F1 of what the default reports before any trial, told the hit delay that the person's rig states."""
+    """Mean F1 of what the default reports before any trial, told what the person's rig states."""
     persons = isiw.subjects.cohort(cohort, people, seed)
-    reported = {delay: _reported(delay, space) for delay in {person.stated_hit_delay_ms for person in persons}}
-    return float(np.mean([f1(reported[p.stated_hit_delay_ms], p.window(space), space) for p in persons]))
+    stated = [(person.stated_hit_delay_ms, person.conditioning) for person in persons]
+    reported = {each: _reported(*each, space) for each in set(stated)}
+    return float(np.mean([f1(reported[each], p.window(space), space) for each, p in zip(stated, persons, strict=True)]))
 
 
-def _reported(hit_delay_ms: tuple[float, float], space: DesignSpace) -> Window | None:
-    return isiw.make_strategy("default", space=space, hit_delay_ms=hit_delay_ms).estimate().window
+def _reported(hit_delay_ms: tuple[float, float], conditioning: Conditioning, space: DesignSpace) -> Window | None:
+    known = {"hit_delay_ms": hit_delay_ms, "conditioning": conditioning}
+    return isiw.make_strategy("default", space=space, **known).estimate().window
 
 
 def without_any_trial(cohorts: Sequence[str], people: int, seed: int, space: DesignSpace) -> pd.DataFrame:

@@ -239,7 +239,8 @@ def device_for(config: RunConfig) -> Device:
     respond = partial(subject.begin(config.seed).respond, reference=reference)
     hit_delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
     if config.subject.kind == "simulated":
-        return SimulatedDevice(SimulatedPerson(respond, reference, hit_delay_ms=hit_delay_ms))
+        person = SimulatedPerson(respond, reference, hit_delay_ms=hit_delay_ms, conditioning=subject.conditioning)
+        return SimulatedDevice(person)
     if config.subject.data is None:
         raise ConfigError(
             "subject.data is missing: recorded EMG is not part of the package",
@@ -247,7 +248,8 @@ def device_for(config: RunConfig) -> Device:
             remedy="Give it with --data DIR.",
         )
     recordings = load_recordings(config.subject.data)
-    return SimulatedDevice(RecordedPerson(respond, reference, recordings, config.seed, hit_delay_ms))
+    recorded = RecordedPerson(respond, reference, recordings, config.seed, hit_delay_ms, subject.conditioning)
+    return SimulatedDevice(recorded)
 
 
 def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:

@@ -22,7 +22,7 @@ from isiw.devices.simulated import Respond
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals.mep import MEP_WINDOW_MS
 from isiw.trials import Channel, Stimulus, Sweep
-from isiw.types import BoolArray, FloatArray, Reference
+from isiw.types import BoolArray, Conditioning, FloatArray, Reference
 
 __all__ = ["RecordedPerson", "Recordings", "load_recordings"]
 
@@ -134,6 +134,7 @@ class RecordedPerson:
         recordings: the recorded sweeps.
         seed: seed of the choice of sweeps; the choice of a trial depends on the seed and the trial's number alone.
         hit_delay_ms: mean and SD of the hit delay that the device states [ms].
+        conditioning: what it delivers first.
     """
 
     def __init__(
@@ -143,10 +144,16 @@ class RecordedPerson:
         recordings: Recordings,
         seed: int = 0,
         hit_delay_ms: tuple[float, float] | None = None,
+        conditioning: Conditioning = "tap",
     ) -> None:
-        name, channels = "simulated person in recorded EMG (semi-synthetic)", {"emg": "mV"}
         self.info = DeviceInfo(
-            name, reference, simulated=True, channels=channels, hit_delay_ms=hit_delay_ms, tap_alone=True
+            "simulated person in recorded EMG (semi-synthetic)",
+            reference,
+            simulated=True,
+            channels={"emg": "mV"},
+            hit_delay_ms=hit_delay_ms,
+            tap_alone=True,
+            conditioning=conditioning,
         )
         self._respond, self._recordings, self._seed = respond, recordings, seed
 

@@ -9,7 +9,7 @@ from typing import Protocol, TypeAlias
 from isiw.devices.protocol import Answer, DeviceInfo, require_staged
 from isiw.errors import DeviceError
 from isiw.trials import Measurement, Stimulus
-from isiw.types import Reference
+from isiw.types import Conditioning, Reference
 
 __all__ = ["Outcome", "Respond", "SimulatedDevice", "SimulatedPerson", "Simulation"]
 
@@ -106,6 +106,7 @@ class SimulatedPerson:
         reference: the event that ISIs count from.
         name: what the log calls the device.
         hit_delay_ms: mean and SD of the hit delay that the device states [ms].
+        conditioning: what it delivers first.
     """
 
     def __init__(
@@ -114,8 +115,11 @@ class SimulatedPerson:
         reference: Reference,
         name: str = "simulated person",
         hit_delay_ms: tuple[float, float] | None = None,
+        conditioning: Conditioning = "tap",
     ) -> None:
-        self.info = DeviceInfo(name, reference, simulated=True, hit_delay_ms=hit_delay_ms, tap_alone=True)
+        self.info = DeviceInfo(
+            name, reference, simulated=True, hit_delay_ms=hit_delay_ms, tap_alone=True, conditioning=conditioning
+        )
         self._respond = respond
 
     def answer(self, stimulus: Stimulus) -> Measurement:

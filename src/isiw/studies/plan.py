@@ -211,7 +211,7 @@ class Study:
             stopping=self.stopping,
             amplitude=self.amplitude,
         )
-        return session if self.hit_delay == "unstated" else session.with_stated_hit_delay()
+        return session if self.hit_delay == "unstated" else session.as_the_rig_states()
 
     def _unit(self, sessions: tuple[SimulatedSession, ...]) -> Unit:
         first, last = sessions[0], f"-{sessions[-1].person:05d}" if self.engine == "batched" else ""

@@ -130,11 +130,15 @@ class SimulatedSession:
         usual = cohort(self.cohort, self.person + 1, self.seed)[self.person]
         return replace(usual, scale=self.amplitude * usual.scale)
 
-    def with_stated_hit_delay(self) -> SimulatedSession:
-        """The same with the hit delay told to the strategy, as the person's rig states it, where it can use it."""
-        known = known_settings(self.strategy, {"hit_delay_ms": self.subject().stated_hit_delay_ms})
-        if self.space.reference == "impact":
-            return self
+    def as_the_rig_states(self) -> SimulatedSession:
+        """The same with what the person's rig states told to the strategy, where it can use it.
+
+        It states its hit delay, where ISIs count from the valve command, and its conditioning stimulus.
+        """
+        subject = self.subject()
+        delay_ms = subject.stated_hit_delay_ms if self.space.reference == "valve" else None
+        stimulus = None if subject.conditioning == "tap" else subject.conditioning
+        known = known_settings(self.strategy, {"hit_delay_ms": delay_ms, "conditioning": stimulus})
         return replace(self, settings=tuple((known | dict(self.settings)).items()))
 
     def player(self) -> Strategy:

@@ -124,6 +124,9 @@ _OFF_THE_MAP: Final[Mapping[str, _Law]] = MappingProxyType(
 )
 """People whom the usual law does not cover."""
 
+_NARROW: Final = _Law(start_ms=(5, 50), width_ms=(20, 0.3), width_limits_ms=(10, 40))
+"""Windows after an electrical pulse: about 20 ms wide (dissertation, 3.3.4)."""
+
 _KINDS_OF_ODD: Final = ("other-rig", "late", "very-wide", ("steep", "flat"), "weak", "rmt-off", "hand")
 
 
@@ -208,6 +211,7 @@ _DRAW: Final[dict[str, Callable[[np.random.Generator], SimulatedSubject]]] = {
     "recruitment": _USUAL.subject,
     **{name: partial(_off_the_map, name=name) for name in _OFF_THE_MAP},
     "odd": _odd,
+    "electrical": lambda rng: replace(_NARROW.subject(rng), conditioning="electrical"),
     "supra-threshold": supra_threshold,
 }
 

@@ -17,7 +17,7 @@ from isiw.errors import InvalidValueError
 from isiw.subjects.plasticity import Plasticity
 from isiw.subjects.profiles import OpposedProfile, Profile
 from isiw.subjects.responses import RecruitmentResponse, ResponseCurve, TrialNoise
-from isiw.types import FloatArray, Reference
+from isiw.types import Conditioning, FloatArray, Reference
 from isiw.window import Window, window_from_excess
 
 __all__ = ["OUTLIERS_MV", "Drift", "Responder", "Response", "SimulatedSubject"]
@@ -73,6 +73,7 @@ class SimulatedSubject:
         scale: factor on every amplitude.
         stated_hit_delay_ms: mean and SD of the hit delay that the rig states, where it knows itself [ms]; by default
             the tapping robot's, over people.
+        conditioning: what is given to them first, a tap or an electrical pulse.
         plasticity: how the pairs that are delivered change the gain; None where they do not. The true window and
             profile are those before the first pair.
 
@@ -91,6 +92,7 @@ class SimulatedSubject:
     jitter_told: bool = True
     scale: float = 1.0
     stated_hit_delay_ms: tuple[float, float] = (180.0, 6.0)
+    conditioning: Conditioning = "tap"
     plasticity: Plasticity | None = None
 
     def __post_init__(self) -> None:
