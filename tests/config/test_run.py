@@ -221,3 +221,10 @@ def test_every_limit_of_a_configuration_is_the_sessions(tmp_path: Path) -> None:
     session_for(load_config(file).with_overrides(strategy="random")).run()
     kept = read_session(tmp_path / "s.mcap").header.limits
     assert {name: getattr(kept, name) for name in wanted} == wanted
+
+
+def test_the_strategy_is_told_what_the_device_delivers_first(config_file: WriteFile, tmp_path: Path) -> None:
+    text = f"log = '{tmp_path}/s.mcap'\n[subject]\ncohort = 'COHORT'\n[space]\nreference = 'impact'\nhigh_ms = 320\n"
+    for cohort, stimulus in (("electrical", "electrical"), ("recruitment", "tap")):
+        session = session_for(load_config(config_file(text.replace("COHORT", cohort))))
+        assert session.strategy.recipe.settings["conditioning"] == stimulus

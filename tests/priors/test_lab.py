@@ -19,6 +19,7 @@ from isiw.errors import ConfigError, InvalidValueError, LogError, StrategyError
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.laws import NoiseShares
 from isiw.models.particles.prior import Prior
+from isiw.models.particles.profile import ProfilePrior
 from isiw.priors.recall import recalled
 from isiw.strategy.catalogue import make_strategy
 from known import instance
@@ -235,3 +236,20 @@ def test_a_session_is_recalled_with_what_its_strategy_was_told_of_rig_and_muscle
     recall = recalled(isiw.read_session(tmp_path / "s.mcap"), Prior(), particles=100)
     assert recall.model.prior.profile.start.hit_delay_ms == (60.0, 4.0)
     assert recall.model.prior.muscle == "hand"
+
+
+def test_what_electrical_pulses_taught_is_for_electrical_pulses(logs: Any, tmp_path: Path) -> None:
+    pulsed = [
+        write_log(tmp_path / f"{k}.mcap", gaussian_person(k), subject=f"E{k}", trials=TRIALS, conditioning="electrical")
+        for k in range(2)
+    ]
+    prior = priors.load(priors.write_lab_prior(priors.learn(pulsed), tmp_path / "lab.toml"))
+    assert prior.profile.conditioning == "electrical"
+    assert prior.profile.widths == ProfilePrior(conditioning="electrical").widths
+    assert make_strategy(prior=prior, particles=50).estimate().probability is not None
+    with pytest.raises(InvalidValueError, match="another conditioning stimulus"):
+        make_strategy(prior=prior, conditioning="tap", particles=50)
+    with pytest.raises(LogError, match="different conditioning stimuli"):
+        priors.learn([*logs, *pulsed])
+    day, *_ = map(isiw.read_session, pulsed)
+    assert {place.conditioning for place in priors.after(day).profile.places} == {"electrical"}

@@ -14,6 +14,7 @@ from isiw.errors import ConfigError, InvalidValueError, StrategyError
 from isiw.models.parametric import ParametricModel
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.prior import Prior
+from isiw.models.particles.profile import ProfilePrior
 from isiw.models.particles.swarm import Moving
 from isiw.models.protocol import ResponseModel
 from isiw.models.shared.scales import Scale
@@ -114,6 +115,14 @@ def test_the_hit_delay_and_the_muscle_have_keys_of_their_own() -> None:
     assert make_strategy(**strategy.recipe.settings).model == strategy.model
     parametric = make_strategy("parametric-mi", hit_delay_ms=[150.0, 5.0])
     assert instance(ParametricModel, parametric.model).prior.start.hit_delay_ms == (150.0, 5.0)
+
+
+def test_a_strategy_that_was_told_of_electrical_pulses_is_made_again_from_its_recipe() -> None:
+    strategy = make_strategy(conditioning="electrical", muscle="hand", **FEW)
+    assert instance(ParticleModel, strategy.model).prior == Prior(
+        ProfilePrior(conditioning="electrical"), muscle="hand"
+    )
+    assert make_strategy(**strategy.recipe.settings).model == strategy.model
 
 
 def test_only_a_strategy_that_can_use_what_is_known_is_told() -> None:

@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 import tomli_w
 
-from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.studies import Study, StudyStrategy, load_study
 from isiw.studies.plan import study_from, study_values
@@ -115,3 +115,14 @@ def test_a_single_name_is_a_strategy_and_a_cohort() -> None:
     study = tiny(strategies=("nr",), cohorts="gaussian")
     assert (study.strategies, study.cohorts) == ((StudyStrategy("nr"),), ("gaussian",))
     assert tiny(strategies="nr").strategies == (StudyStrategy("nr"),)
+
+
+def test_what_the_rig_states_is_told_where_a_study_says_so() -> None:
+    def settings(hit_delay: Any, space: DesignSpace) -> list[dict[str, Any]]:
+        study = Study((StudyStrategy("default"),), ("recruitment", "electrical"), 1, space=space, hit_delay=hit_delay)
+        return [dict(unit.sessions[0].settings) for unit in study.units()]
+
+    assert settings("unstated", IMPACT_SPACE) == [{}, {}]
+    assert settings("stated", IMPACT_SPACE) == [{}, {"conditioning": "electrical"}]
+    delay = {"hit_delay_ms": (180.0, 6.0)}
+    assert settings("stated", VALVE_SPACE) == [delay, delay | {"conditioning": "electrical"}]

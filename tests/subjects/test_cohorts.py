@@ -27,11 +27,11 @@ from known import instance, known
 
 PEOPLE = 400
 KS_LEVEL = 1e-5
-OFF_THE_MAP = ("other-rig", "late", "very-wide", "steep", "flat", "weak", "rmt-off", "hand")
+OFF_THE_MAP = ("other-rig", "late", "very-wide", "steep", "flat", "weak", "rmt-off", "hand", "electrical")
 OTHER_LAWS = {"odd", "kim11", "kim11-measured", "another-day", "supra-threshold", *LABS}
-USUAL_START = [name for name in COHORTS if name not in {"late", "very-wide", *OTHER_LAWS}]
+USUAL_START = [name for name in COHORTS if name not in {"late", "very-wide", "electrical", *OTHER_LAWS}]
 USUAL_DELAY = [name for name in COHORTS if name not in {"other-rig", *OTHER_LAWS}]
-USUAL_WIDTH = [name for name in COHORTS if name not in {"narrow", "wide", "very-wide", *OTHER_LAWS}]
+USUAL_WIDTH = [name for name in COHORTS if name not in {"narrow", "wide", "very-wide", "electrical", *OTHER_LAWS}]
 GAIN = [name for name in COHORTS if name not in {"recruitment", "nonresponder", *OTHER_LAWS, *OFF_THE_MAP}]
 SOME_WITHOUT_A_WINDOW = {
     "nonresponder": 0.0,
@@ -63,6 +63,7 @@ GOLDEN = {  # person 3 of seed 7: start, width, hit delay [ms]; baseline, one ME
     "weak": (17.935991515, 120.696943048, 183.443699559, 15.700784707, 56.608959530),
     "rmt-off": (74.218307886, 112.525712103, 188.232285430, 24.203424727, 37.024783464),
     "hand": (84.807565834, 40.000000000, 188.025895468, 405.512286791, 836.441568198),
+    "electrical": (19.976246574, 19.837553640, 187.852063419, 21.786812540, 38.306593589),
     "odd": (90.440553468, 45.837527776, 184.314130489, 194.289659538, 464.222031414),
     "supra-threshold": (24.866261922, 32.847816077, 189.879315173, 826.299001084, 825.329106370),
     "nonresponder": (26.795763804, 200.583631934, 171.477980223, 17.537323509, 27.809842272),
@@ -183,8 +184,10 @@ def test_windows_start_as_stated(name: str) -> None:
     assert_uniform([profile_of(s).start_ms for s in people(name)], 5, 110)
 
 
-@pytest.mark.parametrize(("name", "low_ms", "high_ms"), [("late", 80, 200), ("very-wide", 0, 60)])
-def test_late_and_very_wide_windows_have_their_starts(name: str, low_ms: float, high_ms: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "low_ms", "high_ms"), [("late", 80, 200), ("very-wide", 0, 60), ("electrical", 5, 50)]
+)
+def test_late_very_wide_and_electrical_windows_have_their_starts(name: str, low_ms: float, high_ms: float) -> None:
     assert_uniform([profile_of(s).start_ms for s in people(name)], low_ms, high_ms)
 
 
@@ -199,6 +202,16 @@ def test_another_rig_hits_at_any_time_and_states_it() -> None:
     drawn = people("other-rig")
     assert_uniform([s.hit_delay_ms for s in drawn], 20, 300)
     assert all(s.stated_hit_delay_ms == (s.hit_delay_ms, 6.0) for s in drawn)
+
+
+@pytest.mark.parametrize("name", COHORTS)
+def test_what_rigs_state_of_their_hit_delay_is_true(name: str) -> None:
+    off = [(s.hit_delay_ms - s.stated_hit_delay_ms[0]) / s.stated_hit_delay_ms[1] for s in people(name)]
+    assert np.abs(off).max() < 4.0
+
+
+def test_only_people_of_electrical_are_not_tapped() -> None:
+    assert {name for name in COHORTS if cohort(name, 1, 3)[0].conditioning == "electrical"} == {"electrical"}
 
 
 def assert_clipped_log_normal(values: object, median: float, log_sd: float, ends: tuple[float, float]) -> None:
@@ -223,6 +236,7 @@ def test_widths_are_log_normal_and_clipped(name: str) -> None:
 
 def test_very_wide_windows_have_their_widths() -> None:
     assert_clipped_log_normal([profile_of(s).width_ms for s in people("very-wide")], 200, 0.25, (120, 320))
+    assert_clipped_log_normal([profile_of(s).width_ms for s in people("electrical")], 20, 0.3, (10, 40))
 
 
 @pytest.mark.parametrize(("name", "low_ms", "high_ms"), [("narrow", 35, 50), ("wide", 180, 230)])

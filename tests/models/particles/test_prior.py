@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import torch
 
-from isiw.design import VALVE_SPACE
+from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.models.particles.latents import BLOCKS, LATENTS, latents_of, used_by
 from isiw.models.particles.laws import (
@@ -242,3 +242,27 @@ def test_as_usual_unusual_windows_keep_a_part_of_their_probability(hit_delay_ms:
     assert usual.start.p_anywhere == pytest.approx(0.04 / 3)
     assert (usual.p_window, usual.start.hit_delay_ms) == (profile.p_window, hit_delay_ms)
     assert profile.as_usual(1.0) == profile
+
+
+def test_after_an_electrical_pulse_windows_are_believed_narrow_and_early() -> None:
+    generator = torch.Generator().manual_seed(1)
+    prior = Prior(ProfilePrior(conditioning="electrical"))
+    shape = prior.person(prior.sample(1, MANY, generator, IMPACT_SPACE)).shape
+    usual = (shape.start_ms >= 0) & (shape.start_ms <= 60)
+    assert 0.65 < usual.float().mean() < 0.85
+    assert 15 < shape.width_ms.median() < 35
+    assert (shape.width_ms < 35).float().mean() > 0.65
+
+
+def test_starts_and_widths_of_ones_own_are_kept_whatever_comes_first() -> None:
+    own = (Width(1.0, Scale(50.0, 0.3)),)
+    profile = ProfilePrior(widths=own)
+    assert replace(profile, conditioning="electrical").widths == own
+    assert replace(ProfilePrior(conditioning="electrical"), conditioning="tap") == ProfilePrior()
+    delayed = ProfilePrior(start=StartPrior(hit_delay_ms=(150.0, 5.0)), conditioning="electrical").start
+    assert delayed == replace(ProfilePrior(conditioning="electrical").start, hit_delay_ms=(150.0, 5.0))
+
+
+def test_a_stimulus_that_is_neither_tap_nor_pulse_is_refused() -> None:
+    with pytest.raises(InvalidValueError, match="conditioning"):
+        ProfilePrior(conditioning="puff")  # type: ignore[arg-type] # is refused
