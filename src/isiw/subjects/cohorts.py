@@ -125,7 +125,7 @@ _OFF_THE_MAP: Final[Mapping[str, _Law]] = MappingProxyType(
 """People whom the usual law does not cover."""
 
 _NARROW: Final = _Law(start_ms=(5, 50), width_ms=(20, 0.3), width_limits_ms=(10, 40))
-"""Windows after an electrical pulse: about 20 ms wide (dissertation, 3.3.4)."""
+"""Windows after an electrical pulse: 15–20 ms wide with TMS below the threshold (dissertation, 3.3.4)."""
 
 _KINDS_OF_ODD: Final = ("other-rig", "late", "very-wide", ("steep", "flat"), "weak", "rmt-off", "hand")
 

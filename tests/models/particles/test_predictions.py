@@ -18,8 +18,13 @@ from isiw.window import Window, window_from_excess
 
 @pytest.mark.parametrize(
     "space",
-    [VALVE_SPACE, DesignSpace(0, 300, reference="valve"), DesignSpace(240, 300, reference="valve")],
-    ids=["whole windows", "windows cut off", "inside windows"],
+    [
+        VALVE_SPACE,
+        DesignSpace(0, 300, reference="valve"),
+        DesignSpace(240, 300, reference="valve"),
+        DesignSpace(0, 500, step_ms=25, reference="valve"),
+    ],
+    ids=["whole windows", "windows cut off", "inside windows", "a coarse grid"],
 )
 def test_windows_are_those_of_the_rule_also_where_a_peak_lies_beyond_the_range(space: DesignSpace) -> None:
     # Tables of facilitations are interpolated in windows and in MEPs; they differ where an edge or a peak lies between.

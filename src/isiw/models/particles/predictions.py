@@ -11,12 +11,15 @@ from isiw.design import DesignSpace
 from isiw.models.particles.likelihood import in_pieces, levels
 from isiw.models.particles.noise import NODES, Response, evoked_mean, log_gain, outcome_density
 from isiw.models.particles.prior import Person
-from isiw.models.particles.shapes import highest_facilitation, reaches
+from isiw.models.particles.shapes import facilitation, highest_facilitation, reaches
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
 from isiw.models.windows import least_excess_mv
 
 __all__ = ["PersonSample", "outcome_table"]
+
+FINE_MS = 1.0
+"""Between the points of such a grid facilitation hardly changes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +46,18 @@ class PersonSample:
         return evoked_mean(self.person.response, self._levels)
 
     @cached_property
+    def _highest(self) -> Tensor:
+        """Largest facilitation on the space's grid, shape (b, s); on a fine one that of its whole range."""
+        if self.space.step_ms <= FINE_MS:
+            return highest_facilitation(self.person.shape, self.space.low_ms, self.space.high_ms)
+        grid_ms = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=self.person.present.device)
+        return facilitation(self.person.shape, grid_ms).amax(-1)
+
+    @cached_property
     def edge_level(self) -> Tensor:
         """Facilitation at a window's edge by the least-excess rule; above 1 where there is no window, shape (b, s)."""
         excess_mv = self.person.response.log_floor.exp().unsqueeze(-1) * (self._evoked - self._evoked[..., :1])
-        highest = highest_facilitation(self.person.shape, self.space.low_ms, self.space.high_ms)
-        peak_mv = interpolated(excess_mv.unsqueeze(-1), highest.unsqueeze(-1))[..., 0, 0]
+        peak_mv = interpolated(excess_mv.unsqueeze(-1), self._highest.unsqueeze(-1))[..., 0, 0]
         least_mv = least_excess_mv(peak_mv, self.baselines_mv()).unsqueeze(-1)
         right = torch.searchsorted(excess_mv.contiguous(), least_mv.contiguous()).clamp(1, LEVELS - 1)
         low_mv, high_mv = excess_mv.gather(-1, right - 1), excess_mv.gather(-1, right)

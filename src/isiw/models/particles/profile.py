@@ -79,7 +79,7 @@ _AFTER: Final[Mapping[Conditioning, _Windows]] = MappingProxyType(
     {
         # 60–220 ms, mean 108 measured (dissertation, Table 4.1).
         "tap": _Windows(TAP_SPANS, (Width(0.7, Scale(100.0, 0.42)), Width(0.3, Scale(170.0, 0.5)))),
-        # About 20 ms measured (dissertation, 3.3.4); facilitation at 0–7.5 and 22.5–35 ms known before (its chapter 3).
+        # 15–20 ms measured, with TMS below the threshold (dissertation, 3.3.4); most studies use an ISI of 25 ms.
         "electrical": _Windows(
             (Span(0.7, 0.0, 60.0, 3.0), Span(0.3, -30.0, 260.0, 20.0)),
             (Width(0.75, Scale(20.0, 0.4)), Width(0.25, Scale(60.0, 0.7))),
