@@ -35,6 +35,13 @@ def test_the_example_in_python_runs(
     assert len(list((tmp_path / "small.study" / "parts").iterdir())) == 8
 
 
+def test_a_strategy_of_ones_own_meets_the_people_of_a_study(capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict[str, Any] = {"__name__": "docs"}
+    exec(compile(blocks("python")[1], "studies.md", "exec"), names)  # noqa: S102 - the point of the test
+    assert set(names["rows"]["strategy"]) == {"straddle"}
+    assert "10" in capsys.readouterr().out
+
+
 def test_every_column_of_a_row_is_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {"__name__": "docs"}
