@@ -22,6 +22,7 @@ from isiw.log.schema import Event, Intent, StrategyRecipe
 from isiw.log.topics import decode
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session
+from isiw.session.opening import open_session
 from isiw.session.resume import exclude, resume
 from isiw.session.updates import SessionUpdate
 from isiw.strategy.catalogue import make_strategy
@@ -173,6 +174,40 @@ def test_the_header_of_each_part_stays_in_the_log(interrupted: Path, space: Desi
     assert messages[0].topic == "/header"
     assert [decode(m.topic, m.data) for m in messages if m.topic == "/header"] == headers
     assert len({header.limits for header in headers}) == 3
+
+
+@pytest.fixture
+def own_loop(log: Path) -> Path:
+    """A log of a lab's own loop, without limits that anybody stated, after two of ten trials."""
+    with open_session(scripted_strategy(10), log) as session:
+        for _ in range(2):
+            session.tell(session.ask(), 0.02)
+    return log
+
+
+def test_a_device_that_takes_over_a_loop_of_the_labs_own_waits_the_usual_interval(own_loop: Path) -> None:
+    device, clock = ScriptedDevice(simulated=False), FakeRealClock()
+    with pytest.raises(KeyboardInterrupt):
+        resume(own_loop, device, scripted_strategy(10), clock=clock, on_trial=stop_after(4)).run()
+    record = read_session(own_loop)
+    assert [intent.t_s for intent in record.intents][2:] == [105.0, 110.0]
+    assert "At least 5 s between two stimuli from here on; it was 0 s." in record.events[0].text
+    resume(own_loop, device, scripted_strategy(10), clock=clock).run()
+    assert clock.now_s() == 110.0 + 6 * 5.0
+
+
+@pytest.mark.parametrize(
+    ("own_s", "stated_s", "holds_s"), [(0.0, 0.5, 0.5), (0.0, None, 5.0), (3.0, None, 5.0), (8.0, None, 8.0)]
+)
+def test_the_interval_that_a_device_takes_over_is_the_longer_one_unless_another_is_stated(
+    log: Path, own_s: float, stated_s: float | None, holds_s: float
+) -> None:
+    space = scripted_strategy().space
+    with open_session(scripted_strategy(10), log, limits=Limits.of_space(space, min_iti_s=own_s)):
+        pass
+    limits = None if stated_s is None else Limits.of_space(space, min_iti_s=stated_s)
+    session = resume(log, ScriptedDevice(simulated=False), scripted_strategy(10), limits=limits)
+    assert session.header.limits.min_iti_s == holds_s
 
 
 def test_the_first_stimulus_after_resuming_waits_a_whole_interval(

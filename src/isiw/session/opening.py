@@ -128,7 +128,7 @@ def _resumed(
     ages = ages_s(salvaged, len(replayed.trials))
     for trial in replayed.unknown:
         writer.append(trial)
-    writer.append(resumption(record, replayed))
+    writer.append(resumption(record, replayed, header.limits))
     if record.is_judged_since:
         strategy = replayed.strategy
         writer.append(believed(strategy, len(replayed.trials) - 1, strategy.decision(), None))
