@@ -9,9 +9,11 @@ import pytest
 
 from isiw.config.going_on import changes_on_resume, differences_on_resume
 from isiw.config.run import load_config
+from isiw.devices.protocol import Readiness
 from isiw.log.reader import SessionRecord, read_session
+from isiw.session.loop import Session
 from isiw.session.opening import open_session
-from scripted import SPACE, scripted_strategy
+from scripted import SPACE, ScriptedDevice, scripted_strategy
 
 
 @pytest.fixture
@@ -46,3 +48,30 @@ def test_an_interval_that_the_configuration_states_holds(config: Any, own_loop: 
     stated = config("[limits]\nmin_iti_s = 2.0\n")
     assert changes_on_resume(stated, own_loop)["limits"].min_iti_s == 2.0
     assert differences_on_resume(stated, own_loop) == ("limits.min_iti_s is 2.0 from here on; it was 0.0.",)
+
+
+@pytest.fixture
+def locked(tmp_path: Path) -> SessionRecord:
+    """The log of a session that is bound to the intensity that its device reported."""
+
+    class Stimulator(ScriptedDevice):
+        def readiness(self) -> Readiness:
+            return Readiness(intensity_pct_mso=60.0)
+
+    Session(Stimulator(), scripted_strategy(2), log=tmp_path / "s.mcap").run()
+    return read_session(tmp_path / "s.mcap")
+
+
+def test_the_intensity_that_a_session_began_with_stays_where_the_configuration_names_none(
+    config: Any, locked: SessionRecord
+) -> None:
+    said = config("[limits]\nmax_pulses = 50\n")
+    limits = changes_on_resume(said, locked)["limits"]
+    assert (limits.max_pulses, limits.intensity_pct_mso) == (50, 60.0)
+    assert differences_on_resume(said, locked) == ("limits.max_pulses is 50 from here on; it was 200.",)
+
+
+def test_the_intensity_that_the_configuration_names_holds(config: Any, locked: SessionRecord) -> None:
+    said = config("[limits]\nintensity_pct_mso = 65.0\n")
+    assert changes_on_resume(said, locked)["limits"].intensity_pct_mso == 65.0
+    assert differences_on_resume(said, locked) == ("limits.intensity_pct_mso is 65.0 from here on; it was 60.0.",)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from isiw.config.run import RunConfig, config_of_log, has_truth
+from isiw.devices.limits import Limits
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Header
@@ -21,7 +22,7 @@ def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any
     """What a session goes on with, as arguments of `isiw.resume`: limits, signals and the device's time-out.
 
     `[limits]` and `[signals]` count as wholes, as for `isiw run`; without one of them it stays as it was logged last,
-    as `isiw.resume` says.
+    as `isiw.resume` says. The intensity that the session is bound to stays, unless the configuration names another one.
 
     Args:
         config: read from a file.
@@ -35,7 +36,7 @@ def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any
     _require_same_simulated(config, record)
     changes: dict[str, Any] = {}
     if "limits" in given:
-        changes["limits"] = dataclasses.replace(header.limits, **config.limits.model_dump())
+        changes["limits"] = _limits(config, header.limits)
     if "signals" in given:
         changes["signals"] = config.signals
     if config.device is not None and "timeout_s" in config.device.model_fields_set:
@@ -66,6 +67,13 @@ def differences_on_resume(config: RunConfig, record: SessionRecord) -> tuple[str
             if was != now
         ),
     )
+
+
+def _limits(config: RunConfig, logged: Limits) -> Limits:
+    said = config.limits.model_dump()
+    if said["intensity_pct_mso"] is None:
+        del said["intensity_pct_mso"]
+    return dataclasses.replace(logged, **said)
 
 
 def _require_space(config: RunConfig, header: Header) -> None:
