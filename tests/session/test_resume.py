@@ -29,6 +29,7 @@ from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Measurement, MistrialReason, Stimulus
+from isiw.visit import VisitProtocol
 from known import known
 from log.written import make_header
 from logs import cut_after
@@ -208,6 +209,34 @@ def test_the_interval_that_a_device_takes_over_is_the_longer_one_unless_another_
     limits = None if stated_s is None else Limits.of_space(space, min_iti_s=stated_s)
     session = resume(log, ScriptedDevice(simulated=False), scripted_strategy(10), limits=limits)
     assert session.header.limits.min_iti_s == holds_s
+
+
+IDLE = (
+    dataclasses.replace(Limits.of_space(scripted_strategy().space, max_pulses=5), max_block_pulses=3, rest_s=2.0),
+    VisitProtocol(block_trials=3, rest_s=2.0),
+)
+"""Limits and a protocol whose rests are shorter than the interval."""
+
+
+@pytest.mark.parametrize("part", [{"limits": IDLE[0]}, {"protocol": IDLE[1]}])
+def test_rests_that_limit_nothing_are_refused_where_they_are_stated_and_go_on_from_an_earlier_log(
+    log: Path, part: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = {"limits": Limits.of_space(scripted_strategy().space)} | part
+    with pytest.raises(InvalidValueError, match="so there is none"):
+        Session(ScriptedDevice(), scripted_strategy(4), log=log, **part).run()
+    with pytest.raises(InvalidValueError, match="so there is none"):
+        open_session(scripted_strategy(4), log, **own)
+    assert not list(log.parent.iterdir())
+    monkeypatch.setattr(Session, "_require_effect", lambda _: None)
+    with pytest.raises(KeyboardInterrupt):
+        Session(ScriptedDevice(), scripted_strategy(4), log=log, on_trial=stop_after(2), **part).run()
+    monkeypatch.undo()
+    with pytest.raises(InvalidValueError, match="so there is none"):
+        resume(log, ScriptedDevice(), scripted_strategy(4), limits=IDLE[0])
+    resume(log, ScriptedDevice(), scripted_strategy(4)).run()
+    header = read_session(log).header
+    assert {name: getattr(header, name) for name in part} == part
 
 
 def test_the_first_stimulus_after_resuming_waits_a_whole_interval(

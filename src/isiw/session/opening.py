@@ -68,7 +68,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
         DeviceError: the log is of a simulated device.
         InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; a subject that is no text,
-            or another than the log's; a protocol with control trials.
+            or another than the log's; a protocol with control trials; a rest or a period that limits nothing.
         LogError: there is a log already, or it cannot be written or read.
         StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
 
@@ -98,6 +98,8 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         signals=SignalLimits(),
         config=dict(config or {}),
     )
+    header.limits.require_effect()
+    header.protocol.require_effect(header.limits.min_iti_s)
     clock = clock or MonotonicClock()
     if not (resume and (path.exists() or part_of(path).exists())):
         return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)

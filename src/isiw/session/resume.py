@@ -70,7 +70,8 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     Raises:
         LogError: no such log, or one of which not even the header can be read.
         DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
-        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there.
+        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; or a rest or a period
+            of the limits that limits nothing.
         StrategyError: the strategy cannot be made again, or asks something else with the same versions.
         DeviceError: a simulated device for a session with a real one, or the other way round.
 
@@ -80,6 +81,8 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
     header = record.header
+    if limits is not None:
+        limits.require_effect()
     limits = limits or limits_of_log(header)
     require_as_real(device.describe(), header.device)
     record = with_lost_pulses(record, lost_pulses)
