@@ -81,6 +81,18 @@ def test_a_protocol_that_makes_no_sense_is_refused(wrong: dict[str, Any]) -> Non
         VisitProtocol(**wrong)
 
 
+@pytest.mark.parametrize(("iti_s", "min_iti_s"), [((5.0, 8.0), 0.0), (None, 8.0), ((8.0, 8.0), 5.0)])
+def test_a_rest_that_is_no_longer_than_the_longest_interval_is_refused_where_it_is_stated(
+    iti_s: tuple[float, float] | None, min_iti_s: float
+) -> None:
+    for rest_s in (2.0, 7.0, 8.0):
+        protocol = VisitProtocol(iti_s=iti_s, block_trials=3, rest_s=rest_s)
+        with pytest.raises(InvalidValueError, match=r"no longer than.*rest_s above 8"):
+            protocol.require_effect(min_iti_s)
+    VisitProtocol(iti_s=iti_s, block_trials=3, rest_s=8.1).require_effect(min_iti_s)
+    VisitProtocol(iti_s=iti_s, rest_s=2.0).require_effect(min_iti_s)
+
+
 @pytest.mark.parametrize("wrong", [{"day": 0}, {"operator": 7}, {"intensity_pct_rmt": 0.0}, {"muscle": None}])
 def test_a_note_of_the_wrong_kind_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"Visit\."):

@@ -47,8 +47,8 @@ from .devices.transports.lsl import LslDevice as LslDevice
 from .log.reader import read_session as read_session
 from .server.live.page import watch as watch
 from .session.loop import Session as Session
+from .session.opening import open_session as open_session
 from .session.recorder import Recorder as Recorder
-from .session.recorder import open_session as open_session
 from .session.resume import exclude as exclude
 from .session.resume import include as include
 from .session.resume import resume as resume

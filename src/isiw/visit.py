@@ -101,6 +101,26 @@ class VisitProtocol:
     def _share(self) -> Fraction:
         return _exact(self.tms_alone) + _exact(self.tap_alone)
 
+    def require_effect(self, min_iti_s: float) -> None:
+        """Raise where the intervals are as long as the rests, so that these are none.
+
+        It is for a protocol that somebody states: those of earlier logs stay readable.
+
+        Args:
+            min_iti_s: the interval of the limits, which holds where the protocol has none [s].
+
+        Raises:
+            InvalidValueError: a rest that is no longer than the longest interval.
+        """
+        longest_s = min_iti_s if self.iti_s is None else self.iti_s[1]
+        if self.block_trials is not None and self.rest_s <= longest_s:
+            raise InvalidValueError(
+                "the protocol's rest is no longer than the longest interval between two trials, so there is none",
+                got=f"rest_s {self.rest_s:g}, longest interval {longest_s:g}",
+                expected=f"rest_s above {longest_s:g}",
+                remedy="Set a longer rest_s [s], or leave out block_trials and rest_s.",
+            )
+
     def rests_before(self, trial: int) -> bool:
         """Whether a rest comes before this trial."""
         return self.block_trials is not None and trial > 0 and trial % self.block_trials == 0

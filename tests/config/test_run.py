@@ -18,7 +18,7 @@ from isiw.config.run import (
     true_window,
 )
 from isiw.devices.simulated import SimulatedDevice
-from isiw.errors import ConfigError, DeviceError, StrategyError
+from isiw.errors import ConfigError, DeviceError, InvalidValueError, StrategyError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from scripted import ScriptedDevice, scripted_strategy
@@ -129,6 +129,20 @@ def test_a_period_needs_a_number_of_pulses_also_where_it_is_the_usual_one(config
     for text in ("[limits]\nperiod_s = 3600.0\n", "[limits]\nrest_s = 120.0\n", "[protocol]\nrest_s = 120.0\n"):
         with pytest.raises(ConfigError, match=r"does nothing without"):
             load_config(config_file(text))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[limits]\nmax_block_pulses = 3\nrest_s = 2.0\n",
+        "[limits]\nmax_period_pulses = 3\nperiod_s = 1.0\n",
+        "[protocol]\nblock_trials = 3\nrest_s = 6.0\niti_s = [5.0, 8.0]\n",
+        "[protocol]\nblock_trials = 3\nrest_s = 20.0\n[limits]\nmin_iti_s = 30.0\n",
+    ],
+)
+def test_a_rest_or_a_period_that_limits_nothing_is_refused(config_file: WriteFile, text: str) -> None:
+    with pytest.raises(InvalidValueError, match=r"so there is none|limits nothing"):
+        load_config(config_file(text))
 
 
 RIG = '[device]\nfactory = "rig:make"\n'

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -31,6 +32,40 @@ LIMITS = Limits(low_ms=0, high_ms=200, min_iti_s=5.0, max_pulses=3)
 def test_limits_that_limit_nothing_are_refused(values: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         Limits(**({"low_ms": 0, "high_ms": 200} | values))
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"max_block_pulses": 3, "rest_s": 2.0}, "rest_s above 5"),
+        ({"max_block_pulses": 3, "rest_s": 5.0}, "rest_s above 5"),
+        ({"max_period_pulses": 3, "period_s": 1.0}, "period_s above 15"),
+        ({"max_period_pulses": 3, "period_s": 15.0}, "period_s above 15"),
+        ({"max_period_pulses": 720}, "period_s above 3600"),
+    ],
+)
+def test_a_rest_or_a_period_that_limits_nothing_is_refused_where_it_is_stated(
+    values: dict[str, Any], words: str
+) -> None:
+    limits = Limits(0, 200, **values)  # an earlier log with such limits is read
+    with pytest.raises(InvalidValueError, match=words):
+        limits.require_effect()
+    assert waits_s(limits) == {5.0}
+
+
+@pytest.mark.parametrize("values", [{"max_block_pulses": 3, "rest_s": 5.1}, {"max_period_pulses": 3, "period_s": 15.1}])
+def test_a_rest_or_a_period_that_makes_a_session_wait_is_none_that_limits_nothing(values: dict[str, Any]) -> None:
+    limits = Limits(0, 200, **values)
+    limits.require_effect()
+    assert max(waits_s(limits)) > 5.0
+
+
+def waits_s(limits: Limits) -> set[float]:
+    """How long is waited before each of thirty stimuli that come as soon as they may [s]."""
+    times_s: list[float] = []
+    for _ in range(30):
+        times_s.append(limits.earliest_s(times_s, 0.0))
+    return {after - before for before, after in pairwise(times_s)}
 
 
 def test_limits_of_a_space_hold_exactly_its_isis(space: DesignSpace) -> None:

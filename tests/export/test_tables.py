@@ -18,7 +18,7 @@ from isiw.export.tables import session_facts
 from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
-from isiw.session.recorder import open_session
+from isiw.session.opening import open_session
 from isiw.session.resume import exclude
 from isiw.visit import Visit
 from logs import cut_after

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import shutil
 from collections.abc import Container
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -88,6 +90,54 @@ def test_the_subjects_logs_of_a_folder_count_and_no_others(tmp_path: Path, heade
     assert len(ages_s) == 5
     assert ages_s == sorted(ages_s, reverse=True)
     assert len(earlier(tmp_path, "P08")) == 3
+
+
+def test_logs_in_folders_of_the_folder_count_and_the_own_one_never(tmp_path: Path, header: Header) -> None:
+    day = tmp_path / "P07" / "day 1"
+    day.mkdir(parents=True)
+    make_log(day / "a.mcap", header, intents=3)
+    make_log(day.parent / "b.mcap", header, intents=2)
+    own = make_log(day / "mine.mcap", header)
+    assert len(earlier_pulses_s(tmp_path, "P07", HOUR_S, but=own)) == 5
+    (day / "c.mcap").write_bytes(b"no log")
+    with pytest.raises(DamagedLogError):
+        earlier(tmp_path)
+
+
+def test_a_linked_folder_is_looked_into_and_a_circle_of_links_ends(tmp_path: Path, header: Header) -> None:
+    archive, folder = tmp_path / "archive", tmp_path / "logs"
+    archive.mkdir()
+    folder.mkdir()
+    make_log(archive / "a.mcap", header, intents=3)
+    (folder / "old").symlink_to(archive)
+    (archive / "back").symlink_to(folder)
+    assert len(earlier(folder)) == 3
+
+
+def test_a_folder_that_may_not_be_read_is_an_error_as_nobody_knows_what_it_holds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    locked, scandir = tmp_path / "locked", os.scandir
+    locked.mkdir()
+
+    def refused(path: Any) -> Any:
+        if Path(path) == locked:
+            raise PermissionError(13, "Permission denied", str(locked))
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", refused)
+    with pytest.raises(LogError, match=r"cannot be read: Permission denied.*locked"):
+        earlier(tmp_path)
+
+
+def test_copies_of_a_log_count_once_and_those_of_the_own_one_never(tmp_path: Path, header: Header) -> None:
+    export = tmp_path / "export"
+    export.mkdir()
+    shutil.copy(make_log(tmp_path / "a.mcap", header, intents=3), export)
+    shutil.copy(make_log(tmp_path / "mine.mcap", header, intents=2), export)
+    assert len(earlier(tmp_path)) == 3
+    (tmp_path / "mine.mcap").rename(tmp_path / "mine.mcap.part")
+    assert len(earlier(tmp_path)) == 3
 
 
 def test_an_interval_production_log_holds_no_stimuli_and_blocks_nobody(tmp_path: Path, header: Header) -> None:

@@ -20,7 +20,7 @@ from isiw.log.reader import SessionRecord, read_session
 from isiw.priors import Difference
 from isiw.report.compared import save_comparison
 from isiw.report.page import save_report
-from isiw.session.recorder import open_session
+from isiw.session.opening import open_session
 from report.sessions import HOSTILE, tapped
 from scripted import scripted_strategy
 

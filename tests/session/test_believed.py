@@ -14,7 +14,7 @@ from isiw.log.schema import Estimate
 from isiw.log.topics import decode, encode
 from isiw.session.believed import believed
 from isiw.session.loop import Session
-from isiw.session.recorder import open_session
+from isiw.session.opening import open_session
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choosing import candidate_isis
 from isiw.strategy.strategy import Strategy

@@ -17,7 +17,7 @@ from isiw.devices.protocol import Device
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
-from isiw.session.recorder import open_session
+from isiw.session.opening import open_session
 from isiw.session.resume import resume
 from isiw.session.updates import SessionUpdate
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep

@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -33,7 +34,8 @@ from isiw.report import final_statement
 from isiw.session import recorder
 from isiw.session.journal import relearned
 from isiw.session.loop import Session
-from isiw.session.recorder import Recorder, open_session
+from isiw.session.opening import open_session
+from isiw.session.recorder import Recorder
 from isiw.session.resume import exclude, resume
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
@@ -47,6 +49,33 @@ from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 @pytest.fixture
 def log(tmp_path: Path) -> Path:
     return tmp_path / "s.mcap"
+
+
+class BusyClock(FakeRealClock):
+    """In the middle of the first wait something else happens."""
+
+    def __init__(self, meanwhile: Callable[[], object]) -> None:
+        super().__init__()
+        self.meanwhile: Callable[[], object] | None = meanwhile
+
+    def sleep_s(self, duration_s: float) -> None:
+        meanwhile, self.meanwhile = self.meanwhile, None
+        super().sleep_s(duration_s / 2)
+        if meanwhile is not None:
+            meanwhile()
+        super().sleep_s(duration_s / 2)
+
+
+class MeetingClock(FakeRealClock):
+    """Whoever waits wakes up together with another one."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.both = threading.Barrier(2)
+
+    def sleep_s(self, duration_s: float) -> None:
+        self.both.wait(10.0)
+        super().sleep_s(duration_s)
 
 
 def mep_at(isi_ms: float) -> float:
@@ -205,6 +234,37 @@ def test_the_limits_hold(log: Path, space: DesignSpace) -> None:
         with pytest.raises(LimitExceededError, match="3 pulses"):
             session.ask()
     assert [intent.t_s for intent in read_session(log).intents] == [7.0, 14.0, 21.0]
+
+
+def test_tms_alone_that_is_told_while_an_ask_waits_has_its_interval_too(log: Path, space: DesignSpace) -> None:
+    clock = BusyClock(lambda: session.tell(None, 0.01))
+    session = open_session(scripted_strategy(9), log, limits=Limits.of_space(space, min_iti_s=5.0), clock=clock)
+    with session:
+        run(session, 1)
+    intents = read_session(log).intents
+    assert [(intent.isi_ms is None, intent.t_s) for intent in intents] == [(True, 102.5), (False, 107.5)]
+
+
+def test_tms_alone_that_is_told_while_an_ask_waits_may_have_been_the_last_pulse(log: Path, space: DesignSpace) -> None:
+    clock, limits = BusyClock(lambda: session.tell(None, 0.01)), Limits.of_space(space, min_iti_s=5.0, max_pulses=1)
+    session = open_session(scripted_strategy(9), log, limits=limits, clock=clock)
+    with session, pytest.raises(LimitExceededError, match="1 pulses"):
+        session.ask()
+    assert [intent.isi_ms for intent in read_session(log).intents] == [None]
+
+
+def test_two_who_ask_at_once_get_the_same_isi_and_one_intent(log: Path, space: DesignSpace) -> None:
+    clock, asked = MeetingClock(), list[float]()
+    with open_session(scripted_strategy(9), log, limits=Limits.of_space(space, min_iti_s=5.0), clock=clock) as session:
+        threads = [threading.Thread(target=lambda: asked.append(session.ask())) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(20.0)
+        assert len(asked) == 2
+        assert len(set(asked)) == 1
+        session.tell(asked[0], 0.02)
+    assert [intent.trial for intent in read_session(log).intents] == [0]
 
 
 def test_rests_between_blocks_are_waited_for_also_after_resuming(log: Path, space: DesignSpace) -> None:
@@ -397,7 +457,7 @@ VICTIM = """
 import sys, time
 sys.path.insert(0, {tests!r})
 from scripted import scripted_strategy
-from isiw.session.recorder import open_session
+from isiw.session.opening import open_session
 
 session = open_session(scripted_strategy(9), {log!r})
 for _ in range(3):

@@ -22,12 +22,14 @@ from isiw.log.schema import Event, Intent, StrategyRecipe
 from isiw.log.topics import decode
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session
+from isiw.session.opening import open_session
 from isiw.session.resume import exclude, resume
 from isiw.session.updates import SessionUpdate
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Measurement, MistrialReason, Stimulus
+from isiw.visit import VisitProtocol
 from known import known
 from log.written import make_header
 from logs import cut_after
@@ -173,6 +175,68 @@ def test_the_header_of_each_part_stays_in_the_log(interrupted: Path, space: Desi
     assert messages[0].topic == "/header"
     assert [decode(m.topic, m.data) for m in messages if m.topic == "/header"] == headers
     assert len({header.limits for header in headers}) == 3
+
+
+@pytest.fixture
+def own_loop(log: Path) -> Path:
+    """A log of a lab's own loop, without limits that anybody stated, after two of ten trials."""
+    with open_session(scripted_strategy(10), log) as session:
+        for _ in range(2):
+            session.tell(session.ask(), 0.02)
+    return log
+
+
+def test_a_device_that_takes_over_a_loop_of_the_labs_own_waits_the_usual_interval(own_loop: Path) -> None:
+    device, clock = ScriptedDevice(simulated=False), FakeRealClock()
+    with pytest.raises(KeyboardInterrupt):
+        resume(own_loop, device, scripted_strategy(10), clock=clock, on_trial=stop_after(4)).run()
+    record = read_session(own_loop)
+    assert [intent.t_s for intent in record.intents][2:] == [105.0, 110.0]
+    assert "At least 5 s between two stimuli from here on; it was 0 s." in record.events[0].text
+    resume(own_loop, device, scripted_strategy(10), clock=clock).run()
+    assert clock.now_s() == 110.0 + 6 * 5.0
+
+
+@pytest.mark.parametrize(
+    ("own_s", "stated_s", "holds_s"), [(0.0, 0.5, 0.5), (0.0, None, 5.0), (3.0, None, 5.0), (8.0, None, 8.0)]
+)
+def test_the_interval_that_a_device_takes_over_is_the_longer_one_unless_another_is_stated(
+    log: Path, own_s: float, stated_s: float | None, holds_s: float
+) -> None:
+    space = scripted_strategy().space
+    with open_session(scripted_strategy(10), log, limits=Limits.of_space(space, min_iti_s=own_s)):
+        pass
+    limits = None if stated_s is None else Limits.of_space(space, min_iti_s=stated_s)
+    session = resume(log, ScriptedDevice(simulated=False), scripted_strategy(10), limits=limits)
+    assert session.header.limits.min_iti_s == holds_s
+
+
+IDLE = (
+    dataclasses.replace(Limits.of_space(scripted_strategy().space, max_pulses=5), max_block_pulses=3, rest_s=2.0),
+    VisitProtocol(block_trials=3, rest_s=2.0),
+)
+"""Limits and a protocol whose rests are shorter than the interval."""
+
+
+@pytest.mark.parametrize("part", [{"limits": IDLE[0]}, {"protocol": IDLE[1]}])
+def test_rests_that_limit_nothing_are_refused_where_they_are_stated_and_go_on_from_an_earlier_log(
+    log: Path, part: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = {"limits": Limits.of_space(scripted_strategy().space)} | part
+    with pytest.raises(InvalidValueError, match="so there is none"):
+        Session(ScriptedDevice(), scripted_strategy(4), log=log, **part).run()
+    with pytest.raises(InvalidValueError, match="so there is none"):
+        open_session(scripted_strategy(4), log, **own)
+    assert not list(log.parent.iterdir())
+    monkeypatch.setattr(Session, "_require_effect", lambda _: None)
+    with pytest.raises(KeyboardInterrupt):
+        Session(ScriptedDevice(), scripted_strategy(4), log=log, on_trial=stop_after(2), **part).run()
+    monkeypatch.undo()
+    with pytest.raises(InvalidValueError, match="so there is none"):
+        resume(log, ScriptedDevice(), scripted_strategy(4), limits=IDLE[0])
+    resume(log, ScriptedDevice(), scripted_strategy(4)).run()
+    header = read_session(log).header
+    assert {name: getattr(header, name) for name in part} == part
 
 
 def test_the_first_stimulus_after_resuming_waits_a_whole_interval(

@@ -20,7 +20,7 @@ from isiw.log.schema import Estimate, Event, Intent
 from isiw.log.verdicts import LOOKED_AT
 from isiw.report import final_statement
 from isiw.session.loop import Session
-from isiw.session.recorder import open_session
+from isiw.session.opening import open_session
 from isiw.session.resume import exclude, include, resume
 from isiw.session.safeguards import Safeguards
 from isiw.session.updates import SessionUpdate

@@ -12,6 +12,7 @@ from isiw.devices.limits import Limits
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Header
+from isiw.session.resume import limits_of_log
 from isiw.strategy.catalogue import make_strategy
 
 __all__ = ["changes_on_resume", "differences_on_resume"]
@@ -20,7 +21,8 @@ __all__ = ["changes_on_resume", "differences_on_resume"]
 def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any]:
     """What a session goes on with, as arguments of `isiw.resume`: limits, signals and the device's time-out.
 
-    `[limits]` and `[signals]` count as wholes, as for `isiw run`; without one of them it stays as it was logged last.
+    `[limits]` and `[signals]` count as wholes, as for `isiw run`; without one of them it stays as it was logged last,
+    as `isiw.resume` says. The intensity that the session is bound to stays, unless the configuration names another one.
 
     Args:
         config: read from a file.
@@ -32,7 +34,9 @@ def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any
     header, given = record.header, config.model_fields_set
     _require_space(config, header)
     _require_same_simulated(config, record)
-    changes: dict[str, Any] = {"limits": _limits(config, header.limits)}
+    changes: dict[str, Any] = {}
+    if "limits" in given:
+        changes["limits"] = _limits(config, header.limits)
     if "signals" in given:
         changes["signals"] = config.signals
     if config.device is not None and "timeout_s" in config.device.model_fields_set:
@@ -51,7 +55,7 @@ def differences_on_resume(config: RunConfig, record: SessionRecord) -> tuple[str
     """
     header, changes = record.header, changes_on_resume(config, record)
     changed = [
-        *_differing("limits", header.limits, changes["limits"]),
+        *_differing("limits", header.limits, changes.get("limits", limits_of_log(header))),
         *_differing("signals", header.signals, changes.get("signals", header.signals)),
         ("device.timeout_s", header.timeout_s, changes.get("timeout_s", header.timeout_s)),
     ]
@@ -66,7 +70,10 @@ def differences_on_resume(config: RunConfig, record: SessionRecord) -> tuple[str
 
 
 def _limits(config: RunConfig, logged: Limits) -> Limits:
-    return dataclasses.replace(logged, **config.limits.model_dump()) if "limits" in config.model_fields_set else logged
+    said = config.limits.model_dump()
+    if said["intensity_pct_mso"] is None:
+        del said["intensity_pct_mso"]
+    return dataclasses.replace(logged, **said)
 
 
 def _require_space(config: RunConfig, header: Header) -> None:

@@ -157,6 +157,7 @@ def load_config(path: str | Path | None = None) -> RunConfig:
 
     Raises:
         ConfigError: it cannot be read, or has an unknown key or a bad value; the message names file, key and value.
+        InvalidValueError: a rest or a period that limits nothing.
     """
     if path is None:
         return _validated({}, "the defaults")
@@ -166,6 +167,8 @@ def load_config(path: str | Path | None = None) -> RunConfig:
     config = _validated(values, str(path))
     _require_percent(config.visit)
     require_together(values)
+    _limits(config).require_effect()
+    config.protocol.require_effect(config.limits.min_iti_s)
     return config
 
 
@@ -276,7 +279,7 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         device,
         make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),
         log=log,
-        limits=dataclasses.replace(Limits.of_space(space), **config.limits.model_dump()),
+        limits=_limits(config),
         on_trial=on_trial,
         subject=config.visit.subject or ("" if config.device else _code(config)),
         signals=config.signals,
@@ -285,6 +288,10 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         visit=config.visit.noted(),
         protocol=config.protocol,
     )
+
+
+def _limits(config: RunConfig) -> Limits:
+    return dataclasses.replace(Limits.of_space(config.space.design()), **config.limits.model_dump())
 
 
 def _require_used(subject: SubjectConfig) -> None:

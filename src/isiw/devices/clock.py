@@ -5,7 +5,10 @@ from __future__ import annotations
 import time
 from typing import Protocol, runtime_checkable
 
-__all__ = ["Clock", "MonotonicClock", "VirtualClock"]
+__all__ = ["ROUNDING_S", "Clock", "MonotonicClock", "VirtualClock"]
+
+ROUNDING_S = 1e-6
+"""Who sleeps for exactly as long as is left may wake up a rounding error early."""
 
 
 @runtime_checkable

@@ -6,15 +6,13 @@ import dataclasses
 import threading
 from collections.abc import Callable, Sequence
 
-from isiw.devices.clock import Clock, VirtualClock
+from isiw.devices.clock import ROUNDING_S, Clock, VirtualClock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness, require_staged
 from isiw.errors import DeviceError, LimitExceededError, NotDelivered
 from isiw.trials import Stimulus
 
 __all__ = ["LimitedDevice", "require_real_time"]
-
-_ROUNDING_S = 1e-6  # who sleeps for exactly `wait_s` may wake up a rounding error early
 
 
 def require_real_time(info: DeviceInfo, clock: Clock) -> None:
@@ -107,7 +105,7 @@ class LimitedDevice:
         self._limits.require_left(self._delivered)
         if stimulus.isi_ms is not None:
             self._limits.require_isi(stimulus.isi_ms)
-        if (wait_s := self.wait_s()) > _ROUNDING_S:
+        if (wait_s := self.wait_s()) > ROUNDING_S:
             raise LimitExceededError(
                 "the next stimulus comes too early",
                 got=f"{wait_s:.3f} s before its time",

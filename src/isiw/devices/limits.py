@@ -90,6 +90,31 @@ class Limits:
             max_consecutive_mistrials=max_consecutive_mistrials,
         )
 
+    def require_effect(self) -> None:
+        """Raise where the interval alone keeps what a rest or a period asks for, so that these limit nothing.
+
+        It is for limits that somebody states: those of earlier logs stay readable.
+
+        Raises:
+            InvalidValueError: a rest that is no longer than the interval, or a period that always lets a stimulus pass.
+        """
+        if self.max_block_pulses is not None and self.rest_s <= self.min_iti_s:
+            raise InvalidValueError(
+                "the rest of the limits is no longer than the interval between two stimuli, so there is none",
+                got=f"rest_s {self.rest_s:g}, min_iti_s {self.min_iti_s:g}",
+                expected=f"rest_s above {self.min_iti_s:g}",
+                remedy="Set a longer rest_s [s], or leave out max_block_pulses and rest_s.",
+            )
+        # At the shortest interval n stimuli take so long that the next one comes when the first is n intervals old.
+        if self.max_period_pulses is not None and self.period_s <= self.max_period_pulses * self.min_iti_s:
+            raise InvalidValueError(
+                "the period of the limits limits nothing, as the interval alone lets no more stimuli into it",
+                got=f"period_s {self.period_s:g}, max_period_pulses {self.max_period_pulses}, "
+                f"min_iti_s {self.min_iti_s:g}",
+                expected=f"period_s above {self.max_period_pulses * self.min_iti_s:g}",
+                remedy="Set a longer period_s [s] or fewer max_period_pulses, or leave out both.",
+            )
+
     def require_left(self, delivered: int) -> None:
         """Raise where no delivery is left.
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import time
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from isiw.errors import DamagedLogError, LogError
-from isiw.log.durable import log_of
+from isiw.log.durable import log_of, part_of
 from isiw.log.outputs import is_log
 from isiw.log.reader import of_production, read_any
 from isiw.log.salvage import Message, Salvage, salvage
@@ -31,7 +33,11 @@ def pulses_s(salvaged: Salvage, now_ns: int | None = None) -> list[float]:
         salvaged: what was read from the log.
         now_ns: the time now [ns since 1970].
     """
-    now_ns = time.time_ns() if now_ns is None else now_ns
+    return _ages_s(_given(salvaged), now_ns)
+
+
+def _given(salvaged: Salvage) -> list[tuple[int, int]]:
+    """The number of each stimulus that was about to be delivered, and when that was [ns since 1970]."""
     at_ns: dict[int, int] = {}
     for message in salvaged.messages:
         record = _timed(message)
@@ -41,7 +47,12 @@ def pulses_s(salvaged: Salvage, now_ns: int | None = None) -> list[float]:
             at_ns.setdefault(record.index, message.log_time_ns)
         elif isinstance(record, Event) and record.kind == "refused" and record.trial is not None:
             at_ns.pop(record.trial, None)
-    return [max(0.0, (now_ns - each_ns) / 1e9) for each_ns in at_ns.values()]
+    return list(at_ns.items())
+
+
+def _ages_s(given: Iterable[tuple[int, int]], now_ns: int | None = None) -> list[float]:
+    now_ns = time.time_ns() if now_ns is None else now_ns
+    return [max(0.0, (now_ns - each_ns) / 1e9) for _, each_ns in given]
 
 
 def _timed(message: Message) -> Record | None:
@@ -55,30 +66,60 @@ def _timed(message: Message) -> Record | None:
 def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: Path) -> list[float]:
     """How long ago each stimulus of a subject was, by the logs of a folder [s]; those of simulations do not count.
 
+    Stimuli that several logs tell of, as an exported copy does, count once.
+
     Args:
-        folder: the folder.
+        folder: the folder, whose folders are looked into, too.
         subject: the person's code.
         period_s: how far back it matters [s].
-        but: a log that does not count, finished or not.
+        but: a log that does not count, finished or not; nor do copies of it.
 
     Raises:
-        LogError: there is no such folder, or a log in it cannot be read or has lost its end: nobody knows what it told
-            of.
+        LogError: there is no such folder, or a folder or log in it cannot be read, or has lost its end: nobody knows
+            what it told of.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise LogError("there is no such folder of logs", got=str(folder), remedy="Check Safeguards.earlier_logs.")
+    own = log_of(but.resolve())
+    given = {stimulus for log in sorted(_recent(folder, period_s) - {own}) for stimulus in _of_subject(log, subject)}
+    if own.exists() or part_of(own).exists():
+        given -= set(_given(salvage(own)))  # of which there may be a copy
+    return sorted((age_s for age_s in _ages_s(given) if age_s <= period_s), reverse=True)
+
+
+def _recent(folder: Path, period_s: float) -> set[Path]:
+    """The logs of a folder, and of its folders, that something was written to in a period."""
     since_s = time.time() - period_s
-    recent = (file for file in folder.iterdir() if file.is_file() and file.stat().st_mtime >= since_s)
-    logs = {log_of(file.resolve()) for file in recent if file.suffix in _SUFFIXES or is_log(file)}
-    logs -= {log_of(but.resolve())}
-    ages_s = [age_s for log in sorted(logs) for age_s in _of_subject(log, subject)]
-    return sorted((age_s for age_s in ages_s if age_s <= period_s), reverse=True)
+    try:
+        recent = [file for file in _files(folder) if file.is_file() and file.stat().st_mtime >= since_s]
+        return {log_of(file.resolve()) for file in recent if file.suffix in _SUFFIXES or is_log(file)}
+    except OSError as error:
+        raise LogError(
+            f"a folder of earlier logs cannot be read: {error.strerror}",
+            got=str(error.filename),
+            remedy="Give isiw the right to read all of Safeguards.earlier_logs, or name another folder.",
+        ) from error
 
 
-def _of_subject(log: Path, subject: str) -> list[float]:
+def _files(folder: Path) -> Iterator[Path]:
+    """What is in a folder and in its folders, each folder once, whatever links lead to it."""
+    seen = set()
+    for place, folders, names in os.walk(folder, onerror=_raise, followlinks=True):
+        if (real := os.path.realpath(place)) in seen:
+            folders.clear()
+            continue
+        seen.add(real)
+        yield from (Path(place, name) for name in names)
+
+
+def _raise(error: OSError) -> None:
+    raise error
+
+
+def _of_subject(log: Path, subject: str) -> list[tuple[int, int]]:
     salvaged = salvage(log)
-    if of_production(salvaged) and not pulses_s(salvaged):  # nobody is stimulated in such a task
+    if of_production(salvaged) and not _given(salvaged):  # nobody is stimulated in such a task
         return []
     header = read_any(salvaged).header
     if header.subject != subject or header.device.simulated:
@@ -89,4 +130,4 @@ def _of_subject(log: Path, subject: str) -> list[float]:
             got=str(log),
             remedy="Resume that session with the number of pulses that were lost, or wait until the period is over.",
         )
-    return pulses_s(salvaged)
+    return _given(salvaged)

@@ -14,8 +14,8 @@ from isiw.log.schema import RUN_KEY, SERVED_KEY, Estimate
 from isiw.metrics import f1
 from isiw.report.depression import depression_sentence
 from isiw.report.evidence import contradiction, no_comparison, nothing_measured, nothing_stood_out
+from isiw.session.header import OWN_LOOP
 from isiw.session.progress import asked, outcome
-from isiw.session.recorder import OWN_LOOP
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.text.found import SURE, rules_out
 from isiw.window import MIN_EXCESS_MV, Window

@@ -20,7 +20,7 @@ from isiw.server.answers import DecisionAnswer, EstimateAnswer, SessionAnswer, S
 from isiw.server.driven import DrivenSession, not_open
 from isiw.server.refusals import Refusal
 from isiw.server.requests import NAME, CreateRequest
-from isiw.session.recorder import open_session
+from isiw.session.opening import open_session
 from isiw.session.replay import strategy_of
 from isiw.strategy.catalogue import make_strategy
 

@@ -2,8 +2,9 @@
 
 from isiw.log.threshold import pulses_given, read_threshold
 from isiw.session.loop import Session
+from isiw.session.opening import open_session
 from isiw.session.progress import PROGRESS_HEADINGS, aligned, progress_row
-from isiw.session.recorder import Recorder, open_session
+from isiw.session.recorder import Recorder
 from isiw.session.resume import exclude, include, resume
 from isiw.session.threshold import ThresholdRecorder, open_threshold, resume_threshold, search_of
 from isiw.session.threshold_loops import open_simulated, run_by_hand, run_simulated, simulated_person

@@ -16,7 +16,10 @@ from isiw.log.durable import log_of
 from isiw.log.schema import Header, StrategyRecipe
 from isiw.strategy.strategy import Strategy
 
-__all__ = ["header_of", "header_with", "require_parts", "versions"]
+__all__ = ["OWN_LOOP", "header_of", "header_with", "require_parts", "versions"]
+
+OWN_LOOP = "a loop of the lab's own"
+"""What the log calls the device of a session whose loop is not isiw's."""
 
 _PACKAGES = ("numpy", "torch", "botorch", "gpytorch")
 

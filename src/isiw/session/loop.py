@@ -203,6 +203,7 @@ class Session(Judging):
         Raises:
             DeviceError: the device failed; it is stopped, and the trial is a mistrial "outcome unknown". Or another
                 session drives it.
+            InvalidValueError: a rest or a period of limits or protocol that limits nothing; nothing was delivered.
             LimitExceededError: a stimulus was refused; nothing was delivered.
             LogError: the log cannot be written, or is no longer at its path; nothing is delivered without a log.
             StrategyError: the strategy knows of trials that are not this session's; nothing was delivered.
@@ -214,6 +215,7 @@ class Session(Judging):
 
     def _run(self, *, progress: bool | None, keys: bool) -> SessionResult:
         self._require_own_strategy()
+        self._require_effect()
         earlier_s = self._earlier_s()
         self._steps.on_trial = self._reporting(progress=progress)
         with self._rig.driven(), self._open_log(self._header) as log, self._journal.writing(log):
@@ -322,6 +324,11 @@ class Session(Judging):
                 expected=f"{len(self.trials)} trials",
                 remedy="Make a new one, or give the session strategy.restarted().",
             )
+
+    def _require_effect(self) -> None:
+        if not self._resumed:  # what an earlier log says goes on as it was
+            self._limits.require_effect()
+            self._header.protocol.require_effect(self._limits.min_iti_s)
 
     def _earlier_s(self) -> list[float]:
         """How long ago each earlier stimulus was to the same person, as far as the logs to look at know [s]."""

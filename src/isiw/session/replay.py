@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from isiw.devices.limits import Limits
 from isiw.errors import ConfigError, InvalidValueError, OtherVersionsWarning, StrategyError
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent, StrategyRecipe
@@ -189,17 +190,21 @@ def _differing_text(replayed: Replayed, header: Header) -> str:
     )
 
 
-def resumption_text(record: SessionRecord, replayed: Replayed) -> str:
+def resumption_text(record: SessionRecord, replayed: Replayed, limits: Limits) -> str:
     """What the log says about a resumption.
 
     Args:
         record: the log.
         replayed: the strategy that has learned it.
+        limits: those that hold from here on.
     """
+    was_s, now_s = record.header.limits.min_iti_s, limits.min_iti_s
     sentences = [f"Resumed after {len(replayed.trials)} trials."]
     if replayed.differing:
         sentences.append(_differing_text(replayed, record.header))
     if replayed.unknown:
         numbers = ", ".join(str(trial.index) for trial in replayed.unknown)
         sentences.append(f"Outcome unknown: {numbers}.")
+    if was_s != now_s:
+        sentences.append(f"At least {now_s:g} s between two stimuli from here on; it was {was_s:g} s.")
     return " ".join((*sentences, *record.losses))

@@ -18,6 +18,7 @@ from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import MOST_TRIALS, Event, Header
 from isiw.log.verdicts import exclusion, inclusion
 from isiw.log.writer import LogWriter
+from isiw.session.header import OWN_LOOP
 from isiw.session.loop import Session
 from isiw.session.replay import Replayed, replay, resumption_text, strategy_of, warn_where_differing
 from isiw.session.safeguards import Safeguards
@@ -26,7 +27,7 @@ from isiw.signals.judgement import SignalLimits
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus, TrialTable
 
-__all__ = ["ages_s", "as_resumed", "exclude", "include", "resume", "resumption", "with_lost_pulses"]
+__all__ = ["ages_s", "as_resumed", "exclude", "include", "limits_of_log", "resume", "resumption", "with_lost_pulses"]
 
 
 def resume(  # noqa: PLR0913 - all but three are keyword-only
@@ -53,7 +54,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         path: the log, with or without `.part`; finished, torn or damaged.
         device: the device to go on with; one with a memory is brought to where the logged stimuli left it.
         strategy: needed where the session's strategy was built from a user's own objects: the same again.
-        limits: other limits than those that were logged last.
+        limits: other limits than those that `limits_of_log` says.
         signals: other demands on sweeps than those that were logged last; trials that were judged stay as they are.
         clock: as for `Session`.
         on_trial: as for `Session`.
@@ -69,7 +70,8 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     Raises:
         LogError: no such log, or one of which not even the header can be read.
         DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
-        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there.
+        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; or a rest or a period
+            of the limits that limits nothing.
         StrategyError: the strategy cannot be made again, or asks something else with the same versions.
         DeviceError: a simulated device for a session with a real one, or the other way round.
 
@@ -79,6 +81,9 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
     header = record.header
+    if limits is not None:
+        limits.require_effect()
+    limits = limits or limits_of_log(header)
     require_as_real(device.describe(), header.device)
     record = with_lost_pulses(record, lost_pulses)
     replayed = replay(record, strategy.restarted() if strategy else strategy_of(header), verify=verify)
@@ -89,7 +94,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         device,
         replayed.strategy,
         log=path,
-        limits=limits or header.limits,
+        limits=limits,
         clock=clock,
         on_trial=on_trial,
         subject=header.subject,
@@ -105,11 +110,26 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         replayed.trials,
         as_resumed(session.header, header, replayed),
         partial(LogWriter.continuing, path, salvaged, header),
-        (*replayed.unknown, resumption(record, replayed)),
+        (*replayed.unknown, resumption(record, replayed, limits)),
         partial(ages_s, salvaged, len(replayed.trials)),
         [event.text for event in record.events if event.kind == "pause"],
     )
     return session
+
+
+def limits_of_log(header: Header) -> Limits:
+    """The limits that a device goes on with where none are stated: those that were logged last.
+
+    A loop of the lab's own keeps its intervals itself, and has none by default; a device that takes it over has at
+    least the default one.
+
+    Args:
+        header: the log's.
+    """
+    limits = header.limits
+    if header.device.name != OWN_LOOP or limits.min_iti_s >= Limits.min_iti_s:
+        return limits
+    return dataclasses.replace(limits, min_iti_s=Limits.min_iti_s)
 
 
 def as_resumed(header: Header, logged: Header, replayed: Replayed) -> Header:
@@ -123,15 +143,16 @@ def as_resumed(header: Header, logged: Header, replayed: Replayed) -> Header:
     return header.model_copy(update={"created": logged.created, "asks_from": replayed.asks_from})
 
 
-def resumption(record: SessionRecord, replayed: Replayed) -> Event:
+def resumption(record: SessionRecord, replayed: Replayed, limits: Limits) -> Event:
     """What the log says about a resumption.
 
     Args:
         record: the log so far.
         replayed: what the strategy has learned of it.
+        limits: those that hold from here on.
     """
     last = len(replayed.trials) - 1 if replayed.trials else None
-    return Event(kind="resume", trial=last, text=resumption_text(record, replayed))
+    return Event(kind="resume", trial=last, text=resumption_text(record, replayed, limits))
 
 
 def ages_s(salvaged: Salvage, trials: int) -> list[float]:

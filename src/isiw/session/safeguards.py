@@ -23,7 +23,8 @@ class Safeguards:
         on_pause: is called with the reason when the session has paused and the device is disarmed; True goes on, and
             arms again. Without it the operator is asked in the terminal, and where there is none the session ends.
         dead_man: is called before each stimulus; anything but True refuses it and ends the session.
-        earlier_logs: a folder of logs; the same subject's stimuli in it count for the limits' period and block.
+        earlier_logs: a folder of logs, whose folders are looked into, too; the same subject's stimuli in it count for
+            the limits' period and block. A log that cannot be read refuses the session.
 
     Raises:
         InvalidValueError: a number of retries or a time that is negative.

@@ -1,0 +1,149 @@
+"""Opening a session whose loop is the lab's own, or going on with one from its log."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from isiw.checks import text
+from isiw.devices.clock import Clock, MonotonicClock
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import DeviceInfo
+from isiw.errors import InvalidValueError, StrategyError
+from isiw.log.durable import part_of
+from isiw.log.reader import read_salvaged
+from isiw.log.salvage import salvage
+from isiw.log.schema import Header
+from isiw.log.writer import LogWriter
+from isiw.session.believed import believed
+from isiw.session.header import OWN_LOOP, header_of, require_parts
+from isiw.session.recorder import Recorder
+from isiw.session.replay import replay, warn_where_differing
+from isiw.session.resume import ages_s, as_resumed, require_same_person, resumption, with_lost_pulses
+from isiw.signals.judgement import SignalLimits
+from isiw.strategy.strategy import Strategy
+from isiw.visit import Visit, VisitProtocol
+
+__all__ = ["open_session"]
+
+
+def open_session(  # noqa: PLR0913 - all but two are keyword-only
+    strategy: Strategy,
+    log: str | Path,
+    *,
+    resume: bool = False,
+    limits: Limits | None = None,
+    clock: Clock | None = None,
+    subject: str = "",
+    visit: Visit | None = None,
+    protocol: VisitProtocol | None = None,
+    config: Mapping[str, Any] | None = None,
+    lost_pulses: int | None = None,
+    on_doubt: Callable[[str], None] | None = None,
+) -> Recorder:
+    """Open a session whose loop is your own: ask it for ISIs, and tell it what came of them.
+
+    Args:
+        strategy: proposes ISIs and learns; of a session that goes on, made with the same settings and seed.
+        log: where the log is; it must not exist yet, unless the session goes on.
+        resume: whether to go on with the log where there is one. What was asked and has no outcome in it becomes a
+            mistrial.
+        limits: what may be asked; the strategy's space and 200 pulses by default, without an inter-trial interval; of a
+            session that goes on, the logged ones by default. Limits of the coil and of the intensity allow nothing, as
+            nobody reports these here.
+        clock: tells the time, and waits in `ask` until the interval, the rest and the period of the limits have passed,
+            before the first stimulus, too, as nobody knows what came before.
+        subject: the person's code, for the log; of a session that goes on, the logged one by default.
+        visit: what is noted about the visit, for the log; of a session that goes on, the logged one by default.
+        protocol: intervals, blocks and rests, which `ask` waits for; of a session that goes on, the logged one by
+            default. Control trials are the loop's own: `tell(None, …)` is TMS alone.
+        config: anything that should be kept in the log, as TOML values; of a session that goes on, what is logged by
+            default.
+        lost_pulses: as for `isiw.resume`: needed where the end of the log is missing.
+        on_doubt: called with what looks like a slip in what was told, or like a rig that needs somebody to look; by
+            default a warning.
+
+    Raises:
+        DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
+        DeviceError: the log is of a simulated device.
+        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; a subject that is no text,
+            or another than the log's; a protocol with control trials; a rest or a period that limits nothing.
+        LogError: there is a log already, or it cannot be written or read.
+        StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
+
+    Warns:
+        OtherVersionsWarning: with other versions than those that were logged the strategy asks something else.
+    """
+    path = require_parts(
+        log,
+        strategy=(strategy, Strategy),
+        limits=(limits, Limits | None),
+        visit=(visit, Visit | None),
+        protocol=(protocol, VisitProtocol | None),
+    )
+    if strategy.delivered:
+        raise StrategyError(
+            "the strategy knows of trials that are not this session's",
+            got=f"{strategy.delivered} trials",
+            remedy="Make it anew, or give the session strategy.restarted().",
+        )
+    header = header_of(
+        strategy,
+        subject=text("subject", subject),
+        visit=visit or Visit(),
+        protocol=_without_controls(protocol or VisitProtocol()),
+        limits=limits or Limits.of_space(strategy.space, min_iti_s=0.0),
+        device=DeviceInfo(OWN_LOOP, strategy.space.reference),
+        signals=SignalLimits(),
+        config=dict(config or {}),
+    )
+    header.limits.require_effect()
+    header.protocol.require_effect(header.limits.min_iti_s)
+    clock = clock or MonotonicClock()
+    if not (resume and (path.exists() or part_of(path).exists())):
+        return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
+    given = {"subject": subject, "visit": visit, "protocol": protocol, "limits": limits, "config": config}
+    unsaid = {name for name, value in given.items() if value is None or value == ""}
+    return _resumed(strategy, path, header, unsaid, lost_pulses, clock, on_doubt)
+
+
+def _resumed(
+    strategy: Strategy,
+    path: Path,
+    header: Header,
+    unsaid: Iterable[str],
+    lost_pulses: int | None,
+    clock: Clock,
+    on_doubt: Callable[[str], None] | None,
+) -> Recorder:
+    """The session of a log, from where it ends; what nobody said anew is as it was logged."""
+    salvaged = salvage(path)
+    record = read_salvaged(salvaged)
+    require_same_person(header, record.header)
+    record = with_lost_pulses(record, lost_pulses)
+    replayed = replay(record, strategy)
+    warn_where_differing(replayed, record.header)
+    logged = {name: getattr(record.header, name) for name in unsaid}
+    header = as_resumed(header.model_copy(update=logged), record.header, replayed)
+    writer = LogWriter.continuing(path, salvaged, record.header, header)
+    ages = ages_s(salvaged, len(replayed.trials))
+    for trial in replayed.unknown:
+        writer.append(trial)
+    writer.append(resumption(record, replayed, header.limits))
+    if record.is_judged_since:
+        strategy = replayed.strategy
+        writer.append(believed(strategy, len(replayed.trials) - 1, strategy.decision(), None))
+    writer.sync()
+    return Recorder(replayed.strategy, writer, header, clock, replayed.trials, ages, on_doubt)
+
+
+def _without_controls(protocol: VisitProtocol) -> VisitProtocol:
+    if protocol.tms_alone or protocol.tap_alone:
+        raise InvalidValueError(
+            "in a loop of one's own the protocol cannot have control trials, as ask() answers with an ISI",
+            got=protocol,
+            remedy="Give TMS alone whenever you like, and tell it with tell(None, mep_mv). isiw.Session interleaves "
+            "control trials itself.",
+        )
+    return protocol
