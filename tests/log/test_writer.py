@@ -15,6 +15,7 @@ from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Header, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel
+from known import known
 from log.written import write_trials
 
 
@@ -157,6 +158,32 @@ def test_continuing_keeps_all_records_and_appends(finished_log: Path) -> None:
     assert after.header == before.header
     assert after.finished
     assert list(finished_log.parent.iterdir()) == [finished_log]
+
+
+def blocks_of(log: Path) -> list[tuple[int, int]]:
+    """Where each block of records begins and ends."""
+    with log.open("rb") as file:
+        chunks = known(make_reader(file).get_summary()).chunk_indexes
+    return [(chunk.chunk_start_offset, chunk.chunk_start_offset + chunk.chunk_length) for chunk in chunks]
+
+
+def test_a_damaged_bit_costs_a_log_that_went_on_one_trial(finished_log: Path, header: Header) -> None:
+    before = blocks_of(finished_log)
+    LogWriter.continuing(finished_log, salvage(finished_log), header).close()
+    assert len(blocks_of(finished_log)) == len(before)
+    whole, table = finished_log.read_bytes(), read_session(finished_log).table
+    for _, end in blocks_of(finished_log):
+        finished_log.write_bytes(whole[: end - 20] + bytes([whole[end - 20] ^ 0x10]) + whole[end - 19 :])
+        damaged = read_session(finished_log)
+        assert damaged.losses
+        assert len(damaged.table) >= len(table) - 1
+
+
+def test_a_cut_copy_of_a_log_that_went_on_has_every_trial_before_the_cut(finished_log: Path, header: Header) -> None:
+    LogWriter.continuing(finished_log, salvage(finished_log), header).close()
+    start, _ = blocks_of(finished_log)[-1]
+    finished_log.write_bytes(finished_log.read_bytes()[:start])
+    assert len(read_session(finished_log).table) == 7
 
 
 def test_continuing_twice_keeps_metadata_names_unique(broken_log: Path, header: Header) -> None:
