@@ -15,8 +15,8 @@ from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Header, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel
-from known import known
 from log.written import write_trials
+from logs import blocks_of, damage
 
 
 def test_a_log_is_a_part_until_it_is_closed(tmp_path: Path, header: Header) -> None:
@@ -160,20 +160,14 @@ def test_continuing_keeps_all_records_and_appends(finished_log: Path) -> None:
     assert list(finished_log.parent.iterdir()) == [finished_log]
 
 
-def blocks_of(log: Path) -> list[tuple[int, int]]:
-    """Where each block of records begins and ends."""
-    with log.open("rb") as file:
-        chunks = known(make_reader(file).get_summary()).chunk_indexes
-    return [(chunk.chunk_start_offset, chunk.chunk_start_offset + chunk.chunk_length) for chunk in chunks]
-
-
 def test_a_damaged_bit_costs_a_log_that_went_on_one_trial(finished_log: Path, header: Header) -> None:
     before = blocks_of(finished_log)
     LogWriter.continuing(finished_log, salvage(finished_log), header).close()
     assert len(blocks_of(finished_log)) == len(before)
     whole, table = finished_log.read_bytes(), read_session(finished_log).table
-    for _, end in blocks_of(finished_log):
-        finished_log.write_bytes(whole[: end - 20] + bytes([whole[end - 20] ^ 0x10]) + whole[end - 19 :])
+    for block in range(len(before)):
+        finished_log.write_bytes(whole)
+        damage(finished_log, block)
         damaged = read_session(finished_log)
         assert damaged.losses
         assert len(damaged.table) >= len(table) - 1

@@ -11,14 +11,16 @@ import torch
 
 from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
-from isiw.errors import InvalidValueError, LogError
+from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.log.reader import read_session
 from isiw.models.particles.prior import Prior
+from isiw.session.resume import exclude
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse
 from isiw.subjects.subject import SimulatedSubject
 from known import instance, known
+from logs import damage
 from priors.logged import gaussian_person, write_log
 
 EARLY_MS, LATE_MS = 20.0, 200.0
@@ -122,6 +124,16 @@ def test_of_a_session_without_a_window_it_cannot_be_said_whether_it_moved(first:
     none = read_session(write_log(folder / "none.mcap", person(gain=0.0), trials=18))
     with pytest.raises(InvalidValueError, match="probably has none"):
         priors.moved(none, first)
+
+
+def test_a_day_whose_log_is_damaged_is_refused_unless_told(tmp_path: Path) -> None:
+    log = write_log(tmp_path / "s.mcap", trials=4)
+    exclude(log, 2, "sneezed")
+    damage(log)
+    record = read_session(log)
+    with pytest.raises(DamagedLogError, match=r"s\.mcap: .*lost.*Leave it out.*damaged=True"):
+        priors.after(record)
+    assert priors.after(record, damaged=True).profile.places
 
 
 def test_days_of_different_people_are_refused(first: Any, folder: Path) -> None:

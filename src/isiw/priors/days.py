@@ -25,7 +25,7 @@ from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Tensor
 from isiw.priors.components import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
-from isiw.priors.recall import recalled
+from isiw.priors.recall import recalled, require_whole
 from isiw.types import FloatArray
 
 __all__ = ["DayToDay", "after", "moved"]
@@ -78,16 +78,20 @@ class DayToDay:
         }
 
 
-def after(*records: SessionRecord, prior: Prior | None = None, law: DayToDay | None = None) -> Prior:
+def after(
+    *records: SessionRecord, prior: Prior | None = None, law: DayToDay | None = None, damaged: bool = False
+) -> Prior:
     """What is believed of a person after earlier sessions, for `isiw.make_strategy(prior=...)`.
 
     Args:
         *records: the person's sessions, the first one first.
         prior: what is believed of people before them; by default the built-in prior.
         law: how people differ from day to day.
+        damaged: whether of damaged logs is learnt what is left.
 
     Raises:
         LogError: a session without an accepted trial.
+        DamagedLogError: a session's log is damaged.
         InvalidValueError: sessions of different people, the same twice, or a later one first; sessions, or a prior,
             that count ISIs from different events, or are of rigs with different hit delays.
     """
@@ -95,6 +99,8 @@ def after(*records: SessionRecord, prior: Prior | None = None, law: DayToDay | N
     if not isinstance(prior, Prior | None):
         raise InvalidValueError("this is no prior", got=prior, expected="what isiw.priors.load(path) reads")
     prior, law = prior or Prior(), law or DayToDay()
+    for record in records if not damaged else ():
+        require_whole(record)
     for record in records:
         prior = _another_day(recalled(record, prior), law)
     return prior

@@ -21,7 +21,7 @@ from isiw.models.particles.profile import ProfilePrior, ShapeShares
 from isiw.priors.components import beside, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.priors.people import hyper_prior, people_of, usual_shares
 from isiw.priors.population import Law, Population, learnt
-from isiw.priors.recall import recalled, require_meps, stated_conditioning, stated_hit_delay_ms
+from isiw.priors.recall import recalled, require_meps, require_whole, stated_conditioning, stated_hit_delay_ms
 from isiw.types import Conditioning, Reference
 
 __all__ = ["LabPrior", "LearntSession", "learn"]
@@ -126,6 +126,7 @@ def learn(
     logs: Sequence[str | Path],
     *,
     again: bool = False,
+    damaged: bool = False,
     seed: int = 0,
     on_done: Callable[[SessionRecord], None] = lambda _record: None,
 ) -> LabPrior:
@@ -137,6 +138,7 @@ def learn(
     Args:
         logs: their paths.
         again: whether a person may be in more than one; each session counts as a person of its own.
+        damaged: whether of damaged logs is learnt what is left.
         seed: seed of the sampler.
         on_done: called after each session.
 
@@ -144,6 +146,7 @@ def learn(
         LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person
             twice, or sessions that count ISIs from different events, or are of rigs with different hit delays or of
             different conditioning stimuli, or of which some are simulated and others are not.
+        DamagedLogError: a log is damaged.
         InvalidValueError: a seed that is no whole number from 0 on.
     """
     seed = whole("seed", seed, least=0)
@@ -151,6 +154,8 @@ def learn(
         raise LogError("logs must be a list of paths", got=str(logs), remedy=f'Write ["{logs}"] for a single one.')
     records = [read_session(path) for path in logs]
     for record in records:
+        if not damaged:
+            require_whole(record)
         require_meps(record)
     sessions = tuple(_learnt_session(record) for record in records)
     _require_different(records, sessions, again=again)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
+from typing import Final
 
 from isiw.checks import mean_and_sd
-from isiw.errors import LogError
+from isiw.errors import DamagedLogError, LogError
 from isiw.log.reader import SessionRecord
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
 from isiw.types import Conditioning
 
-__all__ = ["recalled", "require_meps", "stated_conditioning", "stated_hit_delay_ms"]
+__all__ = ["recalled", "require_meps", "require_whole", "stated_conditioning", "stated_hit_delay_ms"]
+
+TOLD_LOSSES: Final = 3
+"""Losses that an error names; isiw show lists them all."""
 
 
 def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> ParticlePosterior:
@@ -57,6 +62,24 @@ def require_meps(record: SessionRecord) -> None:
             "the session has no MEP to learn from: every amplitude is 0, below the detection limit",
             got=str(record.path),
             remedy="Leave this log out.",
+        )
+
+
+def require_whole(record: SessionRecord) -> None:
+    """Check that nothing is lost of a session that is learnt from: an exclusion may be among it.
+
+    Args:
+        record: the session.
+
+    Raises:
+        DamagedLogError: its log is damaged.
+    """
+    if record.losses:
+        raise DamagedLogError(
+            "the log is damaged, so that what a person excluded may count as if nobody had",
+            got=f"{record.path}: {' '.join(record.losses[:TOLD_LOSSES])}",
+            remedy=f"Leave it out; or, if what isiw show {shlex.quote(str(record.path))} lists is right, let it count "
+            "all the same: damaged=True, or isiw prior learn --damaged.",
         )
 
 
