@@ -15,6 +15,7 @@ from isiw.signals.judgement import SignalLimits
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
 from isiw.trials import Status, Trial
+from isiw.visit import Visit
 
 
 def gaussian_person(number: int = 0) -> SimulatedSubject:
@@ -33,6 +34,7 @@ def write_log(
     simulated: bool = False,
     created: str = "2026-11-21T10:00:00+00:00",
     hit_delay_ms: tuple[float, float] | None = None,
+    visit: Visit | None = None,
 ) -> Path:
     """The log of a session with ISIs all over the range."""
     header = Header(
@@ -45,6 +47,7 @@ def write_log(
         limits=Limits.of_space(space),
         device=DeviceInfo("bench", space.reference, simulated=simulated, hit_delay_ms=hit_delay_ms),
         signals=SignalLimits(),
+        visit=visit or Visit(),
     )
     responder = (person or gaussian_person()).begin(seed)
     order = np.random.default_rng(seed).permutation(trials)

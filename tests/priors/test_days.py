@@ -19,6 +19,7 @@ from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse
 from isiw.subjects.subject import SimulatedSubject
+from isiw.visit import Visit
 from known import instance, known
 from logs import damage
 from priors.logged import gaussian_person, write_log
@@ -141,6 +142,21 @@ def test_days_of_different_people_are_refused(first: Any, folder: Path) -> None:
     for together in (priors.after, priors.moved):
         with pytest.raises(InvalidValueError, match="different people"):
             together(first, other)
+
+
+@pytest.mark.parametrize(
+    ("noted", "what"),
+    [(Visit(muscle="FDI"), "different muscles, FCR and FDI"), (Visit(intensity_pct_rmt=120.0), "90 and 120 % of RMT")],
+)
+def test_days_of_different_muscles_or_intensities_are_refused(noted: Visit, what: str, tmp_path: Path) -> None:
+    usual = Visit(muscle="FCR", intensity_pct_rmt=90.0)
+    one, other = (
+        read_session(write_log(tmp_path / f"{day}.mcap", trials=4, created=f"2026-11-2{day}", seed=day, visit=visit))
+        for day, visit in enumerate((usual, noted), 1)
+    )
+    for together in (priors.after, priors.moved):
+        with pytest.raises(InvalidValueError, match=what):
+            together(one, other)
 
 
 def test_a_session_counts_once_also_as_a_copy(first: Any, folder: Path) -> None:

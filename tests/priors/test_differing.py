@@ -16,6 +16,7 @@ from isiw.priors import Difference, differences
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse
 from isiw.subjects.subject import SimulatedSubject
+from isiw.visit import Visit
 from known import instance, known
 from priors.logged import gaussian_person, write_log
 
@@ -60,6 +61,17 @@ def test_only_of_the_same_person_it_is_said_whether_the_window_moved(found: list
 
 def test_of_windows_at_the_same_place_neither_is_later(found: list[Difference]) -> None:
     assert 0.05 < known(found[3].starts_later) < 0.95
+
+
+def test_of_another_muscle_it_is_said_why_nobody_knows_whether_the_window_moved(records: list[SessionRecord]) -> None:
+    of_muscles = [
+        replace(record, header=record.header.model_copy(update={"visit": Visit(muscle=muscle)}))
+        for record, muscle in ((records[0], "FCR"), (records[2], "FDI"))
+    ]
+    difference = differences(of_muscles)[0]
+    assert difference.moved is None
+    assert difference.obstacle.startswith("The sessions are of different muscles, FCR and FDI")
+    assert known(difference.starts_later) > 0.9
 
 
 def test_of_a_session_without_a_window_nothing_is_said_but_why(found: list[Difference]) -> None:

@@ -27,6 +27,7 @@ from isiw.models.protocol import Tensor
 from isiw.priors.components import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.priors.recall import recalled, require_whole
 from isiw.types import FloatArray
+from isiw.visit import MOST_APART_PCT_RMT
 
 __all__ = ["DayToDay", "after", "moved"]
 
@@ -93,7 +94,8 @@ def after(
         LogError: a session without an accepted trial.
         DamagedLogError: a session's log is damaged.
         InvalidValueError: sessions of different people, the same twice, or a later one first; sessions, or a prior,
-            that count ISIs from different events, or are of rigs with different hit delays.
+            that count ISIs from different events, or are of rigs with different hit delays; sessions of which is noted
+            that they are of different muscles or intensities.
     """
     _require_days_of_one_person(records)
     if not isinstance(prior, Prior | None):
@@ -117,8 +119,8 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
     Raises:
         LogError: a session without an accepted trial.
         InvalidValueError: sessions of different people, the same twice, or the later one first; sessions that count
-            ISIs from different events, or are of rigs with different hit delays, or one in which there is probably no
-            window.
+            ISIs from different events, or are of rigs with different hit delays, muscles or intensities, or one in
+            which there is probably no window.
     """
     _require_days_of_one_person((first, second))
     earlier = recalled(first, Prior())
@@ -132,7 +134,7 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
 
 
 def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
-    """Raise where sessions are of different people, one counts twice, or a later one comes first."""
+    """Raise where sessions are of different people or muscles, one counts twice, or a later one comes first."""
     require_records(records)
     subjects = sorted({record.header.subject for record in records} - {""})
     if len(subjects) > 1:
@@ -146,8 +148,15 @@ def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
             )
     for first, second in itertools.combinations(records, 2):
         trials = list(zip(first.table, second.table, strict=False))
+        paths = f"{first.path} and {second.path}"
+        if unlike := first.header.visit.unlike(second.header.visit):
+            raise InvalidValueError(
+                f"the sessions are of {unlike}, and each has a window of its own",
+                got=paths,
+                expected=f"the same muscle, and intensities at most {MOST_APART_PCT_RMT:g} % of RMT apart",
+                remedy="Leave one out.",
+            )
         if trials and all(one == other for one, other in trials):
-            paths = f"{first.path} and {second.path}"
             raise InvalidValueError("two logs are of the same session", got=paths, expected="each session once")
 
 

@@ -94,8 +94,8 @@ def _moved(first: SessionRecord, second: SessionRecord) -> tuple[float | None, s
     earlier, later = sorted((first, second), key=lambda record: record.header.created)
     try:
         return moved(earlier, later), ""
-    except InvalidValueError as error:  # with the first day known, there is probably no window on the second
-        return None, error.what
+    except InvalidValueError as error:  # of another muscle; or, with the first day known, probably without a window
+        return None, f"{error.what[0].upper()}{error.what[1:]}"
 
 
 def _later(first_ms: FloatArray, second_ms: FloatArray) -> float:
