@@ -21,7 +21,14 @@ from isiw.models.particles.profile import ProfilePrior, ShapeShares
 from isiw.priors.components import beside, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.priors.people import hyper_prior, people_of, usual_shares
 from isiw.priors.population import Law, Population, learnt
-from isiw.priors.recall import recalled, require_meps, require_whole, stated_conditioning, stated_hit_delay_ms
+from isiw.priors.recall import (
+    recalled,
+    require_meps,
+    require_whole,
+    stated_conditioning,
+    stated_hit_delay_ms,
+    too_far_apart_ms,
+)
 from isiw.types import Conditioning, Reference
 
 __all__ = ["LabPrior", "LearntSession", "learn"]
@@ -197,12 +204,10 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
     if len(stimuli) > 1:
         remedy = "Learn a prior from each kind of session."
         raise LogError("the sessions have different conditioning stimuli", got=sorted(stimuli), remedy=remedy)
-    delays_ms = [stated_hit_delay_ms(record) for record in records]
-    means_ms = [stated[0] for stated in delays_ms if stated is not None]
-    if references == {"valve"} and means_ms and max(means_ms) - min(means_ms) > MOST_APART_MS:
+    if (apart_ms := too_far_apart_ms(records)) is not None:
         raise LogError(
             "the sessions were run on rigs with different hit delays, so their windows cannot be compared",
-            got=f"hit delays from {min(means_ms):g} to {max(means_ms):g} ms",
+            got=f"hit delays from {apart_ms[0]:g} to {apart_ms[1]:g} ms",
             expected=f"at most {MOST_APART_MS:g} ms apart",
             remedy="Learn a prior for each rig.",
         )
