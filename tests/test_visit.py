@@ -97,3 +97,12 @@ def test_a_rest_that_is_no_longer_than_the_longest_interval_is_refused_where_it_
 def test_a_note_of_the_wrong_kind_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"Visit\."):
         Visit(**wrong)
+
+
+def test_visits_are_unlike_where_both_note_another_muscle_or_a_clearly_different_intensity() -> None:
+    noted = Visit(muscle="FCR", intensity_pct_rmt=110.0)
+    for like in (Visit(), Visit(muscle=" fcr"), Visit(intensity_pct_rmt=120.0), Visit(day=2, muscle="FCR"), noted):
+        assert noted.unlike(like) is None
+        assert like.unlike(noted) is None
+    assert noted.unlike(Visit(muscle="FDI")) == "different muscles, FCR and FDI"
+    assert noted.unlike(Visit(intensity_pct_rmt=99.5)) == "different intensities, 110 and 99.5 % of RMT"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import get_args
@@ -96,6 +97,21 @@ class DesignSpace:
         inside = min(max(number("an ISI [ms]", isi_ms), self.low_ms), self.high_ms)
         steps = round((inside - self.low_ms) / self.step_ms)
         return float(self.grid_ms[steps])
+
+    def whole_steps_ms(self, step_ms: float) -> float:
+        """The smallest multiple of the grid's step that is no smaller than this step [ms]."""
+        return self.step_ms * math.ceil(step_ms / self.step_ms - 1e-9)
+
+    def stops_ms(self, step_ms: float) -> FloatArray:
+        """The ISIs of a sweep from the first one on [ms], shape (t,).
+
+        Args:
+            step_ms: from one to the next [ms]; where that is none of the grid's, the next multiple of its step.
+        """
+        whole_ms = self.whole_steps_ms(step_ms)
+        stops = math.floor((self.high_ms - self.low_ms) / whole_ms + 1e-9) + 1
+        isis_ms: FloatArray = self.low_ms + whole_ms * np.arange(stops, dtype=np.float64)
+        return isis_ms
 
     def admits(self, isi_ms: float) -> bool:
         """Whether a realised ISI [ms] can have come from this space."""

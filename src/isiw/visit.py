@@ -19,6 +19,9 @@ _ITI_DRAWS, _CONTROL_DRAWS = 1, 2
 
 _FINEST_SHARE = 1000
 
+MOST_APART_PCT_RMT = 10.0
+"""Intensities of one person's visits that are further apart are not the same: MEPs grow, and windows widen, with it."""
+
 MOST_ITI_S = 1000.0
 """Nobody waits a quarter of an hour between two trials: such an interval is in ms."""
 
@@ -57,6 +60,20 @@ class Visit:
         check_wholes(self, "day", least=1, optional=True)
         check_texts(self, "operator", "muscle", "electrodes")
         check_numbers(self, "intensity_pct_rmt", "intensity_pct_mso", above=0, optional=True)
+
+    def unlike(self, other: Visit) -> str | None:
+        """Why the window of this visit is not that of another one, in words; None where nothing that is noted says so.
+
+        Args:
+            other: the other visit of the same person.
+        """
+        muscles = [visit.muscle.strip() for visit in (self, other)]
+        if all(muscles) and muscles[0].casefold() != muscles[1].casefold():
+            return f"different muscles, {muscles[0]} and {muscles[1]}"
+        own, others = self.intensity_pct_rmt, other.intensity_pct_rmt
+        if own is not None and others is not None and abs(own - others) > MOST_APART_PCT_RMT:
+            return f"different intensities, {own:g} and {others:g} % of RMT"
+        return None
 
 
 @dataclass(frozen=True)

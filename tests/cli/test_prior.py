@@ -8,7 +8,9 @@ from typer.testing import CliRunner
 
 from isiw import priors
 from isiw.cli import app
+from isiw.cli.console import DAMAGED
 from isiw.log.reader import read_session
+from logs import damage
 
 
 @pytest.fixture(scope="module")
@@ -114,6 +116,23 @@ def test_the_same_person_twice_is_refused_with_the_way_out(isiw: Any, logs: Any,
     assert result.exit_code == 1
     assert "--again" in result.output
     assert not (folder / "twice.toml").exists()
+
+
+def test_a_damaged_log_is_refused_or_learnt_with_a_warning_as_told(isiw: Any, logs: Any, folder: Path) -> None:
+    damaged = folder / "damaged.mcap"
+    damaged.write_bytes(logs[0].read_bytes())
+    damage(damaged)
+    for command in (("prior", "learn", damaged, "-o", "d.toml"), ("run", "--after", damaged, "--log", "d2.mcap")):
+        refused = isiw(*command)
+        assert refused.exit_code == DAMAGED, refused.output
+        assert "damaged.mcap: " in refused.output
+        assert "--damaged" in refused.output
+    assert not (folder / "d.toml").exists()
+    assert not list(folder.glob("d2.mcap*"))
+    learnt = isiw("prior", "learn", damaged, "--damaged", "-o", "d.toml")
+    assert learnt.exit_code == DAMAGED, learnt.output
+    assert "damaged.mcap: " in learnt.output
+    assert (folder / "d.toml").exists()
 
 
 def test_a_prior_that_is_not_there_is_named(isiw: Any) -> None:

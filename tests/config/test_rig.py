@@ -14,6 +14,7 @@ from isiw.config.run import device_for, load_config, session_for
 from isiw.design import IMPACT_SPACE
 from isiw.errors import ConfigError
 from isiw.log.reader import read_session
+from isiw.visit import Visit
 from known import known
 from priors.logged import write_log
 
@@ -118,6 +119,18 @@ def test_a_session_starts_from_the_same_persons_earlier_ones_alone(template: Pat
     assert prior != session_for(config).strategy.recipe.settings.get("prior")
     with pytest.raises(ConfigError, match=r"another person's.*P02.*P01"):
         session_for(config.with_overrides(after=[own, others]))
+
+
+def test_a_session_does_not_start_from_one_of_another_muscle_or_intensity(template: Path, tmp_path: Path) -> None:
+    other, far = (
+        write_log(tmp_path / f"{name}.mcap", subject="P01", trials=3, space=IMPACT_SPACE, visit=visit)
+        for name, visit in (("other", Visit(muscle="FDI")), ("far", Visit(muscle="FCR", intensity_pct_rmt=90.0)))
+    )
+    config = load_config(with_real_device(template)).with_overrides(log=tmp_path / "s.mcap")
+    noted = config.visit.model_copy(update={"muscle": "FCR", "intensity_pct_rmt": 120.0})
+    for earlier, what in ((other, "different muscles, FCR and FDI"), (far, "different intensities, 120 and 90 %")):
+        with pytest.raises(ConfigError, match=what):
+            session_for(config.model_copy(update={"visit": noted}).with_overrides(after=[earlier]))
 
 
 def test_what_simulated_sessions_taught_is_not_used_on_a_person(template: Path, tmp_path: Path) -> None:

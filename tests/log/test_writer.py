@@ -16,6 +16,7 @@ from isiw.log.schema import Event, Header, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel
 from log.written import write_trials
+from logs import blocks_of, damage
 
 
 def test_a_log_is_a_part_until_it_is_closed(tmp_path: Path, header: Header) -> None:
@@ -157,6 +158,26 @@ def test_continuing_keeps_all_records_and_appends(finished_log: Path) -> None:
     assert after.header == before.header
     assert after.finished
     assert list(finished_log.parent.iterdir()) == [finished_log]
+
+
+def test_a_damaged_bit_costs_a_log_that_went_on_one_trial(finished_log: Path, header: Header) -> None:
+    before = blocks_of(finished_log)
+    LogWriter.continuing(finished_log, salvage(finished_log), header).close()
+    assert len(blocks_of(finished_log)) == len(before)
+    whole, table = finished_log.read_bytes(), read_session(finished_log).table
+    for block in range(len(before)):
+        finished_log.write_bytes(whole)
+        damage(finished_log, block)
+        damaged = read_session(finished_log)
+        assert damaged.losses
+        assert len(damaged.table) >= len(table) - 1
+
+
+def test_a_cut_copy_of_a_log_that_went_on_has_every_trial_before_the_cut(finished_log: Path, header: Header) -> None:
+    LogWriter.continuing(finished_log, salvage(finished_log), header).close()
+    start, _ = blocks_of(finished_log)[-1]
+    finished_log.write_bytes(finished_log.read_bytes()[:start])
+    assert len(read_session(finished_log).table) == 7
 
 
 def test_continuing_twice_keeps_metadata_names_unique(broken_log: Path, header: Header) -> None:

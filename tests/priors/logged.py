@@ -16,6 +16,7 @@ from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
 from isiw.trials import Status, Trial
 from isiw.types import Conditioning
+from isiw.visit import Visit
 
 
 def gaussian_person(number: int = 0) -> SimulatedSubject:
@@ -35,6 +36,7 @@ def write_log(
     created: str = "2026-11-21T10:00:00+00:00",
     hit_delay_ms: tuple[float, float] | None = None,
     conditioning: Conditioning = "tap",
+    visit: Visit | None = None,
 ) -> Path:
     """The log of a session with ISIs all over the range."""
     header = Header(
@@ -49,6 +51,7 @@ def write_log(
             "bench", space.reference, simulated=simulated, hit_delay_ms=hit_delay_ms, conditioning=conditioning
         ),
         signals=SignalLimits(),
+        visit=visit or Visit(),
     )
     responder = (person or gaussian_person()).begin(seed)
     order = np.random.default_rng(seed).permutation(trials)

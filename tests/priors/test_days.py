@@ -11,14 +11,17 @@ import torch
 
 from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
-from isiw.errors import InvalidValueError, LogError
+from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.log.reader import read_session
 from isiw.models.particles.prior import Prior
+from isiw.session.resume import exclude
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse
 from isiw.subjects.subject import SimulatedSubject
+from isiw.visit import Visit
 from known import instance, known
+from logs import damage
 from priors.logged import gaussian_person, write_log
 
 EARLY_MS, LATE_MS = 20.0, 200.0
@@ -124,11 +127,36 @@ def test_of_a_session_without_a_window_it_cannot_be_said_whether_it_moved(first:
         priors.moved(none, first)
 
 
+def test_a_day_whose_log_is_damaged_is_refused_unless_told(tmp_path: Path) -> None:
+    log = write_log(tmp_path / "s.mcap", trials=4)
+    exclude(log, 2, "sneezed")
+    damage(log)
+    record = read_session(log)
+    with pytest.raises(DamagedLogError, match=r"s\.mcap: .*lost.*Leave it out.*damaged=True"):
+        priors.after(record)
+    assert priors.after(record, damaged=True).profile.places
+
+
 def test_days_of_different_people_are_refused(first: Any, folder: Path) -> None:
     other = read_session(write_log(folder / "other.mcap", person(), subject="P2", trials=5))
     for together in (priors.after, priors.moved):
         with pytest.raises(InvalidValueError, match="different people"):
             together(first, other)
+
+
+@pytest.mark.parametrize(
+    ("noted", "what"),
+    [(Visit(muscle="FDI"), "different muscles, FCR and FDI"), (Visit(intensity_pct_rmt=120.0), "90 and 120 % of RMT")],
+)
+def test_days_of_different_muscles_or_intensities_are_refused(noted: Visit, what: str, tmp_path: Path) -> None:
+    usual = Visit(muscle="FCR", intensity_pct_rmt=90.0)
+    one, other = (
+        read_session(write_log(tmp_path / f"{day}.mcap", trials=4, created=f"2026-11-2{day}", seed=day, visit=visit))
+        for day, visit in enumerate((usual, noted), 1)
+    )
+    for together in (priors.after, priors.moved):
+        with pytest.raises(InvalidValueError, match=what):
+            together(one, other)
 
 
 def test_a_session_counts_once_also_as_a_copy(first: Any, folder: Path) -> None:

@@ -16,6 +16,8 @@ from isiw.priors import Difference, differences
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse
 from isiw.subjects.subject import SimulatedSubject
+from isiw.types import Reference
+from isiw.visit import Visit
 from known import instance, known
 from priors.logged import gaussian_person, write_log
 
@@ -60,6 +62,39 @@ def test_only_of_the_same_person_it_is_said_whether_the_window_moved(found: list
 
 def test_of_windows_at_the_same_place_neither_is_later(found: list[Difference]) -> None:
     assert 0.05 < known(found[3].starts_later) < 0.95
+
+
+def test_of_another_muscle_it_is_said_why_nobody_knows_whether_the_window_moved(records: list[SessionRecord]) -> None:
+    of_muscles = [
+        replace(record, header=record.header.model_copy(update={"visit": Visit(muscle=muscle)}))
+        for record, muscle in ((records[0], "FCR"), (records[2], "FDI"))
+    ]
+    difference = differences(of_muscles)[0]
+    assert difference.moved is None
+    assert difference.obstacle.startswith("The sessions are of different muscles, FCR and FDI")
+    assert known(difference.starts_later) > 0.9
+
+
+def on_rig(record: SessionRecord, mean_ms: float, reference: Reference = "valve") -> SessionRecord:
+    device = replace(record.header.device, hit_delay_ms=(mean_ms, 3.0), reference=reference)
+    space = replace(record.header.space, reference=reference)
+    return replace(record, header=record.header.model_copy(update={"device": device, "space": space}))
+
+
+def test_windows_on_rigs_with_other_hit_delays_are_not_compared(records: list[SessionRecord]) -> None:
+    difference = differences([on_rig(records[0], 100.0), on_rig(records[1], 250.0)])[0]
+    assert (difference.starts_later, difference.ends_later, difference.moved) == (None, None, None)
+    assert "different hit delays, 100 and 250 ms" in difference.obstacle
+
+
+def test_windows_on_rigs_with_nearly_the_same_hit_delay_or_after_the_impact_are_compared(
+    records: list[SessionRecord], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("isiw.priors.differing._edges", lambda _: np.zeros((1, 2)))
+    near = [on_rig(records[0], 100.0), on_rig(records[1], 110.0)]
+    after_impact = [on_rig(records[0], 100.0, "impact"), on_rig(records[1], 250.0, "impact")]
+    for pair in (near, after_impact, [records[0], near[1]]):
+        assert differences(pair)[0].starts_later == 0.5
 
 
 def test_of_a_session_without_a_window_nothing_is_said_but_why(found: list[Difference]) -> None:

@@ -15,7 +15,7 @@ import torch
 import isiw
 from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
-from isiw.errors import ConfigError, InvalidValueError, LogError, StrategyError
+from isiw.errors import ConfigError, DamagedLogError, InvalidValueError, LogError, StrategyError
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.laws import NoiseShares
 from isiw.models.particles.prior import Prior
@@ -23,6 +23,7 @@ from isiw.models.particles.profile import ProfilePrior
 from isiw.priors.recall import recalled
 from isiw.strategy.catalogue import make_strategy
 from known import instance
+from logs import damage
 from priors.logged import gaussian_person, write_log
 
 TRIALS = 14
@@ -101,6 +102,15 @@ def test_nothing_is_learnt_from_nobody(tmp_path: Path) -> None:
         priors.learn("a.mcap")
     with pytest.raises(LogError, match="no accepted trial"):
         priors.learn([write_log(tmp_path / "empty.mcap", trials=0)])
+
+
+def test_of_a_damaged_log_nothing_is_learnt_unless_told(tmp_path: Path) -> None:
+    log = write_log(tmp_path / "s.mcap", trials=4)
+    isiw.exclude(log, 2, "sneezed")
+    damage(log)
+    with pytest.raises(DamagedLogError, match=r"s\.mcap: .*lost.*Leave it out.*damaged=True"):
+        priors.learn([log])
+    assert priors.learn([log], damaged=True).sessions[0].trials == 4  # the exclusion is lost
 
 
 def test_people_in_general_keep_at_least_a_tenth_of_every_block(lab: Any) -> None:

@@ -140,7 +140,7 @@ def test_logs_of_every_kind_have_a_page(name: str) -> None:
 
 
 def test_a_session_without_a_trial_has_a_page(record: SessionRecord) -> None:
-    empty = replace(record, history=(), waveforms={}, finished=False)
+    empty = replace(record, history=(), waveforms={}, finished=False, delivered=0)
     assert "No trial has been completed." in Page(report_page(empty)).words
 
 

@@ -201,6 +201,25 @@ def test_without_a_trial_there_is_nothing_to_say(record: SessionRecord) -> None:
     assert final_statement(empty) == "No trial has been completed."
 
 
+def test_where_no_estimate_can_be_read_it_is_said_what_was_given_and_what_is_lost(record: SessionRecord) -> None:
+    def said(*history: Any, losses: tuple[str, ...] = ()) -> str:
+        return final_statement(type(record)(record.path, record.header, history, {}, losses, False))
+
+    intents = [Intent(trial=number, isi_ms=70.0) for number in range(2)]
+    assert said(losses=("Records 1 to 9 are lost.",)) == "No trial can be read, and the log is damaged."
+    assert said(*intents) == "No outcome can be read: 2 pulses were given, or may have been, none has an outcome."
+    assert said(*intents, losses=("Record 5 is lost.",)).startswith("No outcome can be read, and the log is damaged: 2")
+    assert said(*intents, record.table[0]) == (
+        "No estimate can be read: 2 pulses were given, or may have been, 1 has an outcome."
+    )
+
+
+def test_a_log_of_which_a_header_is_left_says_how_many_pulses_it_asks_for(record: SessionRecord) -> None:
+    cut = type(record)(record.path, record.header, (), {}, ("It was cut off.",), False, end_lost=True)
+    assert final_statement(cut).startswith("No trial can be read, and the log is damaged. The log's end is missing;")
+    assert "--lost-pulses" in final_statement(cut)
+
+
 def test_the_truth_is_compared_by_f1(record: SessionRecord) -> None:
     said = truth_sentence(record, Window(33, 93))
     assert said.endswith("has the window 33–93 ms; the F1 of the reported one is 1.00.")

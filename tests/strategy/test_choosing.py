@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from isiw.acquisition.fixed import EvenSpacing, RandomIsi
+from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep, RandomIsi
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import StrategyError
 from isiw.models.dissertation.bootstrap import BootstrapPosterior
@@ -93,6 +93,19 @@ def test_initial_isis_come_before_a_methods_own_plan_and_that_before_scores() ->
     scored = course("pf", acquisitions=(EvenSpacing(),))
     assert scored.planned is None
     assert scored.choices == (Choice(evenly_spaced(VALVE_SPACE, 0)),) * 3
+
+
+def test_a_sweep_is_asked_on_the_grid_of_the_space_and_tms_alone_is_none_of_its_pairs() -> None:
+    going = course("nr", people=2, space=IMPACT_SPACE, acquisitions=(IncrementalSweep(trials_per_isi=2),))
+    asked_ms: list[float] = []
+    for trial in range(12):
+        if trial % 3 == 2:
+            going = told(going, None)
+            continue
+        assert going.choices == (Choice(going.choices[0].isi_ms),) * 2
+        asked_ms.append(going.choices[0].isi_ms)
+        going = told(going, asked_ms[-1])
+    assert asked_ms == [0.0, 0.0, 5.0, 5.0, 10.0, 10.0, 15.0, 15.0]
 
 
 def test_tms_alone_uses_up_no_initial_isi() -> None:

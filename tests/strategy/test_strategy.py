@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import torch
 
+from isiw.acquisition.fixed import IncrementalSweep
 from isiw.acquisition.information import MutualInformation, WindowGain
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, OutOfSpaceError, StrategyError
@@ -312,6 +313,16 @@ def test_a_batch_takes_up_the_initial_isis_first() -> None:
     strategy = Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, initial_ms=(0.0, 100.0, 200.0))
     assert strategy.ask_batch(3) == [0.0, 100.0, 200.0]
     assert strategy.ask_batch(2) == [0.0, 100.0]
+
+
+def test_a_batch_of_a_sweep_goes_on_with_it_whatever_the_model() -> None:
+    usual = scripted_strategy()
+    sweep = IncrementalSweep(step_ms=5.0, trials_per_isi=2)
+    strategy = Strategy(usual.space, usual.model, sweep, usual.stopping, initial_ms=(200.0,))
+    assert strategy.ask_batch(6) == [200.0, 0.0, 5.0, 5.0, 10.0, 10.0]
+    strategy.learn(200.0, 0.02)
+    strategy.learn(None, 0.02)
+    assert strategy.ask_batch(2) == [0.0, 5.0]
 
 
 def test_a_batch_from_a_model_that_imagines_no_trials_is_refused() -> None:

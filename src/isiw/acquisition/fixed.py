@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,6 +11,7 @@ import torch
 from scipy.stats import qmc
 
 from isiw.checks import check_numbers, check_wholes
+from isiw.design import DesignSpace
 from isiw.models.protocol import Posterior, ProposesIsi, Tensor
 
 __all__ = ["EvenSpacing", "IncrementalSweep", "OwnProposal", "RandomIsi", "SobolIsi", "golden_index"]
@@ -35,7 +37,7 @@ def _only(index: int, isi_ms: Tensor) -> Tensor:
 
 @dataclass(frozen=True)
 class EvenSpacing:
-    """ISIs that fill the range evenly: multiples of the golden ratio, modulo the range."""
+    """Candidate ISIs that fill the range evenly: multiples of the golden ratio, modulo the range."""
 
     needs: ClassVar[tuple[type, ...]] = ()
 
@@ -46,7 +48,7 @@ class EvenSpacing:
 
 @dataclass(frozen=True)
 class RandomIsi:
-    """Uniformly random ISIs.
+    """Uniformly random ISIs among the candidates, which in a wide space are not all of its ISIs.
 
     Args:
         seed: seed of the order.
@@ -63,7 +65,7 @@ class RandomIsi:
 
 @dataclass(frozen=True)
 class SobolIsi:
-    """ISIs from a scrambled Sobol sequence [Owen1998]: random, and yet evenly spread.
+    """Candidate ISIs from a scrambled Sobol sequence [Owen1998]: random, and yet evenly spread.
 
     Args:
         seed: seed of the scrambling.
@@ -82,9 +84,11 @@ class SobolIsi:
 class IncrementalSweep:
     """From the lowest ISI to the highest, some trials at each: the conventional search; then from the start again.
 
+    A strategy follows it on the grid of its space, pair by pair (`FollowsPlan`).
+
     Args:
-        step_ms: from one ISI to the next [ms].
-        trials_per_isi: trials at each.
+        step_ms: from one ISI to the next [ms]; where that is none of the space's, the next multiple of its step.
+        trials_per_isi: pairs of stimuli at each.
 
     Raises:
         InvalidValueError: a step that is not positive, or no trials.
@@ -98,9 +102,15 @@ class IncrementalSweep:
         check_numbers(self, "step_ms", above=0)
         check_wholes(self, "trials_per_isi", least=1)
 
+    def planned_isi_ms(self, space: DesignSpace, pairs: int) -> float:
+        """The ISI [ms] of the pair of stimuli after so many pairs; see `FollowsPlan`."""
+        stops_ms = space.stops_ms(self.step_ms)
+        return space.snap(float(stops_ms[pairs // self.trials_per_isi % len(stops_ms)]))
+
     def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
-        """Score the ISI nearest to the one whose turn it is 1 and all others 0, shape (1, t)."""
-        stops = int((isi_ms[-1] - isi_ms[0]) / self.step_ms) + 1
+        """Score the ISI nearest to the one whose turn it is after so many trials 1 and all others 0, shape (1, t)."""
+        # Candidates are in single precision, in which a range may come out a little below a whole number of steps.
+        stops = math.floor(float(isi_ms[-1] - isi_ms[0]) / self.step_ms + 1e-4) + 1
         turn = posterior.trials // self.trials_per_isi % stops
         return _only(int((isi_ms - (isi_ms[0] + turn * self.step_ms)).abs().argmin()), isi_ms)
 

@@ -6,9 +6,10 @@ from typing import Any, Protocol, runtime_checkable
 
 import torch
 
+from isiw.design import DesignSpace
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
 
-__all__ = ["AcquisitionFunction", "ForeseesProfiles", "ForeseesWindows", "best_candidate"]
+__all__ = ["AcquisitionFunction", "FollowsPlan", "ForeseesProfiles", "ForeseesWindows", "best_candidate"]
 
 
 class ForeseesProfiles(PredictsOutcomes, SamplesProfiles, Protocol):
@@ -29,6 +30,19 @@ class AcquisitionFunction(Protocol):
 
     def __call__(self, posterior: Any, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs [ms], shape (t,), for each person, shape (b, t)."""
+
+
+@runtime_checkable
+class FollowsPlan(Protocol):
+    """An acquisition function whose choice is known beforehand, on the grid of the space, whatever is believed."""
+
+    def planned_isi_ms(self, space: DesignSpace, pairs: int) -> float:
+        """The ISI [ms] of the pair of stimuli after so many pairs.
+
+        Args:
+            space: the ISIs that may be asked.
+            pairs: how many pairs were told; TMS alone is none.
+        """
 
 
 def best_candidate(scores: Tensor, cost: Tensor | None = None, first: int = 0) -> Tensor:

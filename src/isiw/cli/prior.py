@@ -11,10 +11,11 @@ from rich.console import Console
 from rich.progress import Progress
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, Overwrite, counted, errors_reported, show
+from isiw.cli.console import DAMAGED, NO_DEFAULT, Overwrite, counted, errors_reported, show
 from isiw.log.outputs import check_output
 
 if TYPE_CHECKING:
+    from isiw.log.reader import SessionRecord
     from isiw.priors import LabPrior
 
 __all__ = ["app"]
@@ -29,18 +30,29 @@ def learn(
     logs: Annotated[list[Path], typer.Argument(help="The logs of sessions, one a person.", **NO_DEFAULT)],
     output: Annotated[Path, typer.Option("--output", "-o", help="Where to: .toml")],
     again: Annotated[bool, typer.Option(help="Count a second session of the same person as another person.")] = False,  # noqa: FBT002 - a flag
+    damaged: Annotated[bool, typer.Option("--damaged", help="Learn what is left of damaged logs.")] = False,  # noqa: FBT002 - a flag
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 0,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag
 ) -> None:
-    """Learn what a lab's people are like from sessions already run."""
+    """Learn what a lab's people are like from sessions already run. Exit code 3 where a log is damaged."""
+    losses: list[str] = []
     with errors_reported("Interrupted: nothing was written."):
         check_output(output, overwrite=overwrite)
         with Progress(console=Console(stderr=True)) as progress:
             task = progress.add_task("sessions", total=len(logs))
-            lab = isiw.priors.learn(logs, again=again, seed=seed, on_done=lambda _record: progress.advance(task))
+
+            def note(record: SessionRecord) -> None:
+                progress.advance(task)
+                losses.extend(f"{record.path.name}: {loss}" for loss in record.losses)
+
+            lab = isiw.priors.learn(logs, again=again, damaged=damaged, seed=seed, on_done=note)
         isiw.priors.write_lab_prior(lab, output, overwrite=overwrite)
         _print(lab)
         show(f"prior: {output}\nRun a session with it: isiw run --prior {shlex.quote(str(output))}")
+        for loss in losses:
+            show(loss, style="red")
+        if losses:
+            raise typer.Exit(DAMAGED)
 
 
 @app.command("show")

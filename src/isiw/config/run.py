@@ -264,7 +264,7 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
 
     Raises:
         ConfigError: no recordings, or no prior, where the configuration says, or recordings that would be ignored;
-            earlier sessions of another person, or simulated ones where the device is real.
+            earlier sessions of another person, muscle or intensity, or simulated ones where the device is real.
         LogError: an earlier session of the person that cannot be read, or has no accepted trial.
         StrategyError: a prior for a strategy that has none of this kind.
     """
@@ -337,6 +337,7 @@ def _taught(config: RunConfig, device: DeviceInfo) -> Prior:
             remedy="Leave it out, or learn from sessions with people.",
         )
     require_same_person(config, earlier)
+    _require_like(config, earlier)
     return after(*earlier, prior=None if lab is None else lab.joined())
 
 
@@ -359,6 +360,17 @@ def require_same_person(config: RunConfig, records: Sequence[SessionRecord]) -> 
             expected=f"{subject}, as visit.subject says",
             remedy="Give this person's own log, or correct visit.subject.",
         )
+
+
+def _require_like(config: RunConfig, records: Sequence[SessionRecord]) -> None:
+    """Raise where an earlier session had another muscle, or another intensity, than the configuration says."""
+    for record in records:
+        if unlike := config.visit.noted().unlike(record.header.visit):
+            raise ConfigError(
+                f"the earlier session and [visit] are of {unlike}",
+                got=str(record.path),
+                remedy="What one taught says little about the other. Leave the log out, or correct [visit].",
+            )
 
 
 def _code(config: RunConfig) -> str:

@@ -33,6 +33,7 @@ __all__ = [
     "announcement",
     "decode",
     "encode",
+    "is_of_isiw",
     "json_schema",
     "topic_of",
     "waveform_topic",
@@ -90,6 +91,11 @@ _WAVEFORM: TypeAdapter[Any] = TypeAdapter(Waveform)
 def adapter(topic: str) -> TypeAdapter[Any]:
     """What turns a topic's records into JSON and back; any topic that is not isiw's own holds waveforms."""
     return _ADAPTERS.get(topic, _WAVEFORM)
+
+
+def is_of_isiw(topic: str) -> bool:
+    """Whether a topic carries records of isiw's own, and not the waveforms of a channel."""
+    return topic in _KINDS
 
 
 def topic_of(record: Record, channel_name: str | None = None) -> str:

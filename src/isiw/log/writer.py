@@ -29,7 +29,7 @@ from isiw.log.durable import (
 from isiw.log.locks import claimed, refuse_if_locked
 from isiw.log.salvage import Message, Salvage, holds, salvage_file
 from isiw.log.schema import AnyHeader, Header, Record
-from isiw.log.topics import CHANNEL_IDS, announcement, decode, encode, json_schema, topic_of
+from isiw.log.topics import CHANNEL_IDS, announcement, decode, encode, is_of_isiw, json_schema, topic_of
 
 __all__ = ["CONFIGURATION", "LogWriter"]
 
@@ -129,6 +129,8 @@ class LogWriter:
             self.append(header)
         for message in salvage.messages:
             self._copy(message)
+            if is_of_isiw(message.topic):  # what a damaged byte costs is then a trial, as where a session wrote them
+                self._writer.flush()
         if as_resumed is not None:
             self.append(as_resumed)
         self.sync()

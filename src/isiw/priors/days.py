@@ -25,8 +25,9 @@ from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Tensor
 from isiw.priors.components import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
-from isiw.priors.recall import recalled
+from isiw.priors.recall import recalled, require_whole
 from isiw.types import FloatArray
+from isiw.visit import MOST_APART_PCT_RMT
 
 __all__ = ["DayToDay", "after", "moved"]
 
@@ -78,23 +79,30 @@ class DayToDay:
         }
 
 
-def after(*records: SessionRecord, prior: Prior | None = None, law: DayToDay | None = None) -> Prior:
+def after(
+    *records: SessionRecord, prior: Prior | None = None, law: DayToDay | None = None, damaged: bool = False
+) -> Prior:
     """What is believed of a person after earlier sessions, for `isiw.make_strategy(prior=...)`.
 
     Args:
         *records: the person's sessions, the first one first.
         prior: what is believed of people before them; by default the built-in prior.
         law: how people differ from day to day.
+        damaged: whether to learn what is left of damaged logs.
 
     Raises:
         LogError: a session without an accepted trial.
+        DamagedLogError: a session's log is damaged.
         InvalidValueError: sessions of different people, the same twice, or a later one first; sessions, or a prior,
-            that count ISIs from different events, or are of rigs with different hit delays.
+            that count ISIs from different events, or are of rigs with different hit delays; sessions of which is noted
+            that they are of different muscles or intensities.
     """
     _require_days_of_one_person(records)
     if not isinstance(prior, Prior | None):
         raise InvalidValueError("this is no prior", got=prior, expected="what isiw.priors.load(path) reads")
     prior, law = prior or Prior(), law or DayToDay()
+    for record in records if not damaged else ():
+        require_whole(record)
     for record in records:
         prior = _another_day(recalled(record, prior), law)
     return prior
@@ -111,8 +119,8 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
     Raises:
         LogError: a session without an accepted trial.
         InvalidValueError: sessions of different people, the same twice, or the later one first; sessions that count
-            ISIs from different events, or are of rigs with different hit delays, or one in which there is probably no
-            window.
+            ISIs from different events, or are of rigs with different hit delays, muscles or intensities, or one in
+            which there is probably no window.
     """
     _require_days_of_one_person((first, second))
     earlier = recalled(first, Prior())
@@ -126,7 +134,7 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
 
 
 def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
-    """Raise where sessions are of different people, one counts twice, or a later one comes first."""
+    """Raise where sessions are of different people or muscles, one counts twice, or a later one comes first."""
     require_records(records)
     subjects = sorted({record.header.subject for record in records} - {""})
     if len(subjects) > 1:
@@ -140,8 +148,15 @@ def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
             )
     for first, second in itertools.combinations(records, 2):
         trials = list(zip(first.table, second.table, strict=False))
+        paths = f"{first.path} and {second.path}"
+        if unlike := first.header.visit.unlike(second.header.visit):
+            raise InvalidValueError(
+                f"the sessions are of {unlike}, and each has a window of its own",
+                got=paths,
+                expected=f"the same muscle, and intensities at most {MOST_APART_PCT_RMT:g} % of RMT apart",
+                remedy="Leave one out.",
+            )
         if trials and all(one == other for one, other in trials):
-            paths = f"{first.path} and {second.path}"
             raise InvalidValueError("two logs are of the same session", got=paths, expected="each session once")
 
 

@@ -12,10 +12,15 @@ from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord, require_records
 from isiw.models.particles.prior import Prior
 from isiw.priors.days import moved
-from isiw.priors.recall import recalled
+from isiw.priors.recall import recalled, too_far_apart_ms
 from isiw.types import FloatArray
 
 __all__ = ["Difference", "differences"]
+
+_OTHER_RIG = (
+    "The sessions were run on rigs with different hit delays, {:g} and {:g} ms, so their windows, which count from the "
+    "valve command, cannot be compared"
+)
 
 _Session: TypeAlias = tuple[SessionRecord, FloatArray | None]
 """A session, and samples of its window's edges [ms]."""
@@ -51,6 +56,7 @@ def differences(records: Sequence[SessionRecord]) -> list[Difference]:
 
     Each session's trials are told to the particle model with the built-in prior, whatever strategy had asked for them,
     so that all are judged alike. Whether one person's window moved is judged in the order of the sessions' dates.
+    Nothing is said of windows from the valve command on rigs that state hit delays further apart than one rig's.
 
     Args:
         records: the sessions, at least two.
@@ -85,6 +91,8 @@ def _difference(first: _Session, second: _Session) -> Difference:
         return Difference(
             one, other, same, obstacle=f"There is probably no window, or too little was measured: {which}"
         )
+    if (apart_ms := too_far_apart_ms((one, other))) is not None:
+        return Difference(one, other, same, obstacle=_OTHER_RIG.format(*apart_ms))
     probability, obstacle = _moved(one, other) if same else (None, "")
     starts, ends = (_later(one_ms[:, edge], other_ms[:, edge]) for edge in (0, 1))
     return Difference(one, other, same, starts, ends, probability, obstacle)
@@ -94,8 +102,8 @@ def _moved(first: SessionRecord, second: SessionRecord) -> tuple[float | None, s
     earlier, later = sorted((first, second), key=lambda record: record.header.created)
     try:
         return moved(earlier, later), ""
-    except InvalidValueError as error:  # with the first day known, there is probably no window on the second
-        return None, error.what
+    except InvalidValueError as error:  # of another muscle; or, with the first day known, probably without a window
+        return None, f"{error.what[0].upper()}{error.what[1:]}"
 
 
 def _later(first_ms: FloatArray, second_ms: FloatArray) -> float:

@@ -21,7 +21,14 @@ from isiw.models.particles.profile import ProfilePrior, ShapeShares
 from isiw.priors.components import beside, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.priors.people import hyper_prior, people_of, usual_shares
 from isiw.priors.population import Law, Population, learnt
-from isiw.priors.recall import recalled, require_meps, stated_conditioning, stated_hit_delay_ms
+from isiw.priors.recall import (
+    recalled,
+    require_meps,
+    require_whole,
+    stated_conditioning,
+    stated_hit_delay_ms,
+    too_far_apart_ms,
+)
 from isiw.types import Conditioning, Reference
 
 __all__ = ["LabPrior", "LearntSession", "learn"]
@@ -126,6 +133,7 @@ def learn(
     logs: Sequence[str | Path],
     *,
     again: bool = False,
+    damaged: bool = False,
     seed: int = 0,
     on_done: Callable[[SessionRecord], None] = lambda _record: None,
 ) -> LabPrior:
@@ -137,6 +145,7 @@ def learn(
     Args:
         logs: their paths.
         again: whether a person may be in more than one; each session counts as a person of its own.
+        damaged: whether to learn what is left of damaged logs.
         seed: seed of the sampler.
         on_done: called after each session.
 
@@ -144,6 +153,7 @@ def learn(
         LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person
             twice, or sessions that count ISIs from different events, or are of rigs with different hit delays or of
             different conditioning stimuli, or of which some are simulated and others are not.
+        DamagedLogError: a log is damaged.
         InvalidValueError: a seed that is no whole number from 0 on.
     """
     seed = whole("seed", seed, least=0)
@@ -151,6 +161,8 @@ def learn(
         raise LogError("logs must be a list of paths", got=str(logs), remedy=f'Write ["{logs}"] for a single one.')
     records = [read_session(path) for path in logs]
     for record in records:
+        if not damaged:
+            require_whole(record)
         require_meps(record)
     sessions = tuple(_learnt_session(record) for record in records)
     _require_different(records, sessions, again=again)
@@ -192,12 +204,10 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
     if len(stimuli) > 1:
         remedy = "Learn a prior from each kind of session."
         raise LogError("the sessions have different conditioning stimuli", got=sorted(stimuli), remedy=remedy)
-    delays_ms = [stated_hit_delay_ms(record) for record in records]
-    means_ms = [stated[0] for stated in delays_ms if stated is not None]
-    if references == {"valve"} and means_ms and max(means_ms) - min(means_ms) > MOST_APART_MS:
+    if (apart_ms := too_far_apart_ms(records)) is not None:
         raise LogError(
             "the sessions were run on rigs with different hit delays, so their windows cannot be compared",
-            got=f"hit delays from {min(means_ms):g} to {max(means_ms):g} ms",
+            got=f"hit delays from {apart_ms[0]:g} to {apart_ms[1]:g} ms",
             expected=f"at most {MOST_APART_MS:g} ms apart",
             remedy="Learn a prior for each rig.",
         )

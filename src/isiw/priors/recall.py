@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 from isiw.checks import mean_and_sd
-from isiw.errors import LogError
+from isiw.errors import DamagedLogError, LogError
 from isiw.log.reader import SessionRecord
 from isiw.models.particles import ParticleModel, ParticlePosterior
+from isiw.models.particles.places import MOST_APART_MS
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
 from isiw.types import Conditioning
 
-__all__ = ["recalled", "require_meps", "stated_conditioning", "stated_hit_delay_ms"]
+__all__ = [
+    "recalled",
+    "require_meps",
+    "require_whole",
+    "stated_conditioning",
+    "stated_hit_delay_ms",
+    "too_far_apart_ms",
+]
+
+TOLD_LOSSES: Final = 3
+"""Losses that an error names; isiw show lists them all."""
 
 
 def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> ParticlePosterior:
@@ -60,6 +74,24 @@ def require_meps(record: SessionRecord) -> None:
         )
 
 
+def require_whole(record: SessionRecord) -> None:
+    """Check that nothing is lost of a session that is learnt from: an exclusion may be among it.
+
+    Args:
+        record: the session.
+
+    Raises:
+        DamagedLogError: its log is damaged.
+    """
+    if record.losses:
+        raise DamagedLogError(
+            "the log is damaged, so that what a person excluded may count as if nobody had",
+            got=f"{record.path}: {' '.join(record.losses[:TOLD_LOSSES])}",
+            remedy=f"Leave it out; or, if what isiw show {shlex.quote(str(record.path))} lists is right, let it count "
+            "all the same: damaged=True, or isiw prior learn --damaged.",
+        )
+
+
 def stated_hit_delay_ms(record: SessionRecord) -> tuple[float, float] | None:
     """Mean and SD of the hit delay that a session's strategy was told, or its rig states [ms]; None where neither is.
 
@@ -68,6 +100,21 @@ def stated_hit_delay_ms(record: SessionRecord) -> tuple[float, float] | None:
     """
     stated = record.header.strategy.settings.get("hit_delay_ms") or record.header.device.hit_delay_ms
     return None if stated is None else mean_and_sd("the session's hit_delay_ms", stated)
+
+
+def too_far_apart_ms(records: Sequence[SessionRecord]) -> tuple[float, float] | None:
+    """The least and the largest stated hit delay [ms] where they are further apart than one rig's; else None.
+
+    From the valve command, the same window is as much later as a rig's taps are. Of ISIs from the impact it is None.
+
+    Args:
+        records: sessions whose ISIs count from the same event.
+    """
+    stated_ms = [stated_hit_delay_ms(record) for record in records if record.header.space.reference == "valve"]
+    means_ms = [mean_ms for mean_ms, _ in filter(None, stated_ms)]
+    if not means_ms or max(means_ms) - min(means_ms) <= MOST_APART_MS:
+        return None
+    return min(means_ms), max(means_ms)
 
 
 def stated_conditioning(record: SessionRecord) -> Conditioning:

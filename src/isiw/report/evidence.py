@@ -13,7 +13,7 @@ from isiw.text.found import NO_MEP
 from isiw.trials import Trial
 from isiw.window import Window
 
-__all__ = ["contradiction", "no_comparison", "nothing_measured", "nothing_stood_out"]
+__all__ = ["contradiction", "no_comparison", "nothing_estimated", "nothing_measured", "nothing_stood_out"]
 
 ENOUGH_ON_EACH_SIDE = 4
 NO_LARGER = 0.5
@@ -28,6 +28,26 @@ OF_REST = 8.0
 ENOUGH_TO_STAND_OUT = 10
 
 _LOOK = "Did the stimulator fire, was the EMG recorded, was the intensity enough?"
+
+
+def nothing_estimated(record: SessionRecord) -> str:
+    """What there is of a session of which no estimate can be read: that nothing was done is said only where it is so.
+
+    Args:
+        record: the session.
+    """
+    completed, given = len(record.table), record.given
+    pulses = f"{given} {'pulse was' if given == 1 else 'pulses were'} given, or may have been"
+    if completed:
+        known = f"{completed} {'has' if completed == 1 else 'have'} an outcome"
+        return f"No estimate can be read{_damage(record)}: {pulses}, {known}."
+    if given:
+        return f"No outcome can be read{_damage(record)}: {pulses}, none has an outcome."
+    return f"No trial can be read{_damage(record)}." if record.losses else "No trial has been completed."
+
+
+def _damage(record: SessionRecord) -> str:
+    return ", and the log is damaged" if record.losses else ""
 
 
 def nothing_measured(record: SessionRecord) -> str | None:

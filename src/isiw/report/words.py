@@ -13,7 +13,13 @@ from isiw.log.reader import SessionRecord, require_records
 from isiw.log.schema import RUN_KEY, SERVED_KEY, Estimate
 from isiw.metrics import f1
 from isiw.report.depression import depression_sentence
-from isiw.report.evidence import contradiction, no_comparison, nothing_measured, nothing_stood_out
+from isiw.report.evidence import (
+    contradiction,
+    no_comparison,
+    nothing_estimated,
+    nothing_measured,
+    nothing_stood_out,
+)
 from isiw.session.header import OWN_LOOP
 from isiw.session.progress import asked, outcome
 from isiw.strategy.catalogue import known_settings, list_strategies
@@ -66,23 +72,22 @@ def final_statement(record: SessionRecord) -> str:
         InvalidValueError: no record of a session.
     """
     require_records((record,))
-    if not record.estimates:
-        return "No trial has been completed."
-    last, way_on = record.estimates[-1], _resuming(record)
-    sentences = [
-        *finding_sentences(record),
-        counts_sentence(record),
-        fit_sentence(record),
-        _unstated_hit_delay(record),
-        "" if record.is_silent and _OF_THE_WINDOW.search(last.reason) else last.reason,
-    ]
+    last, way_on = record.estimates[-1] if record.estimates else None, _resuming(record)
+    sentences = finding_sentences(record)
+    if last is not None:
+        sentences += [
+            counts_sentence(record),
+            fit_sentence(record),
+            _unstated_hit_delay(record),
+            "" if record.is_silent and _OF_THE_WINDOW.search(last.reason) else last.reason,
+        ]
     if record.end_lost:
         sentences.append(
             f"The log's end is missing; go on with the number of pulses that the stimulator counted besides: {way_on}"
         )
-    elif not last.stop:
+    elif last is not None and not last.stop:
         sentences.append(f"The session is not over; go on with: {way_on}")
-    if record.is_judged_since:
+    if last is not None and record.is_judged_since:
         sentences.append(JUDGED_SINCE)
     return " ".join(sentence for sentence in sentences if sentence)
 
@@ -109,7 +114,7 @@ def finding_sentences(record: SessionRecord) -> list[str]:
         record: the session.
     """
     if not record.estimates:
-        return ["No trial has been completed."]
+        return [nothing_estimated(record)]
     space, nothing, estimate = record.header.space, nothing_measured(record), record.estimates[-1]
     if nothing is not None:
         return [nothing]

@@ -14,8 +14,9 @@ from typing import Literal, TypeAlias
 
 import torch
 
+from isiw.acquisition.batch import own_plan
 from isiw.acquisition.fixed import golden_index
-from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
+from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, best_candidate
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
 from isiw.models.protocol import ExpectsTheUsual, Observation, Posterior, ProposesIsi, ResponseModel, Tensor
@@ -40,8 +41,8 @@ Cost = Callable[[Tensor], Tensor]
 """What each of some ISIs [ms] (shape (t,)) costs, in the unit of the scores, shape (t,)."""
 
 ChosenBy: TypeAlias = Literal["initial", "plan", "acquisition", "fallback", "again"]
-"""What chose an ISI: it is an initial one, in the model's own plan, of the highest score, stands in for that one, or is
-asked again because its trial was lost."""
+"""What chose an ISI: it is an initial one, in a plan of the model or the design, of the highest score, stands in for
+that one, or is asked again because its trial was lost."""
 
 
 @dataclass(frozen=True)
@@ -173,6 +174,18 @@ class Course:
         """What is left of the initial ISIs [ms]."""
         return self.method.initial_ms[self.paired_trials :]
 
+    def ahead_ms(self, n: int) -> list[float]:
+        """The next ISIs [ms] of one person that stand already, whatever will be told; at most n of a design's.
+
+        Args:
+            n: how many are wanted.
+        """
+        first, space, left = self.method.acquisitions[0], self.method.space, self.initial_left
+        if isinstance(first, FollowsPlan):
+            pairs = range(self.paired_trials + len(left), self.paired_trials + n)
+            return [*left, *(first.planned_isi_ms(space, pair) for pair in pairs)]
+        return [*left, *map(space.snap, own_plan(self.posterior, first))]
+
     @property
     def plans_ahead(self) -> bool:
         """Whether the model itself proposes the ISIs, whatever an acquisition function would choose."""
@@ -183,6 +196,9 @@ class Course:
         """What is asked of each person where that stands already; None where the acquisition function chooses."""
         if self.initial_left:
             return (Choice(self.initial_left[0], by="initial"),) * self.people
+        if isinstance(first := self.method.acquisitions[0], FollowsPlan):
+            isi_ms = first.planned_isi_ms(self.method.space, self.paired_trials)
+            return (Choice(isi_ms, by="plan"),) * self.people
         if self.plans_ahead and isinstance(self.posterior, ProposesIsi):
             wanted_ms = self.posterior.proposed_isis_ms()[:, 0].tolist()
             return tuple(Choice(self.method.space.snap(isi_ms), by="plan") for isi_ms in wanted_ms)

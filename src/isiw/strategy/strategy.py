@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from isiw.acquisition.batch import greedy_batch, own_plan
+from isiw.acquisition.batch import greedy_batch
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
@@ -195,8 +195,7 @@ class Strategy:
             StrategyError: the model cannot imagine trials, or does not plan so far ahead.
         """
         n = whole("the size of a batch", n, least=1, most=MOST_OF_A_BATCH)
-        own = map(self.space.snap, own_plan(self.posterior, self.acquisition))
-        chosen = [self.ask(), *[*self._course.initial_left, *own][1:]][:n]
+        chosen = [self.ask(), *self._course.ahead_ms(n)[1:]][:n]
         return greedy_batch(self.posterior, self.acquisition, chosen, n, self._next_of_batch)
 
     def _next_of_batch(self, posterior: Posterior) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from statistics import NormalDist
@@ -107,13 +106,12 @@ class SweepPosterior:
     @cached_property
     def _step_ms(self) -> float:
         """From one ISI to the next [ms]: the model's step, or the next multiple of the space's."""
-        return self.space.step_ms * math.ceil(self.model.step_ms / self.space.step_ms - 1e-9)
+        return self.space.whole_steps_ms(self.model.step_ms)
 
     @cached_property
     def _stops_ms(self) -> FloatArray:
         """The ISIs of one sweep [ms]."""
-        stops = math.floor((self.space.high_ms - self.space.low_ms) / self._step_ms + 1e-9) + 1
-        return self.space.low_ms + self._step_ms * np.arange(stops, dtype=np.float64)
+        return self.space.stops_ms(self.model.step_ms)
 
     def proposed_isis_ms(self) -> Tensor:
         """One sweep, from where it has come to; see `ProposesIsi`."""
