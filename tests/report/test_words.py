@@ -57,6 +57,17 @@ def test_an_edge_beyond_the_range_is_said_in_words(record: SessionRecord, low: f
     assert words in final_statement(with_estimate(record, start_low_ms=low, start_high_ms=high))
 
 
+def test_after_an_electrical_pulse_no_tap_is_spoken_of(record: SessionRecord) -> None:
+    header, space = record.header, DesignSpace(0, 200, reference="impact")
+    device = replace(header.device, reference="impact", conditioning="electrical")
+    pulsed = replace(record, header=header.model_copy(update={"device": device, "space": space}))
+    said = final_statement(pulsed)
+    assert "The electrical pulse probably enhances the MEP at ISIs of 33–93 ms after the electrical pulse" in said
+    assert "By this method, which gives no probability, the electrical pulse enhances" in final_statement(
+        with_estimate(pulsed, probability=None)
+    )
+
+
 def test_an_unusual_window_is_said_with_its_probability_once_it_is_worth_saying(record: SessionRecord) -> None:
     statement = final_statement(with_estimate(record, start_beyond=0.25, end_beyond=0.0, split=0.6))
     assert (

@@ -25,7 +25,6 @@ from isiw.priors.recall import (
     recalled,
     require_meps,
     require_whole,
-    stated_conditioning,
     stated_hit_delay_ms,
     too_far_apart_ms,
 )
@@ -166,7 +165,7 @@ def learn(
         require_meps(record)
     sessions = tuple(_learnt_session(record) for record in records)
     _require_different(records, sessions, again=again)
-    conditioning, space = stated_conditioning(records[0]), records[0].header.space
+    conditioning, space = records[0].conditioning, records[0].header.space
     prior = Prior(ProfilePrior(conditioning=conditioning))
     posteriors = []
     for record in records:
@@ -200,7 +199,7 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
     if len(references) > 1:
         remedy = "Learn a prior from each kind of session."
         raise LogError("the sessions count ISIs from different events", got=sorted(references), remedy=remedy)
-    stimuli = {stated_conditioning(record) for record in records}
+    stimuli = {record.conditioning for record in records}
     if len(stimuli) > 1:
         remedy = "Learn a prior from each kind of session."
         raise LogError("the sessions have different conditioning stimuli", got=sorted(stimuli), remedy=remedy)

@@ -14,13 +14,11 @@ from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.places import MOST_APART_MS
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
-from isiw.types import Conditioning
 
 __all__ = [
     "recalled",
     "require_meps",
     "require_whole",
-    "stated_conditioning",
     "stated_hit_delay_ms",
     "too_far_apart_ms",
 ]
@@ -117,23 +115,11 @@ def too_far_apart_ms(records: Sequence[SessionRecord]) -> tuple[float, float] | 
     return min(means_ms), max(means_ms)
 
 
-def stated_conditioning(record: SessionRecord) -> Conditioning:
-    """The conditioning stimulus of a session, as its strategy was told, or as its device says.
-
-    Args:
-        record: the session.
-    """
-    told: Conditioning = record.header.strategy.settings.get("conditioning", record.header.device.conditioning)
-    return told
-
-
 def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
     """The prior, told what came when and whose MEPs these are, as far as prior, strategy or device say."""
     start = prior.profile.start
     delay_ms = stated_hit_delay_ms(record) or start.hit_delay_ms
-    profile = replace(
-        prior.profile, start=replace(start, hit_delay_ms=delay_ms), conditioning=stated_conditioning(record)
-    )
+    profile = replace(prior.profile, start=replace(start, hit_delay_ms=delay_ms), conditioning=record.conditioning)
     told = record.header.strategy.settings.get("muscle")
     known = told if told in {muscle.name for muscle in prior.muscles} else None
     return replace(prior, profile=profile, muscle=prior.muscle or known)

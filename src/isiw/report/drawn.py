@@ -72,7 +72,7 @@ def _belief(record: SessionRecord, estimate: Estimate) -> dict[str, Any]:
     pairs = sum(trial.index <= estimate.trial and trial.isi_ms is not None for trial in record.table.told)
     nothing = lacking(pairs, silent=record.is_silent)
     window = estimate.window if nothing is None else None
-    found = nothing or finding_sentence(estimate, record.header.space)
+    found = nothing or finding_sentence(record, estimate)
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
     bands = {
         "profile": estimate.profile_mv,

@@ -6,6 +6,8 @@ import math
 import re
 import shlex
 from collections import Counter
+from collections.abc import Mapping
+from types import MappingProxyType
 
 from isiw.design import DesignSpace
 from isiw.log.durable import log_of
@@ -24,6 +26,7 @@ from isiw.session.header import OWN_LOOP
 from isiw.session.progress import asked, outcome
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.text.found import SURE, rules_out
+from isiw.types import Conditioning
 from isiw.window import MIN_EXCESS_MV, Window
 
 __all__ = [
@@ -59,7 +62,7 @@ _OF_THE_WINDOW = re.compile(r"^(?!The session is paused).*(window|F1|particles)"
 JUDGED_SINCE = "Trials were judged anew after this estimate; resume the session to have it with what counts now."
 """What is said where `SessionRecord.is_judged_since`."""
 
-_AFTER = {"impact": "after the impact", "valve": "after the valve command"}
+_FIRST: Mapping[Conditioning, str] = MappingProxyType({"tap": "tap", "electrical": "electrical pulse"})
 
 
 def final_statement(record: SessionRecord) -> str:
@@ -119,7 +122,7 @@ def finding_sentences(record: SessionRecord) -> list[str]:
     if nothing is not None:
         return [nothing]
     said = [
-        finding_sentence(estimate, space),
+        finding_sentence(record, estimate),
         _edges(estimate, space),
         contradiction(estimate.window, record.table.told, without_probability=estimate.probability is None) or "",
         no_comparison(estimate.window, record.table.told) or "",
@@ -134,32 +137,40 @@ def finding_sentences(record: SessionRecord) -> list[str]:
     return [sentence for sentence in said if sentence]
 
 
-def finding_sentence(estimate: Estimate, space: DesignSpace) -> str:
+def finding_sentence(record: SessionRecord, estimate: Estimate) -> str:
     """Whether there is a window, and which.
 
     Args:
-        estimate: what is believed.
-        space: says which event an ISI counts from.
+        record: the session.
+        estimate: what is believed at some time of it.
     """
     window, probability = estimate.window, estimate.probability
     if probability is None:
-        return _without_probability(estimate, space)
+        return _without_probability(record, estimate)
     chance = f" (probability of a window: {probability:.2f})"
     if window is None:
         is_none = rules_out(probability)
         return f"No window was found{chance}." if is_none else f"It is undecided whether there is a window{chance}."
-    enhances = f"The tap {'' if probability >= SURE else 'probably '}enhances the MEP"
-    isis = f"{window} {_AFTER[space.reference]}{chance}"
+    enhances = f"The {_FIRST[record.conditioning]} {'' if probability >= SURE else 'probably '}enhances the MEP"
+    isis = f"{window} {_after(record)}{chance}"
     if estimate.expected_f1 is not None and estimate.expected_f1 < A_GUESS:
         return f"{enhances}, but at which ISIs is not known well; the best guess is {isis}."
     return f"{enhances} at ISIs of {isis}."
 
 
-def _without_probability(estimate: Estimate, space: DesignSpace) -> str:
+def _after(record: SessionRecord) -> str:
+    """Which event the session's ISIs count from, in words."""
+    if record.header.space.reference == "valve":
+        return "after the valve command"
+    return "after the impact" if record.conditioning == "tap" else f"after the {_FIRST[record.conditioning]}"
+
+
+def _without_probability(record: SessionRecord, estimate: Estimate) -> str:
     """The same, of a method that gives none."""
+    first, space = _FIRST[record.conditioning], record.header.space
     if estimate.window is not None:
-        isis = f"{estimate.window} {_AFTER[space.reference]}"
-        return f"By this method, which gives no probability, the tap enhances the MEP at ISIs of {isis}."
+        isis = f"{estimate.window} {_after(record)}"
+        return f"By this method, which gives no probability, the {first} enhances the MEP at ISIs of {isis}."
     if not estimate.grid_ms:
         return "The method has no answer yet: it has not measured enough for one."
     first_ms, last_ms = estimate.grid_ms[0], estimate.grid_ms[-1]
