@@ -60,6 +60,7 @@ __all__ = [
     "device_for",
     "fresh_log_path",
     "has_truth",
+    "limits_for",
     "load_config",
     "require_same_person",
     "session_for",
@@ -250,6 +251,11 @@ def device_for(config: RunConfig) -> Device:
     return SimulatedDevice(RecordedPerson(respond, reference, recordings, config.seed, hit_delay_ms))
 
 
+def limits_for(config: RunConfig) -> Limits:
+    """What may be delivered: the ISIs of the space, within the section on limits."""
+    return dataclasses.replace(Limits.of_space(config.space.design()), **config.limits.model_dump())
+
+
 def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:
     """The session that a configuration describes, ready to run.
 
@@ -274,7 +280,7 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         device,
         make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),
         log=log,
-        limits=dataclasses.replace(Limits.of_space(space), **config.limits.model_dump()),
+        limits=limits_for(config),
         on_trial=on_trial,
         subject=config.visit.subject or ("" if config.device else _code(config)),
         signals=config.signals,
