@@ -450,3 +450,50 @@ def test_no_device_is_checked_that_a_session_drives(space: DesignSpace) -> None:
     with driven(device, device.describe()), pytest.raises(DeviceError, match="driven by another session"):
         check_device(lambda: device, space, clock=VirtualClock())
     assert not device.taken
+
+
+class PhantomRig(Hardware):
+    """EMG at rest, with 3 mV of the stimulator's artefact, and a stated time of the pulse that may be too early."""
+
+    def __init__(
+        self, early_ms: float = 0.0, *, unit: str = "mV", only: Callable[[Stimulus], bool] | None = None
+    ) -> None:
+        super().__init__()
+        self.early_ms, self.unit, self.only = early_ms, unit, only or (lambda _: True)
+        self.simulated = False
+
+    def describe(self) -> DeviceInfo:
+        return DeviceInfo("rig", "impact", simulated=self.simulated, channels={"emg": self.unit})
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Sweep:
+        super().deliver(stimulus, timeout_s)
+        since_ms = np.arange(-600.0, 100.0, 0.2)
+        emg_mv = 0.0015 * np.random.default_rng(stimulus.trial).standard_normal(since_ms.size)
+        early_ms = self.early_ms if self.only(stimulus) else 0.0
+        emg_mv += 3.0 * np.exp(-np.clip(since_ms, 0.0, None) / 0.5) * (since_ms >= 0)
+        channel = Channel(emg_mv * {"mV": 1.0, "uV": 1e3}[self.unit], 5000.0, self.unit, t0_ms=-600.0)
+        hit_ms = None if stimulus.isi_ms is None else -early_ms - stimulus.isi_ms
+        return Sweep({"emg": channel}, t_tms_ms=-early_ms, t_hit_ms=hit_ms)
+
+
+@pytest.mark.parametrize("unit", ["mV", "uV"])
+def test_the_suite_finds_an_artefact_in_the_mep_window_of_a_phantom(unit: str) -> None:
+    with pytest.raises(AssertionError, match=r"a phantom has no muscle, and TMS alone .* Is the pulse's time right\?"):
+        check_device(lambda: PhantomRig(15.0, unit=unit), RIG_SPACE, clock=VirtualClock())
+    check_device(lambda: PhantomRig(unit=unit), RIG_SPACE, clock=VirtualClock())
+
+
+def test_the_suite_finds_an_artefact_that_pairs_alone_have() -> None:
+    def is_pair(stimulus: Stimulus) -> bool:
+        return stimulus.isi_ms is not None
+
+    with pytest.raises(AssertionError, match="a phantom has no muscle, and more than one pair"):
+        check_device(lambda: PhantomRig(15.0, only=is_pair), RIG_SPACE, clock=VirtualClock())
+    reflex = PhantomRig(15.0, only=lambda stimulus: stimulus.trial == 0)  # what one ISI alone shows may be the tap's
+    check_device(lambda: reflex, RIG_SPACE, clock=VirtualClock())
+
+
+def test_a_simulated_person_has_a_muscle() -> None:
+    rig = PhantomRig(15.0)
+    rig.simulated = True
+    check_device(lambda: rig, RIG_SPACE)

@@ -17,6 +17,7 @@ from isiw.signals.faults import likely_fault, too_early_by_chance
 from isiw.signals.plausibility import DoubtKind, doubt_of
 from isiw.testing.device_table import Delivery, DeviceTable, device_table
 from isiw.testing.guarded import Guarded, Pace
+from isiw.testing.phantom import artefact_in_window
 from isiw.testing.requirements import require
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
@@ -55,7 +56,8 @@ def check_device(
         The table.
 
     Raises:
-        AssertionError: a promise is broken, or a session would reject a trial; the message says which, and why.
+        AssertionError: a promise is broken, a session would reject a trial, or a real device shows an MEP although a
+            phantom has no muscle; the message says which, and why.
         DeviceError: the device failed, is not ready, or is driven by a session.
         LimitExceededError: the limits do not allow a stimulus; it was not delivered.
         InvalidValueError: an inter-trial interval that is negative or not finite.
@@ -71,7 +73,7 @@ def check_device(
         _check_memory(make, space, pace)
     table = device_table(device.describe(), deliveries, rules.limits)
     say(str(table))
-    _require_usable(deliveries, rules)
+    _require_usable(deliveries, rules, real=not device.describe().simulated)
     return table
 
 
@@ -164,8 +166,8 @@ def _checked_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, rules:
         raise AssertionError(f"broken promise: a session can judge what deliver returns, here: {error}") from error
 
 
-def _require_usable(deliveries: Sequence[Delivery], rules: _Rules) -> None:
-    """Raise where a session would reject what was delivered, or would pause over it."""
+def _require_usable(deliveries: Sequence[Delivery], rules: _Rules, *, real: bool) -> None:
+    """Raise where a session would reject what was delivered, or pause over it, or take an artefact for an MEP."""
     said = []
     for delivery in deliveries:
         fault = likely_fault(delivery.answer, delivery.trial, rules.limits)
@@ -177,6 +179,9 @@ def _require_usable(deliveries: Sequence[Delivery], rules: _Rules) -> None:
     doubt = doubt_of(meps_mv)
     if doubt is not None and doubt.kind is not DoubtKind.EQUAL:
         said.append(doubt.text)
+    artefact = artefact_in_window(deliveries, rules.limits) if real else None
+    if artefact is not None:
+        said.append(artefact)
     require(not said, f"a session can use what deliver returns, here {'; '.join(dict.fromkeys(said))}")
 
 
