@@ -143,6 +143,15 @@ def test_a_rig_that_stimulates_is_checked_only_when_somebody_says_so(isiw: Comma
     assert "background EMG" not in refused.output
 
 
+def test_a_check_keeps_the_limits_of_its_configuration(isiw: Command, tmp_path: Path) -> None:
+    isiw("new", "rig", ".")
+    changed(tmp_path / "session.toml", "max_pulses = 100", "max_pulses = 100\nmax_coil_c = 40.0")
+    refused = isiw("check", "session.toml")
+    assert refused.exit_code == 1
+    assert "the coil is too hot, or its temperature is not known; got 'no temperature'" in refused.output
+    assert "background EMG" not in refused.output
+
+
 def test_a_driver_beside_the_rig_may_be_imported_late(isiw: Command, tmp_path: Path) -> None:
     isiw("new", "rig", ".")
     (tmp_path / "vendor_driver.py").write_text("SIMULATED = True\n", encoding="utf-8")

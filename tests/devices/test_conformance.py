@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import signal
+import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -15,11 +18,12 @@ from isiw.devices.callback import CallbackDevice
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.lock import driven
+from isiw.devices.protocol import DeviceInfo, Readiness
 from isiw.devices.recorded import RecordedPerson, Recordings
 from isiw.devices.replay import RecordedTrials
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
-from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError
+from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import Response
 from isiw.testing import check_device
@@ -309,3 +313,187 @@ def test_a_simulated_device_is_announced_as_one(space: DesignSpace) -> None:
     said: list[str] = []
     check_device(lambda: SimulatedDevice(SimulatedPerson(responder(), "valve")), space, say=said.append)
     assert said[0] == "simulated person is simulated: nothing is delivered to anybody."
+
+
+class ReportingHardware(Hardware):
+    """Says how it is before each pulse."""
+
+    def __init__(self, state: Readiness) -> None:
+        super().__init__()
+        self.state = state
+
+    def readiness(self) -> Readiness:
+        return self.state
+
+
+@pytest.mark.parametrize(
+    ("state", "limit", "error"),
+    [
+        (Readiness(ready=False, reason="charging"), {}, NotDelivered),
+        (Readiness(coil_c=95.0), {"max_coil_c": 40.0}, LimitExceededError),
+        (Readiness(intensity_pct_mso=100.0), {"intensity_pct_mso": 45.0}, LimitExceededError),
+        (Readiness(), {"intensity_pct_mso": 45.0}, LimitExceededError),
+        (Readiness(), {"low_ms": 5.0, "step_ms": None}, LimitExceededError),
+    ],
+)
+def test_the_suite_gives_no_pulse_that_a_session_would_refuse(
+    space: DesignSpace, state: Readiness, limit: dict[str, Any], error: type[Exception]
+) -> None:
+    device, limits = ReportingHardware(state), dataclasses.replace(Limits.of_space(space), **limit)
+    with pytest.raises(error):
+        check_device(lambda: device, space, clock=VirtualClock(), limits=limits)
+    assert not device.fired_s
+    assert not device.armed
+
+
+def test_the_suite_gives_no_more_pulses_than_the_limits_allow(space: DesignSpace) -> None:
+    device = Hardware()
+    with pytest.raises(LimitExceededError, match="the limit of 2 pulses"):
+        check_device(lambda: device, space, clock=VirtualClock(), limits=Limits.of_space(space, max_pulses=2))
+    assert len(device.fired_s) == 2
+    assert not device.armed
+
+
+def test_the_suite_waits_as_long_as_the_limits_ask_for(space: DesignSpace) -> None:
+    clock = VirtualClock()
+    device = RememberingHardware(clock=clock)
+    limits = dataclasses.replace(Limits.of_space(space, min_iti_s=20.0), max_block_pulses=6, rest_s=300.0)
+    said: list[str] = []
+    check_device(lambda: device, space, clock=clock, limits=limits, say=said.append)
+    waits_s = np.diff([0.0, *device.fired_s])
+    assert waits_s.min() >= 20.0
+    assert waits_s[6] >= 300.0
+    assert "20 s apart" in said[0]
+
+
+def test_the_suite_tries_again_what_was_refused_before_firing(space: DesignSpace) -> None:
+    class Charging(Hardware):
+        refusals = 2
+
+        def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement | Sweep:
+            if self.armed and self.refusals:
+                self.refusals -= 1
+                raise NotDelivered("charging")
+            return super().deliver(stimulus, timeout_s)
+
+    device = Charging()
+    check_device(lambda: device, space, clock=VirtualClock())
+    assert len(device.fired_s) == 4
+
+
+class HangingHardware(Hardware):
+    """Hangs in its second delivery until it is stopped."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.stopped = threading.Event()
+
+    def stage(self) -> None:
+        super().stage()
+        self.stopped.clear()
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement | Sweep:
+        answer = super().deliver(stimulus, timeout_s)
+        if len(self.fired_s) == 2:
+            self.stopped.wait(20.0)
+        return answer
+
+    def stop(self) -> None:
+        super().stop()
+        self.stopped.set()
+
+
+def test_a_delivery_that_hangs_is_given_up_and_the_device_disarmed(space: DesignSpace) -> None:
+    device = HangingHardware()
+    began_s = time.monotonic()
+    with pytest.raises(AssertionError, match=r"within its timeout, here after .* given up and disarmed"):
+        check_device(lambda: device, space, clock=VirtualClock(), timeout_s=0.2)
+    assert time.monotonic() - began_s < 10.0
+    assert len(device.fired_s) == 2
+    assert not device.armed
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_between_pulses_disarms_and_ends_the_check(space: DesignSpace, number: signal.Signals) -> None:
+    class Signalling(VirtualClock):
+        def sleep_s(self, duration_s: float) -> None:
+            super().sleep_s(duration_s)
+            if len(device.fired_s) == 2:
+                signal.raise_signal(number)
+
+    device, before = Hardware(), signal.signal(number, lambda *_: None)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            check_device(lambda: device, space, clock=Signalling())
+        assert signal.getsignal(number) is not signal.SIG_DFL
+    finally:
+        signal.signal(number, before)
+    assert len(device.fired_s) == 2
+    assert not device.armed
+    assert not device.taken
+
+
+def test_the_suite_finds_a_stop_that_fails_before_anything_is_armed(space: DesignSpace) -> None:
+    class Unstoppable(Hardware):
+        def stop(self) -> None:
+            raise RuntimeError("no port")
+
+    device = Unstoppable()
+    with pytest.raises(AssertionError, match=r"stop works in any state, here: .*no port"):
+        check_device(lambda: device, space, clock=VirtualClock())
+    assert not device.taken
+
+
+def test_no_device_is_checked_that_a_session_drives(space: DesignSpace) -> None:
+    device = Hardware()
+    with driven(device, device.describe()), pytest.raises(DeviceError, match="driven by another session"):
+        check_device(lambda: device, space, clock=VirtualClock())
+    assert not device.taken
+
+
+class PhantomRig(Hardware):
+    """EMG at rest, with 3 mV of the stimulator's artefact, and a stated time of the pulse that may be too early."""
+
+    def __init__(
+        self, early_ms: float = 0.0, *, unit: str = "mV", only: Callable[[Stimulus], bool] | None = None
+    ) -> None:
+        super().__init__()
+        self.early_ms, self.unit, self.only = early_ms, unit, only or (lambda _: True)
+        self.simulated = False
+
+    def describe(self) -> DeviceInfo:
+        return DeviceInfo("rig", "impact", simulated=self.simulated, channels={"emg": self.unit})
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Sweep:
+        super().deliver(stimulus, timeout_s)
+        since_ms = np.arange(-600.0, 100.0, 0.2)
+        emg_mv = 0.0015 * np.random.default_rng(stimulus.trial).standard_normal(since_ms.size)
+        early_ms = self.early_ms if self.only(stimulus) else 0.0
+        emg_mv += 3.0 * np.exp(-np.clip(since_ms, 0.0, None) / 0.5) * (since_ms >= 0)
+        channel = Channel(emg_mv * {"mV": 1.0, "uV": 1e3}[self.unit], 5000.0, self.unit, t0_ms=-600.0)
+        hit_ms = None if stimulus.isi_ms is None else -early_ms - stimulus.isi_ms
+        return Sweep({"emg": channel}, t_tms_ms=-early_ms, t_hit_ms=hit_ms)
+
+
+@pytest.mark.parametrize("unit", ["mV", "uV"])
+def test_the_suite_finds_an_artefact_in_the_mep_window_of_a_phantom(unit: str) -> None:
+    with pytest.raises(AssertionError, match=r"a phantom has no muscle, and TMS alone .* Is the pulse's time right\?"):
+        check_device(lambda: PhantomRig(15.0, unit=unit), RIG_SPACE, clock=VirtualClock())
+    check_device(lambda: PhantomRig(unit=unit), RIG_SPACE, clock=VirtualClock())
+
+
+def test_the_suite_finds_an_artefact_that_pairs_alone_have() -> None:
+    def is_pair(stimulus: Stimulus) -> bool:
+        return stimulus.isi_ms is not None
+
+    with pytest.raises(AssertionError, match="a phantom has no muscle, and more than one pair"):
+        check_device(lambda: PhantomRig(15.0, only=is_pair), RIG_SPACE, clock=VirtualClock())
+    reflex = PhantomRig(15.0, only=lambda stimulus: stimulus.trial == 0)  # what one ISI alone shows may be the tap's
+    check_device(lambda: reflex, RIG_SPACE, clock=VirtualClock())
+
+
+def test_a_simulated_person_has_a_muscle() -> None:
+    rig = PhantomRig(15.0)
+    rig.simulated = True
+    check_device(lambda: rig, RIG_SPACE)

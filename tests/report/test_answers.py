@@ -69,6 +69,20 @@ def test_a_device_that_only_repeats_what_was_wanted_is_not_taken_for_exact(recor
     assert "no pulse or hit time to check it against" in detail
 
 
+def test_an_isi_exactly_as_wanted_is_right_where_the_times_confirm_it(record: SessionRecord) -> None:
+    timed = trial(0, t_valve_ms=100.0, t_tms_ms=150.0)
+    assert answer(with_history(record, [timed, trial(1)]), "timing").answer == "yes, where it is known (1 of 2 trials)"
+    untimed = trial(0, t_hit_ms=100.0, t_tms_ms=150.0)  # the space counts from the valve
+    assert answer(with_history(record, [untimed, trial(1)]), "timing").answer == "as the device says"
+
+
+def test_an_isi_that_its_times_contradict_is_not_right_where_nobody_rejected_it(record: SessionRecord) -> None:
+    trials = [trial(0, t_valve_ms=100.0, t_tms_ms=110.0), trial(1, t_valve_ms=100.0, t_tms_ms=151.0)]
+    _, said, detail = answer(with_history(record, trials), "timing")
+    assert said == "not in 1 of 2 trials"
+    assert detail.endswith("The times of pulse and valve contradict the ISI in trial 0.")
+
+
 def test_a_muscle_that_was_never_at_rest_is_not_unknown(record: SessionRecord) -> None:
     trials = [trial(k, background_rms_uv=30.0 + k, reason=MistrialReason.BACKGROUND_ACTIVITY) for k in range(3)]
     _, said, detail = answer(with_history(record, trials), "at rest")

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
 
+import numpy as np
 import pytest
 
 import isiw
@@ -25,7 +26,7 @@ from isiw.session.resume import exclude, include, resume
 from isiw.session.safeguards import Safeguards
 from isiw.session.updates import SessionUpdate
 from isiw.strategy.catalogue import make_strategy
-from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Sweep
+from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
 from scripted import ScriptedDevice, scripted_strategy, told_to
 
 Act: TypeAlias = Callable[[Session], None]
@@ -121,6 +122,24 @@ def test_a_mistrial_without_an_mep_cannot_be_accepted_and_the_message_says_so(lo
 
     def refused(session: Session) -> None:
         with pytest.raises(InvalidValueError, match=r"no MEP was measured.*missing channel"):
+            session.accept(2)
+
+    session_that({3: refused}, log, ScriptedDevice(answer)).run()
+    assert verdicts(log) == []
+
+
+def test_no_operator_accepts_an_amplitude_that_no_muscle_gives(log: Path) -> None:
+    def answer(stimulus: Stimulus) -> Sweep | Measurement:
+        if stimulus.trial != 2:
+            return Measurement(0.01 + (stimulus.isi_ms or 0) / 1e4, stimulus.isi_ms)
+        emg_mv = 0.001 * np.random.default_rng(0).standard_normal(4000)
+        emg_mv[3100:3120] += np.linspace(0.0, 194.0, 20)
+        emg = Channel(emg_mv, 5000.0, "mV", t0_ms=-600.0)
+        return Sweep({"emg": emg}, t_valve_ms=-(stimulus.isi_ms or 0.0), t_tms_ms=0.0)
+
+    def refused(session: Session) -> None:
+        assert session.trials[2].reason is MistrialReason.IMPLAUSIBLE
+        with pytest.raises(InvalidValueError, match=r"trial 2 cannot be accepted: .*194 mV is more than any"):
             session.accept(2)
 
     session_that({3: refused}, log, ScriptedDevice(answer)).run()

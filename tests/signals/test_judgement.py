@@ -281,6 +281,42 @@ def test_a_measurement_is_judged_by_the_rules_of_a_sweep(
     assert judged.mep_mv == 0.1  # of a mistrial for whoever looks at it
 
 
+@pytest.mark.parametrize(
+    ("space", "times"),
+    [
+        (IMPACT, {"t_hit_ms": 0.0, "t_tms_ms": 40.0}),
+        (IMPACT, {"t_hit_ms": 40.0, "t_tms_ms": -60.0}),
+        (VALVE, {"t_valve_ms": 0.0, "t_tms_ms": 400.0}),
+        (VALVE, {"t_valve_ms": 0.0, "t_tms_ms": 0.1}),
+    ],
+)
+def test_a_measurement_that_its_own_times_contradict_is_an_error(space: DesignSpace, times: dict[str, float]) -> None:
+    with pytest.raises(DeviceError, match=r"contradict the ISI that it reports; got 'a pulse .* ISI of 100 ms'"):
+        judge_measurement(Measurement(0.1, 100.0, **times), Stimulus(0, 100.0), space)
+
+
+@pytest.mark.parametrize(
+    ("space", "times"),
+    [
+        (IMPACT, {"t_hit_ms": 41.0, "t_tms_ms": 140.0}),  # all three cut off to whole ms
+        (IMPACT, {"t_valve_ms": 0.0, "t_tms_ms": 280.0}),  # the space counts from the impact, which is not told
+        (IMPACT, {"t_tms_ms": 0.0}),
+        (VALVE, {"t_valve_ms": -100.0, "t_hit_ms": 80.0, "t_tms_ms": 0.0}),
+    ],
+)
+def test_a_measurement_that_its_own_times_do_not_contradict_counts(space: DesignSpace, times: dict[str, float]) -> None:
+    assert judge_measurement(Measurement(0.1, 100.0, **times), Stimulus(0, 100.0), space).reason is None
+
+
+def test_a_measurement_of_a_control_trial_has_no_time_of_what_was_not_to_come() -> None:
+    with pytest.raises(DeviceError, match=r"a tap where TMS alone was commanded; got 'an impact at -100 ms'"):
+        judge_measurement(Measurement(0.3, None, t_hit_ms=-100.0, t_tms_ms=0.0), Stimulus(0, None), IMPACT)
+    with pytest.raises(DeviceError, match=r"a magnetic pulse where a tap alone was commanded; got 'one at 3 ms'"):
+        judge_measurement(Measurement(0.3, None, t_tms_ms=3.0), Stimulus(0, None, tap_alone=True), VALVE)
+    tap = judge_measurement(Measurement(0.3, None, t_hit_ms=3.0), Stimulus(0, None, tap_alone=True), VALVE)
+    assert tap.reason is None
+
+
 @pytest.mark.parametrize("full_scale_mv", [None, 5.0])
 def test_a_clipped_mep_is_saturated_also_one_step_below_the_full_scale(full_scale_mv: float | None) -> None:
     times = np.arange(5000) / 5.0

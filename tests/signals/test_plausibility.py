@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from isiw.design import IMPACT_SPACE, DesignSpace
@@ -47,6 +48,7 @@ def test_an_isi_far_from_the_one_asked_is_a_doubt(space: DesignSpace) -> None:
     ("meps_mv", "kind"),
     [
         ([0.02, 0.05, 0.05, 0.05, 0.05], DoubtKind.EQUAL),
+        ([0.02, 0.3, 0.302, 0.299, 0.301, 0.304, 0.3], DoubtKind.EQUAL),
         ([0.0005, 0.0004, 0.0003], DoubtKind.SMALL),
         ([8.0, 6.0, 12.0], DoubtKind.LARGE),
         ([0.008, 0.01, 0.1, 8.0, 11.0, 9.0], DoubtKind.JUMP),
@@ -67,6 +69,8 @@ def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv: list[float], kind
         [0.0, 0.0, 0.0, 0.0, 0.0],
         [0.006] + [0.0] * 20,
         [0.05, 0.05, 0.05],
+        [0.0400, 0.0401, 0.0402, 0.0399, 0.0400, 0.0401, 0.0402],  # EMG at rest, in hum
+        [0.30, 0.33, 0.28, 0.31, 0.27, 0.30, 0.32],  # alike, for a muscle
         [0.008, 0.01, 0.009, 1.5, 0.9, 1.2],
         [0.0027, 0.0008, 0.002],
         [0.08, 5.0, 2.0, 0.1],
@@ -87,3 +91,14 @@ def test_pulses_whose_amplitudes_are_all_below_the_emg_at_rest_may_be_in_volts(m
 @pytest.mark.parametrize("meps_mv", [[], [0.0], [0.002], [0.008, 0.0005], [0.0005, 0.008]])
 def test_amplitudes_with_one_as_large_as_the_emg_at_rest_are_believed(meps_mv: list[float]) -> None:
     assert implausible_scale(meps_mv) is None
+
+
+def test_amplitudes_that_an_artefact_has_are_told_as_one() -> None:
+    doubt = doubt_of([0.3, 0.302, 0.299, 0.301, 0.304, 0.3])
+    assert doubt is not None
+    assert "almost equal (0.301 mV), and MEPs vary more. Is it an artefact of the stimulator?" in doubt.text
+
+
+def test_a_muscle_is_not_doubted_for_being_steady() -> None:
+    meps_mv = [float(mep_mv) for mep_mv in 0.3 * np.random.default_rng(0).lognormal(0.0, 0.3, 5000)]
+    assert not any(doubt_of(meps_mv[n : n + 6]) for n in range(5000))

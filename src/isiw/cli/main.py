@@ -140,7 +140,10 @@ def check(
     config: Annotated[Path, typer.Argument(help="The configuration with your device.")],
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before stimulating.")] = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
-    """Check a device, with the coil on a phantom: what it delivers, and whether a session can use it. It stimulates."""
+    """Check a device, with the coil on a phantom: what it delivers, and whether a session can use it. It stimulates.
+
+    The limits of CONFIG hold, as in a session.
+    """
     with errors_reported("Interrupted: the device is stopped."):
         settings = isiw.config.load_config(config)
         device, space = isiw.config.device_for(settings), settings.space.design()
@@ -151,6 +154,7 @@ def check(
                 lambda: isiw.config.device_for(settings),
                 space,
                 iti_s=settings.limits.min_iti_s,
+                limits=isiw.config.limits_for(settings),
                 timeout_s=settings.timeout_s,
                 signals=settings.signals,
                 say=show,

@@ -60,6 +60,7 @@ __all__ = [
     "device_for",
     "fresh_log_path",
     "has_truth",
+    "limits_for",
     "load_config",
     "require_same_person",
     "session_for",
@@ -167,7 +168,7 @@ def load_config(path: str | Path | None = None) -> RunConfig:
     config = _validated(values, str(path))
     _require_percent(config.visit)
     require_together(values)
-    _limits(config).require_effect()
+    limits_for(config).require_effect()
     config.protocol.require_effect(config.limits.min_iti_s)
     return config
 
@@ -255,6 +256,11 @@ def device_for(config: RunConfig) -> Device:
     return SimulatedDevice(recorded)
 
 
+def limits_for(config: RunConfig) -> Limits:
+    """What may be delivered: the ISIs of the space, within the section on limits."""
+    return dataclasses.replace(Limits.of_space(config.space.design()), **config.limits.model_dump())
+
+
 def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:
     """The session that a configuration describes, ready to run.
 
@@ -279,7 +285,7 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         device,
         make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),
         log=log,
-        limits=_limits(config),
+        limits=limits_for(config),
         on_trial=on_trial,
         subject=config.visit.subject or ("" if config.device else _code(config)),
         signals=config.signals,
@@ -288,10 +294,6 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         visit=config.visit.noted(),
         protocol=config.protocol,
     )
-
-
-def _limits(config: RunConfig) -> Limits:
-    return dataclasses.replace(Limits.of_space(config.space.design()), **config.limits.model_dump())
 
 
 def _require_used(subject: SubjectConfig) -> None:

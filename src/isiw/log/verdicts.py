@@ -10,7 +10,8 @@ from isiw.checks import text
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.log.schema import Event, EventKind
-from isiw.trials import Trial, TrialTable
+from isiw.signals.plausibility import implausible_amplitude
+from isiw.trials import MistrialReason, Trial, TrialTable
 
 __all__ = ["LOOKED_AT", "VERDICTS", "acceptance", "exclusion", "inclusion", "under", "under_all"]
 
@@ -23,6 +24,8 @@ VERDICTS: Final[dict[EventKind, Callable[[Trial], Trial]]] = {
 
 LOOKED_AT: Final = "Rejected by the operator after looking at the MEP."
 """The reason of an exclusion that rejects an MEP."""
+
+_KEPT: Final = "Its waveforms, where there are any, stay in the log; the ISI is asked again."
 
 
 def under(trial: Trial, event: Event) -> Trial:
@@ -87,7 +90,8 @@ def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:
         space: what its ISI must have come from.
 
     Raises:
-        InvalidValueError: no such trial, one that counts already, or one without an amplitude or an ISI to count with.
+        InvalidValueError: no such trial, one that counts already, or one without an amplitude or an ISI to count with,
+            or with an amplitude that no muscle gives.
     """
     trial = next((trial for trial in trials if trial.index == number), None)
     if trial is not None and trial.excluded:
@@ -97,9 +101,25 @@ def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:
         raise InvalidValueError(
             f"trial {number} cannot be accepted: no MEP was measured at an ISI that a strategy could learn from",
             got=None if trial is None else str(trial.reason),
-            remedy="Its waveforms, where there are any, stay in the log; the ISI is asked again.",
+            remedy=_KEPT,
         )
+    _require_of_a_muscle(trial, trial.mep_mv)
     return Event(kind="acceptance", trial=number, text=f"Accepted by the operator all the same: {trial.reason}.")
+
+
+def _require_of_a_muscle(trial: Trial, mep_mv: float) -> None:
+    """Raise where the amplitude cannot be an MEP's, whatever a person thinks of the trial."""
+    slip = implausible_amplitude(mep_mv)
+    if slip is not None:
+        raise InvalidValueError(
+            f"trial {trial.index} cannot be accepted: {slip.what}", got=mep_mv, remedy=f"{slip.remedy} {_KEPT}"
+        )
+    if mep_mv == 0 and trial.reason is MistrialReason.IMPLAUSIBLE:
+        raise InvalidValueError(
+            f"trial {trial.index} cannot be accepted: its EMG does not move in the MEP window",
+            got=mep_mv,
+            remedy=f"Is the amplifier on? {_KEPT}",
+        )
 
 
 def _placed(trial: Trial, space: DesignSpace) -> bool:

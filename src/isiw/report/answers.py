@@ -5,12 +5,14 @@ from __future__ import annotations
 import itertools
 import statistics
 from collections import Counter
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate, Event, EventKind
 from isiw.report.tables import lost_rows
 from isiw.report.words import counts_sentence
+from isiw.signals.agreement import contradicts_its_times, timed_isi_ms
 from isiw.trials import MistrialReason, Trial
 
 __all__ = ["Answer", "answers"]
@@ -42,33 +44,51 @@ def answers(record: SessionRecord) -> list[Answer]:
 
 
 def _lost(record: SessionRecord) -> Answer:
-    given, lost = record.given, [str(number) for number, *_ in lost_rows(record)]
-    named = ", ".join(lost[:MOST_NAMED]) + (f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else "")
-    answer = f"{len(lost)} of {given}: {'trial' if len(lost) == 1 else 'trials'} {named}" if lost else "none"
+    given, lost = record.given, [number for number, *_ in lost_rows(record)]
+    answer = f"{len(lost)} of {given}: {_few(lost)}" if lost else "none"
     return Answer("Which trials were lost, and why?", answer, counts_sentence(record))
 
 
+def _few(numbers: Sequence[object]) -> str:
+    """The first of these trials by their numbers, and how many more there are."""
+    named = ", ".join(str(number) for number in numbers[:MOST_NAMED])
+    more = f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else ""
+    return f"{'trial' if len(numbers) == 1 else 'trials'} {named}{more}"
+
+
 def _timing(record: SessionRecord) -> Answer:
-    question = "Was the timing right?"
+    question, space = "Was the timing right?", record.header.space
     errors_ms = [abs(trial.isi_error_ms) for trial in record.table.told if trial.isi_error_ms is not None]
     rejected = _rejected_for(record, _OF_TIMING)
-    is_timed = any(trial.t_hit_ms is not None or trial.t_tms_ms is not None for trial in record.table)
     if not errors_ms:
         return Answer(
             question,
             _verdict(record, len(rejected), 0),
             f"No trial that counts has a realised ISI. {_listed(rejected)}",
         )
-    if not any(errors_ms) and not is_timed:
+    confirmed = [timed_isi_ms(trial, space) is not None for trial in record.table]
+    if not any(errors_ms) and not any(confirmed):
         detail = "The device reports every ISI exactly as commanded, and no pulse or hit time to check it against."
         answer = _verdict(record, len(rejected), 0) if rejected else "as the device says"
         return Answer(question, answer, f"{detail} {_listed(rejected)}")
-    tolerance_ms = record.header.signals.tolerance_ms(record.header.space)
+    tolerance_ms = record.header.signals.tolerance_ms(space)
     sizes = f"{statistics.median(errors_ms):.1f} ms (median), at most {max(errors_ms):.1f} ms"
+    others = _not_for(record, _OF_TIMING)
+    contradicted = [trial.index for trial in others if contradicts_its_times(trial, space)]
+    off = sum(abs(trial.isi_error_ms or 0.0) > tolerance_ms or trial.index in contradicted for trial in others)
     detail = f"Trials that count are off by {sizes}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
-    known = sum(trial.commanded_isi_ms is None or trial.isi_ms is not None for trial in record.table)
-    off = sum(abs(trial.isi_error_ms or 0.0) > tolerance_ms for trial in _not_for(record, _OF_TIMING))
-    return Answer(question, _verdict(record, len(rejected) + off, known), detail)
+    if contradicted:
+        detail += f" The times of pulse and {space.reference} contradict the ISI in {_few(contradicted)}."
+    return Answer(question, _verdict(record, len(rejected) + off, _known(record, measured=any(errors_ms))), detail)
+
+
+def _known(record: SessionRecord, *, measured: bool) -> int:
+    """Of how many trials it is known when the pulse came; where no ISI was measured, by the trial's times alone."""
+    return sum(
+        trial.commanded_isi_ms is None
+        or (trial.isi_ms is not None and (measured or timed_isi_ms(trial, record.header.space) is not None))
+        for trial in record.table
+    )
 
 
 def _rest(record: SessionRecord) -> Answer:

@@ -81,7 +81,7 @@ class Judging(ABC):
             trial: its number.
 
         Raises:
-            InvalidValueError: no such trial, one that counts already or of which no MEP was measured, or the session is
-                not open.
+            InvalidValueError: no such trial, one that counts already or of which no MEP was measured that a muscle can
+                give, or the session is not open.
         """
         self._judge(lambda trials: acceptance(trials, trial, self._space))

@@ -16,6 +16,7 @@ import numpy as np
 from isiw.checks import MOST_MEP_MV, ascending, check_numbers
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
+from isiw.signals.agreement import pulse_with_tap_alone, require_agreement, tap_with_tms_alone
 from isiw.signals.amplifier import is_blanked, is_saturated
 from isiw.signals.events import tap_artefact_times
 from isiw.signals.impact import impact_time
@@ -168,9 +169,7 @@ def _judge_pulse(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: S
 def _judge_tap(sweep: Sweep, stimulus: Stimulus, limits: SignalLimits) -> Trial:
     """A tap alone, of which no MEP is expected: the impact must be there, and the muscle at rest before it."""
     if sweep.t_tms_ms is not None:
-        raise DeviceError(
-            "the device reports a magnetic pulse where a tap alone was commanded", got=f"one at {sweep.t_tms_ms:g} ms"
-        )
+        raise pulse_with_tap_alone(sweep.t_tms_ms)
     judged = replace(Trial.unknown(stimulus), t_valve_ms=sweep.t_valve_ms)
     if not _usable(sweep, "emg") or not of_one_length(sweep):
         return _mistrial(judged, MistrialReason.MISSING_CHANNEL)
@@ -206,7 +205,8 @@ def judge_measurement(
         limits: what the measurement must satisfy.
 
     Raises:
-        DeviceError: a pair reported where TMS alone was commanded, or the other way round.
+        DeviceError: a pair reported where TMS alone was commanded, or the other way round, or times that contradict the
+            realised ISI.
     """
     limits = limits or SignalLimits()
     if (measurement.isi_ms is None) != (stimulus.isi_ms is None):
@@ -215,6 +215,7 @@ def judge_measurement(
             got=f"a realised ISI of {measurement.isi_ms}",
             expected=f"one for the commanded ISI of {stimulus.isi_ms}",
         )
+    require_agreement(measurement, stimulus, space)
     judged = Trial(
         stimulus.trial, Status.ACCEPTED, stimulus.isi_ms, tap_alone=stimulus.tap_alone, **asdict(measurement)
     )
@@ -255,14 +256,10 @@ def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: 
 
 
 def _require_no_tap(sweep: Sweep) -> None:
-    """Raise where a tap came with TMS alone: a response to both would be taken for one to the pulse."""
+    """Raise where a tap came with TMS alone."""
     hit_ms = _unwanted_impact(sweep) if sweep.t_hit_ms is None else sweep.t_hit_ms
     if hit_ms is not None:
-        raise DeviceError(
-            "the device reports a tap where TMS alone was commanded",
-            got=f"an impact at {hit_ms:g} ms",
-            remedy="Does the valve stay open? Leave t_hit_ms and t_valve_ms out where nothing hits.",
-        )
+        raise tap_with_tms_alone(hit_ms)
 
 
 def _unwanted_impact(sweep: Sweep) -> float | None:

@@ -16,6 +16,7 @@ from typing import Final, NamedTuple
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.text.found import ENOUGH_PAIRS
+from isiw.trials import RESPONSE_MV
 
 __all__ = [
     "Doubt",
@@ -49,6 +50,11 @@ JUMP = 300.0
 IN_A_ROW = 3
 EQUAL_IN_A_ROW = 4
 SILENT_FROM_THE_START = 10
+
+ALIKE_IN_A_ROW = 6
+ALIKE_CV = 0.015
+"""From pulse to pulse MEPs have a CV of .3 and more; what a stimulator itself puts into the EMG has less than this. So
+may mains hum, which is smaller than a response where the muscle counts as at rest."""
 
 MANY_BELOW_MV = 0.02
 """Of a detection limit from here on, amplitudes of 0 are usual: most pulses below the threshold evoke less."""
@@ -197,16 +203,29 @@ def doubt_of(meps_mv: Sequence[float], detection_limit_mv: float | None = None) 
         meps_mv: all amplitudes told so far [mV], in order; 0 is below the detection limit.
         detection_limit_mv: what an amplitude of 0 is known to be below [mV]; None where nobody has said.
     """
-    last = list(meps_mv[-EQUAL_IN_A_ROW:])
-    if len(last) == EQUAL_IN_A_ROW and len(set(last)) == 1 and last[0] > 0:
-        text = f"The last {EQUAL_IN_A_ROW} amplitudes are exactly equal ({last[0]:g} mV). Is the EMG still recorded?"
-        return Doubt(DoubtKind.EQUAL, text)
+    alike = _doubt_of_equals(meps_mv)
+    if alike is not None:
+        return alike
     seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
     if len(meps_mv) >= SILENT_FROM_THE_START and is_silent(meps_mv, detection_limit_mv):
         text = f"None of the first {len(meps_mv)} pulses gave an MEP: every amplitude is 0."
         ask = "Does the stimulator fire, is the EMG recorded, is the intensity enough?"
         return Doubt(DoubtKind.SILENT, f"{text} {ask}")
     return _doubt_of_scale(seen[:-IN_A_ROW], seen[-IN_A_ROW:]) if len(seen) >= IN_A_ROW else None
+
+
+def _doubt_of_equals(meps_mv: Sequence[float]) -> Doubt | None:
+    """What is odd about amplitudes that are one like the other."""
+    last = list(meps_mv[-EQUAL_IN_A_ROW:])
+    if len(last) == EQUAL_IN_A_ROW and len(set(last)) == 1 and last[0] > 0:
+        text = f"The last {EQUAL_IN_A_ROW} amplitudes are exactly equal ({last[0]:g} mV). Is the EMG still recorded?"
+        return Doubt(DoubtKind.EQUAL, text)
+    last = list(meps_mv[-ALIKE_IN_A_ROW:])
+    mean_mv = statistics.fmean(last) if len(last) == ALIKE_IN_A_ROW else 0.0
+    if mean_mv < RESPONSE_MV or statistics.stdev(last) >= ALIKE_CV * mean_mv:
+        return None
+    text = f"The last {ALIKE_IN_A_ROW} amplitudes are almost equal ({mean_mv:.3g} mV), and MEPs vary more. Is it an "
+    return Doubt(DoubtKind.EQUAL, f"{text}artefact of the stimulator? Is the pulse's time right?")
 
 
 def doubts_of(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> frozenset[DoubtKind]:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from isiw.checks import check_numbers
+from isiw.checks import number
 from isiw.design import DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
+from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
-from isiw.errors import DeviceError, IsiwError
+from isiw.errors import IsiwError
 from isiw.log.topics import waveform_topic
 from isiw.signals import SignalLimits, judge, judge_measurement
 from isiw.signals.faults import likely_fault, too_early_by_chance
 from isiw.signals.plausibility import DoubtKind, doubt_of
 from isiw.testing.device_table import Delivery, DeviceTable, device_table
+from isiw.testing.guarded import Guarded, Pace
+from isiw.testing.phantom import artefact_in_window
 from isiw.testing.requirements import require
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
@@ -29,6 +30,7 @@ def check_device(
     *,
     timeout_s: float = 30.0,
     iti_s: float = 5.0,
+    limits: Limits | None = None,
     clock: Clock | None = None,
     signals: SignalLimits | None = None,
     say: Callable[[str], None] = print,
@@ -37,13 +39,15 @@ def check_device(
 
     It delivers three pairs of stimuli, TMS alone, a tap alone where the device says that it can, and five pairs more
     where the device has a memory. It tries six more times while the device is disarmed and must refuse. It says so
-    beforehand, and ends with a table of what was found. Whatever happens, the device is disarmed at the end.
+    beforehand, and ends with a table of what was found. Every delivery goes through the guards of a session: limits,
+    readiness, deadlines, and signals, which disarm at once. Whatever happens, the device is disarmed at the end.
 
     Args:
         make: makes the device, in the same state each time; called three times where the device has a memory.
         space: ISIs that it can deliver, on its reference.
-        timeout_s: how long one delivery may take [s].
-        iti_s: how long to wait before each of these deliveries [s].
+        timeout_s: how long one delivery may take [s]; past it, the device is stopped from another thread.
+        iti_s: how long to wait before each of these deliveries [s]; the limits may ask for more.
+        limits: what may be delivered, as a session's; the space, 5 s between stimuli and 200 pulses by default.
         clock: waits; a virtual one by default where the device is simulated.
         signals: what a session's sweeps must keep.
         say: takes what is said to whoever watches.
@@ -52,57 +56,43 @@ def check_device(
         The table.
 
     Raises:
-        AssertionError: a promise is broken, or a session would reject a trial; the message says which, and why.
+        AssertionError: a promise is broken, a session would reject a trial, or a real device shows an MEP although a
+            phantom has no muscle; the message says which, and why.
+        DeviceError: the device failed, is not ready, or is driven by a session.
+        LimitExceededError: the limits do not allow a stimulus; it was not delivered.
         InvalidValueError: an inter-trial interval that is negative or not finite.
     """
     device = make()
     require(isinstance(device, Device), "it has describe, stage, deliver, stop and unstage")
     _check_description(device, space)
     rules = _Rules(space, signals or SignalLimits())
-    pace = _Pace(timeout_s, iti_s, clock or (VirtualClock() if device.describe().simulated else MonotonicClock()))
+    pace = _pace(device, space, limits, timeout_s=timeout_s, iti_s=iti_s, clock=clock)
     say(_announcement(device, pace))
-    with _disarmed_at_last(device):
-        deliveries = _check_delivery(device, rules, pace)
+    deliveries = _check_delivery(device, rules, pace)
     if isinstance(device, HasMemory):
         _check_memory(make, space, pace)
     table = device_table(device.describe(), deliveries, rules.limits)
     say(str(table))
-    _require_usable(deliveries, rules)
+    _require_usable(deliveries, rules, real=not device.describe().simulated)
     return table
 
 
-def _announcement(device: Device, pace: _Pace) -> str:
+def _pace(
+    device: Device, space: DesignSpace, limits: Limits | None, *, timeout_s: float, iti_s: float, clock: Clock | None
+) -> Pace:
+    clock = clock or (VirtualClock() if device.describe().simulated else MonotonicClock())
+    least_s = number("iti_s", iti_s, least=0)
+    return Pace(timeout_s, least_s, limits or Limits.of_space(space, min_iti_s=least_s), clock)
+
+
+def _announcement(device: Device, pace: Pace) -> str:
     info = device.describe()
     if info.simulated:
         return f"{info.name} is simulated: nothing is delivered to anybody."
     pairs = 8 if isinstance(device, HasMemory) else 3
     alone = ", one magnetic pulse alone and one tap alone" if info.tap_alone else " and one magnetic pulse alone"
-    return f"This check stimulates: {pairs} pairs{alone}, {pace.iti_s:g} s apart. Keep the coil on a phantom."
-
-
-@dataclass(frozen=True)
-class _Pace:
-    """How fast deliveries may follow each other."""
-
-    timeout_s: float
-    iti_s: float
-    clock: Clock
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "iti_s", least=0)
-
-    def deliver(self, device: Device, stimulus: Stimulus) -> Answer:
-        """Deliver one pair of stimuli, an inter-trial interval after whatever was delivered before."""
-        return self.timed(device, stimulus)[0]
-
-    def timed(self, device: Device, stimulus: Stimulus) -> tuple[Answer, float]:
-        """As `deliver`, and how long the device took [s]."""
-        self.clock.sleep_s(self.iti_s)
-        began_s = time.monotonic()
-        answer = device.deliver(stimulus, self.timeout_s)
-        spent_s = time.monotonic() - began_s
-        require(spent_s <= self.timeout_s, f"deliver returns or raises within its timeout, here after {spent_s:.3g} s")
-        return answer, spent_s
+    iti_s = max(pace.iti_s, pace.limits.min_iti_s)
+    return f"This check stimulates: {pairs} pairs{alone}, {iti_s:g} s apart. Keep the coil on a phantom."
 
 
 @dataclass(frozen=True)
@@ -120,36 +110,35 @@ class _Rules:
         return judge_measurement(answer, stimulus, self.space, self.limits)
 
 
-@contextmanager
-def _disarmed_at_last(device: Device) -> Iterator[None]:
-    try:
-        yield
-    finally:
-        try:
-            device.stop()
-        finally:
-            device.unstage()
+def _check_delivery(device: Device, rules: _Rules, pace: Pace) -> list[Delivery]:
+    guarded = Guarded(device, pace)
+    with guarded.driven():
+        guarded.require_stop()
+        with guarded.armed(kept_disarmed=True):
+            guarded.require_refusal("before stage()")
+        with guarded.armed():
+            deliveries = [_delivery(guarded, stimulus, rules) for stimulus in _stimuli(device.describe(), rules.space)]
+            for _ in range(2):
+                guarded.disarm()
+                guarded.require_refusal("after stop()")
+        for _ in range(2):
+            with guarded.armed(kept_disarmed=True):
+                guarded.require_refusal("after unstage()")
+        with guarded.armed():
+            guarded.disarm()
+            guarded.require_refusal("after being staged again and stopped")
+    return deliveries
 
 
-def _check_delivery(device: Device, rules: _Rules, pace: _Pace) -> list[Delivery]:
-    _check_refusal(device, "before stage()", pace)
-    device.stage()
-    space = rules.space
+def _stimuli(info: DeviceInfo, space: DesignSpace) -> list[Stimulus]:
     between_ms = float(space.grid_ms[(len(space.grid_ms) - 1) // 3])
     stimuli = [Stimulus(trial, isi) for trial, isi in enumerate((space.low_ms, None, between_ms, space.high_ms))]
-    stimuli += [Stimulus(4, None, tap_alone=True)] if device.describe().tap_alone else []
-    deliveries = []
-    for stimulus in stimuli:
-        answer, took_s = pace.timed(device, stimulus)
-        trial = _checked_answer(device.describe(), stimulus, answer, rules)
-        deliveries.append(Delivery(stimulus, answer, trial, took_s))
-    for verb in (device.stop, device.stop, device.unstage, device.unstage):
-        verb()
-        _check_refusal(device, "after stop() or unstage()", pace)
-    device.stage()
-    device.stop()
-    _check_refusal(device, "after being staged again and stopped", pace)
-    return deliveries
+    return stimuli + ([Stimulus(4, None, tap_alone=True)] if info.tap_alone else [])
+
+
+def _delivery(guarded: Guarded, stimulus: Stimulus, rules: _Rules) -> Delivery:
+    answer, took_s = guarded.deliver(stimulus)
+    return Delivery(stimulus, answer, _checked_answer(guarded.info, stimulus, answer, rules), took_s)
 
 
 def _check_description(device: Device, space: DesignSpace) -> None:
@@ -157,14 +146,6 @@ def _check_description(device: Device, space: DesignSpace) -> None:
     require(isinstance(info, DeviceInfo), "describe() returns a DeviceInfo before it is staged")
     require(info == device.describe(), "describe() says the same each time")
     require(info.reference == space.reference, f"its reference is the space's, {space.reference}")
-
-
-def _check_refusal(device: Device, when: str, pace: _Pace) -> None:
-    try:
-        pace.deliver(device, Stimulus(0, None))
-    except DeviceError:
-        return
-    raise AssertionError(f"broken promise: deliver raises a DeviceError {when}")
 
 
 def _checked_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, rules: _Rules) -> Trial:
@@ -185,8 +166,8 @@ def _checked_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, rules:
         raise AssertionError(f"broken promise: a session can judge what deliver returns, here: {error}") from error
 
 
-def _require_usable(deliveries: Sequence[Delivery], rules: _Rules) -> None:
-    """Raise where a session would reject what was delivered, or would pause over it."""
+def _require_usable(deliveries: Sequence[Delivery], rules: _Rules, *, real: bool) -> None:
+    """Raise where a session would reject what was delivered, or pause over it, or take an artefact for an MEP."""
     said = []
     for delivery in deliveries:
         fault = likely_fault(delivery.answer, delivery.trial, rules.limits)
@@ -198,10 +179,13 @@ def _require_usable(deliveries: Sequence[Delivery], rules: _Rules) -> None:
     doubt = doubt_of(meps_mv)
     if doubt is not None and doubt.kind is not DoubtKind.EQUAL:
         said.append(doubt.text)
+    artefact = artefact_in_window(deliveries, rules.limits) if real else None
+    if artefact is not None:
+        said.append(artefact)
     require(not said, f"a session can use what deliver returns, here {'; '.join(dict.fromkeys(said))}")
 
 
-def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: _Pace) -> None:
+def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: Pace) -> None:
     grid = space.grid_ms
     stimuli = [Stimulus(trial, float(grid[trial * (len(grid) - 1) // 3])) for trial in range(4)]
     uninterrupted = _answers(make(), stimuli, pace)
@@ -212,10 +196,10 @@ def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: _Pace) -
     require(_same(last, uninterrupted[3]), "after resume_after it answers as if it had never been interrupted")
 
 
-def _answers(device: Device, stimuli: Sequence[Stimulus], pace: _Pace) -> list[Answer]:
-    with _disarmed_at_last(device):
-        device.stage()
-        return [pace.deliver(device, stimulus) for stimulus in stimuli]
+def _answers(device: Device, stimuli: Sequence[Stimulus], pace: Pace) -> list[Answer]:
+    guarded = Guarded(device, pace)
+    with guarded.driven(), guarded.armed():
+        return [guarded.deliver(stimulus)[0] for stimulus in stimuli]
 
 
 def _same(one: Answer, other: Answer) -> bool:

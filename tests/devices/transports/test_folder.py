@@ -295,7 +295,7 @@ def test_what_an_earlier_run_left_behind_is_never_taken(tmp_path: Path) -> None:
         made.deliver(Stimulus(0, 50.0), 5.0)
         left = tmp_path / "answer-0badf00d-3.txt"
         left.write_text("token=0badf00d\nnumber=3\nsaid=delivered\ntrial=1\nset_isi_ms=50\nmep_mv=9\nisi_ms=50\nend\n")
-        assert instance(Measurement, made.deliver(Stimulus(1, 60.0), 5.0)) == Measurement(0.401, 60.1)
+        assert instance(Measurement, made.deliver(Stimulus(1, 60.0), 5.0)) == Measurement(0.45, 60.1)
         assert left.exists()
 
 

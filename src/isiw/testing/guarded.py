@@ -1,0 +1,197 @@
+"""A device under check, driven as a session drives it: within limits and deadlines, and disarmed at every signal."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from isiw.devices.clock import Clock
+from isiw.devices.deadlines import PunctualDevice
+from isiw.devices.limits import Limits
+from isiw.devices.lock import driven
+from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness
+from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered, StillArmedError, told
+from isiw.session.rig import Rig
+from isiw.session.safeguards import Safeguards
+from isiw.testing.requirements import require
+from isiw.trials import Stimulus
+
+__all__ = ["Guarded", "Pace"]
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast deliveries of a check may follow each other.
+
+    Args:
+        timeout_s: how long one delivery may take [s].
+        iti_s: how long to wait before each delivery at least [s].
+        limits: what may be delivered at most; they may ask for longer waits.
+        clock: waits.
+        given_s: when each delivery ended, by the clock [s], of all devices of the check.
+    """
+
+    timeout_s: float
+    iti_s: float
+    limits: Limits
+    clock: Clock
+    given_s: list[float] = field(default_factory=list)
+
+
+class Guarded:
+    """A device that is checked, behind the guards of a session.
+
+    Args:
+        device: the device.
+        pace: how fast deliveries may follow each other, and within which limits.
+    """
+
+    def __init__(self, device: Device, pace: Pace) -> None:
+        self._device, self._pace, self._delivered = device, pace, 0
+        self._kept = _KeptDisarmed(device)
+        self._rig = Rig(self._kept, pace.limits, _GivenClock(pace.clock), Safeguards())
+
+    @property
+    def info(self) -> DeviceInfo:
+        """What the device is."""
+        return self._rig.info
+
+    @contextmanager
+    def driven(self) -> Iterator[None]:
+        """Within, no session drives the device, and every signal disarms it and ends the check."""
+        with driven(self._device, self._rig.info), self._rig.interrupts:
+            yield
+        faults = "; ".join(self._rig.faults)
+        require(not faults, f"stop and unstage work in any state, here: {faults}")
+
+    @contextmanager
+    def armed(self, *, kept_disarmed: bool = False) -> Iterator[None]:
+        """Within, the device is staged; behind it, it is disarmed and let go of, whatever happened.
+
+        Args:
+            kept_disarmed: whether `stage` is kept from it, so that stimuli get through the guards to a disarmed device.
+        """
+        self._kept.now = kept_disarmed
+        now_s = self._pace.clock.now_s()
+        with self._rig.armed(self._delivered, [now_s - given_s for given_s in self._pace.given_s]):
+            yield
+
+    def disarm(self) -> None:
+        """Disarm the staged device, and let stimuli get through to it all the same."""
+        self._rig.disarm()
+        self._kept.now = True
+        self._rig.stage()
+
+    def deliver(self, stimulus: Stimulus) -> tuple[Answer, float]:
+        """Deliver a stimulus when pace and limits allow it, and say how long the device took [s].
+
+        As in a session, one that the device refuses before firing is tried again.
+
+        Args:
+            stimulus: what to deliver.
+        """
+        for backoff_s in Safeguards().backoffs_s:
+            try:
+                return self._tried(stimulus)
+            except NotDelivered:
+                self._sleep(backoff_s)
+        return self._tried(stimulus)
+
+    def require_refusal(self, when: str) -> None:
+        """Raise where the disarmed device does not refuse to deliver.
+
+        Args:
+            when: when that is, for the message.
+
+        Raises:
+            AssertionError: it delivers.
+        """
+        try:
+            self._tried(Stimulus(0, None))
+        except DeviceError:
+            return
+        raise AssertionError(f"broken promise: deliver raises a DeviceError {when}")
+
+    def require_stop(self) -> None:
+        """Raise where `stop` fails before anything is armed; once the device is armed that would be too late.
+
+        Raises:
+            AssertionError: it does.
+        """
+        punctual = PunctualDevice(self._device)
+        try:
+            punctual.stop()
+        except StillArmedError as error:
+            raise AssertionError(f"broken promise: stop works in any state, here: {told(error)}") from error
+        finally:
+            punctual.release_thread()
+
+    def _tried(self, stimulus: Stimulus) -> tuple[Answer, float]:
+        self._sleep(self._pace.iti_s)
+        while (wait_s := self._rig.wait_s()) > 0:
+            self._sleep(wait_s)
+        began_s, timeout_s = time.monotonic(), self._pace.timeout_s
+        try:
+            answer = self._rig.deliver(stimulus, timeout_s)
+        except DeviceTimeoutError as error:
+            if (spent_s := time.monotonic() - began_s) > timeout_s:
+                raise AssertionError(f"broken promise: {_in_time(spent_s)}; it was given up and disarmed") from error
+            raise
+        self._delivered += 1
+        self._pace.given_s.append(self._pace.clock.now_s())
+        spent_s = time.monotonic() - began_s
+        require(spent_s <= timeout_s, _in_time(spent_s))
+        return answer, spent_s
+
+    def _sleep(self, duration_s: float) -> None:
+        self._rig.interrupts.freely(self._pace.clock.sleep_s, duration_s)
+
+
+def _in_time(spent_s: float) -> str:
+    return f"deliver returns or raises within its timeout, here after {spent_s:.3g} s"
+
+
+class _KeptDisarmed:
+    """A device from which `stage` can be kept, for whoever asks whether it refuses what gets through to it then."""
+
+    def __init__(self, device: Device) -> None:
+        self._device, self.now = device, False
+
+    def describe(self) -> DeviceInfo:
+        return self._device.describe()
+
+    def stage(self) -> None:
+        if not self.now:
+            self._device.stage()
+
+    def readiness(self) -> Readiness:
+        return self._device.readiness() if isinstance(self._device, ReportsReadiness) else Readiness()
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
+        if not self.now:
+            return self._device.deliver(stimulus, timeout_s)
+        try:
+            return self._device.deliver(stimulus, timeout_s)
+        except DeviceError as error:  # disarmed, it has delivered nothing
+            raise NotDelivered(told(error)) from error
+
+    def stop(self) -> None:
+        self._device.stop()
+
+    def unstage(self) -> None:
+        self._device.unstage()
+
+
+class _GivenClock:
+    """The check's clock; a virtual one, which a session refuses for a real device, is up to whoever gives it."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+
+    def now_s(self) -> float:
+        return self._clock.now_s()
+
+    def sleep_s(self, duration_s: float) -> None:
+        self._clock.sleep_s(duration_s)

@@ -1,0 +1,64 @@
+"""What the EMG of a phantom shows after the pulse: it has no muscle, so what is larger than before is an artefact."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from isiw.signals import SignalLimits
+from isiw.signals.judgement import EMG_UNITS_MV
+from isiw.testing.device_table import Delivery
+from isiw.trials import RESPONSE_MV, Sweep
+
+__all__ = ["artefact_in_window"]
+
+FACTOR: Final = 3.0
+"""From one stretch of noise to the next of the same length the range differs by less than half; hum adds nothing."""
+
+
+def artefact_in_window(deliveries: Sequence[Delivery], signals: SignalLimits) -> str | None:
+    """What is wrong where TMS alone, or more than one pair, shows an MEP without a muscle; None where nothing is.
+
+    An amplitude of less than a response is left to the EMG's noise. Where the coil alone is on a phantom, the reflex of
+    a tap may lie in the window, but at one of the ISIs only; a tap's artefact may hide the stimulator's at another.
+
+    Args:
+        deliveries: what was delivered.
+        signals: where the MEP is sought.
+    """
+    for alone, least, what in ((True, 1, "TMS alone"), (False, 2, "more than one pair")):
+        pulses = [d for d in deliveries if not d.stimulus.tap_alone and (d.stimulus.isi_ms is None) is alone]
+        shown = [pair for pair in (_shown(delivery, signals) for delivery in pulses) if pair is not None]
+        if len(shown) >= least:
+            mep_mv, rest_mv = min(shown)
+            sizes = f"{1e3 * mep_mv:.3g} µV in the MEP window, where the EMG before has {1e3 * rest_mv:.2g} µV"
+            return (
+                f"a phantom has no muscle, and {what} has {sizes}: an artefact of the stimulator lies in it. "
+                "Is the pulse's time right?"
+            )
+    return None
+
+
+def _shown(delivery: Delivery, signals: SignalLimits) -> tuple[float, float] | None:
+    """The amplitude and that of the EMG before [mV], where the one is clearly above the other."""
+    mep_mv, rest_mv = delivery.trial.mep_mv, _at_rest_mv(delivery, signals)
+    if mep_mv is None or rest_mv is None or mep_mv < max(RESPONSE_MV, FACTOR * rest_mv):
+        return None
+    return mep_mv, rest_mv
+
+
+def _at_rest_mv(delivery: Delivery, signals: SignalLimits) -> float | None:
+    """Peak-to-peak of stretches as long as the MEP window, before pulse and tap [mV]; None where there is none."""
+    sweep, trial = delivery.answer, delivery.trial
+    if not isinstance(sweep, Sweep):
+        return None
+    emg = sweep.channels["emg"]
+    events_ms = [time for time in (trial.t_tms_ms, trial.t_hit_ms, trial.t_valve_ms) if time is not None]
+    end = int((min(events_ms, default=emg.t0_ms) - emg.t0_ms) * emg.rate_hz / 1000)
+    length = round((signals.mep_window_ms[1] - signals.mep_window_ms[0]) * emg.rate_hz / 1000)
+    edges = range(0, min(max(end, 0), emg.values.size) + 1, max(length, 1))
+    ranges = [float(np.ptp(emg.values[first:last])) for first, last in itertools.pairwise(edges)]
+    return EMG_UNITS_MV[emg.unit] * float(np.median(ranges)) if ranges else None
