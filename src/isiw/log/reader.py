@@ -37,7 +37,6 @@ from isiw.strategy.stopping import StopDecision
 from isiw.text.found import lacking
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Stimulus, Trial, TrialTable
-from isiw.types import Conditioning
 
 __all__ = ["Records", "SessionRecord", "of_production", "read_any", "read_salvaged", "read_session", "require_records"]
 
@@ -163,12 +162,6 @@ class SessionRecord:
         return tuple(
             intents.get(number, Intent(trial=number, isi_ms=None)) for number in range(last + 1) if number not in known
         )
-
-    @property
-    def conditioning(self) -> Conditioning:
-        """The conditioning stimulus, as the strategy was told, or as the device says."""
-        told: Conditioning = self.header.strategy.settings.get("conditioning", self.header.device.conditioning)
-        return told
 
     @property
     def unknown_trials(self) -> tuple[Trial, ...]:

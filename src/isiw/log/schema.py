@@ -33,7 +33,7 @@ from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import IntensityRange, ThresholdEstimate
 from isiw.text.found import finding
 from isiw.trials import Channel, Trial
-from isiw.types import FloatArray
+from isiw.types import Conditioning, FloatArray
 from isiw.visit import Visit, VisitProtocol
 from isiw.window import Window, WindowEstimate
 
@@ -115,6 +115,12 @@ class Header(_Record):
     asks_from: int = 0
     config: dict[str, Any] = Field(default_factory=dict)
     intensities: IntensityRange | None = None
+
+    @property
+    def conditioning(self) -> Conditioning:
+        """The conditioning stimulus, as the strategy was told, or as the device says."""
+        told: Conditioning = self.strategy.settings.get("conditioning", self.device.conditioning)
+        return told
 
     @property
     def detection_limit_mv(self) -> float | None:

@@ -165,7 +165,7 @@ def learn(
         require_meps(record)
     sessions = tuple(_learnt_session(record) for record in records)
     _require_different(records, sessions, again=again)
-    conditioning, space = records[0].conditioning, records[0].header.space
+    conditioning, space = records[0].header.conditioning, records[0].header.space
     prior = Prior(ProfilePrior(conditioning=conditioning))
     posteriors = []
     for record in records:
@@ -199,7 +199,7 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
     if len(references) > 1:
         remedy = "Learn a prior from each kind of session."
         raise LogError("the sessions count ISIs from different events", got=sorted(references), remedy=remedy)
-    stimuli = {record.conditioning for record in records}
+    stimuli = {record.header.conditioning for record in records}
     if len(stimuli) > 1:
         remedy = "Learn a prior from each kind of session."
         raise LogError("the sessions have different conditioning stimuli", got=sorted(stimuli), remedy=remedy)

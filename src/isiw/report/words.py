@@ -151,7 +151,7 @@ def finding_sentence(record: SessionRecord, estimate: Estimate) -> str:
     if window is None:
         is_none = rules_out(probability)
         return f"No window was found{chance}." if is_none else f"It is undecided whether there is a window{chance}."
-    enhances = f"The {_FIRST[record.conditioning]} {'' if probability >= SURE else 'probably '}enhances the MEP"
+    enhances = f"The {_FIRST[record.header.conditioning]} {'' if probability >= SURE else 'probably '}enhances the MEP"
     isis = f"{window} {_after(record)}{chance}"
     if estimate.expected_f1 is not None and estimate.expected_f1 < A_GUESS:
         return f"{enhances}, but at which ISIs is not known well; the best guess is {isis}."
@@ -162,12 +162,14 @@ def _after(record: SessionRecord) -> str:
     """Which event the session's ISIs count from, in words."""
     if record.header.space.reference == "valve":
         return "after the valve command"
-    return "after the impact" if record.conditioning == "tap" else f"after the {_FIRST[record.conditioning]}"
+    return (
+        "after the impact" if record.header.conditioning == "tap" else f"after the {_FIRST[record.header.conditioning]}"
+    )
 
 
 def _without_probability(record: SessionRecord, estimate: Estimate) -> str:
     """The same, of a method that gives none."""
-    first, space = _FIRST[record.conditioning], record.header.space
+    first, space = _FIRST[record.header.conditioning], record.header.space
     if estimate.window is not None:
         isis = f"{estimate.window} {_after(record)}"
         return f"By this method, which gives no probability, the {first} enhances the MEP at ISIs of {isis}."

@@ -170,12 +170,12 @@ class _KeptDisarmed:
         return self._device.readiness() if isinstance(self._device, ReportsReadiness) else Readiness()
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
-        if not self.now:
-            return self._device.deliver(stimulus, timeout_s)
         try:
             return self._device.deliver(stimulus, timeout_s)
-        except DeviceError as error:  # disarmed, it has delivered nothing
-            raise NotDelivered(told(error)) from error
+        except DeviceError as error:
+            if not self.now:
+                raise
+            raise NotDelivered(told(error)) from error  # disarmed, it has delivered nothing
 
     def stop(self) -> None:
         self._device.stop()
