@@ -7,13 +7,15 @@ import os
 import signal
 import threading
 import time
+import weakref
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
-from isiw.design import DesignSpace
+from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.callback import CallbackDevice
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limited import LimitedDevice
@@ -497,3 +499,16 @@ def test_a_simulated_person_has_a_muscle() -> None:
     rig = PhantomRig(15.0)
     rig.simulated = True
     check_device(lambda: rig, RIG_SPACE)
+
+
+def test_a_device_that_was_checked_is_gone_as_its_streams_would_keep_their_listeners() -> None:
+    made: list[weakref.ref[SimulatedDevice]] = []
+
+    def make() -> SimulatedDevice:
+        respond = partial(cohort("gaussian", 1, 1)[0].begin(1).respond, reference="valve")
+        device = SimulatedDevice(SimulatedPerson(respond, "valve"))
+        made.append(weakref.ref(device))
+        return device
+
+    check_device(make, VALVE_SPACE, say=lambda _said: None)
+    assert {device() for device in made} == {None}

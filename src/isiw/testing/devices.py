@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -62,15 +63,27 @@ def check_device(
         LimitExceededError: the limits do not allow a stimulus; it was not delivered.
         InvalidValueError: an inter-trial interval that is negative or not finite.
     """
+    rules = _Rules(space, signals or SignalLimits())
+
+    def pace_of(device: Device) -> Pace:
+        return _pace(device, space, limits, timeout_s=timeout_s, iti_s=iti_s, clock=clock)
+
+    table = _checked(make, rules, pace_of, say)
+    gc.collect()  # a device that is gone offers no streams, whose listeners would stay away from the next one
+    return table
+
+
+def _checked(
+    make: Callable[[], Device], rules: _Rules, pace_of: Callable[[Device], Pace], say: Callable[[str], None]
+) -> DeviceTable:
     device = make()
     require(isinstance(device, Device), "it has describe, stage, deliver, stop and unstage")
-    _check_description(device, space)
-    rules = _Rules(space, signals or SignalLimits())
-    pace = _pace(device, space, limits, timeout_s=timeout_s, iti_s=iti_s, clock=clock)
+    _check_description(device, rules.space)
+    pace = pace_of(device)
     say(_announcement(device, pace))
     deliveries = _check_delivery(device, rules, pace)
     if isinstance(device, HasMemory):
-        _check_memory(make, space, pace)
+        _check_memory(make, rules.space, pace)
     table = device_table(device.describe(), deliveries, rules.limits)
     say(str(table))
     _require_usable(deliveries, rules, real=not device.describe().simulated)
