@@ -17,7 +17,7 @@ import pandas as pd
 from scipy.stats import norm
 
 from isiw.studies import SimulatedSession
-from isiw.subjects.cohorts import cohort
+from isiw.subjects.cohorts import person_of
 from isiw.subjects.responses import EmgFloor, ResponseCurve, TrialNoise
 from isiw.subjects.subject import SimulatedSubject
 from isiw.types import ArrayLike, FloatArray
@@ -166,6 +166,6 @@ class RecordedSession(SimulatedSession):
 
     def subject(self) -> SimulatedSubject:
         """The person."""
-        usual = cohort("gaussian", self.person + 1, self.seed)[self.person]
+        usual = person_of("gaussian", self.person, self.seed)
         rng = np.random.default_rng([list(PEOPLE).index(self.cohort), self.seed, self.person])
         return replace(usual, response=PEOPLE[self.cohort](rng))

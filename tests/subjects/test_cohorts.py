@@ -16,7 +16,7 @@ from scipy import stats
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.subjects.cohorts import COHORTS, cohort
+from isiw.subjects.cohorts import COHORTS, cohort, person_of
 from isiw.subjects.days import another_day
 from isiw.subjects.labs import LABS, lab
 from isiw.subjects.profiles import OpposedProfile, PeakProfile, TwoPeakProfile
@@ -173,6 +173,11 @@ def test_an_unknown_cohort_names_the_known_ones() -> None:
 def test_a_negative_number_of_people_or_seed_is_refused(n: int, seed: int) -> None:
     with pytest.raises(InvalidValueError, match="at least 0"):
         cohort("gaussian", n, seed)
+
+
+@pytest.mark.parametrize("name", COHORTS)
+def test_a_person_is_the_same_without_the_others(name: str) -> None:
+    assert person_of(name, 3, seed=7) == cohort(name, 4, seed=7)[3]
 
 
 def test_nobody_is_a_cohort_too() -> None:

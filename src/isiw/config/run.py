@@ -48,7 +48,7 @@ from isiw.session.loop import Session
 from isiw.session.updates import SessionUpdate
 from isiw.signals.judgement import SignalLimits
 from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
-from isiw.subjects.cohorts import cohort
+from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import SimulatedSubject
 from isiw.text.toml_files import checked, read_toml
 from isiw.visit import VisitProtocol
@@ -216,7 +216,7 @@ def fresh_log_path(config: RunConfig) -> Path:
 
 def subject_for(config: RunConfig) -> SimulatedSubject:
     """The simulated person."""
-    return cohort(config.subject.cohort, config.subject.number + 1, config.seed)[-1]
+    return person_of(config.subject.cohort, config.subject.number, config.seed)
 
 
 def true_window(record: SessionRecord) -> Window | None:

@@ -23,7 +23,7 @@ from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choosing import Choice
 from isiw.strategy.stopping import StopDecision, StoppingRule, stimuli_left
 from isiw.strategy.strategy import Strategy
-from isiw.subjects.cohorts import cohort
+from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import Response, SimulatedSubject
 from isiw.window import Window, WindowEstimate
 
@@ -127,7 +127,7 @@ class SimulatedSession:
 
     def subject(self) -> SimulatedSubject:
         """The simulated person."""
-        usual = cohort(self.cohort, self.person + 1, self.seed)[self.person]
+        usual = person_of(self.cohort, self.person, self.seed)
         return replace(usual, scale=self.amplitude * usual.scale)
 
     def as_the_rig_states(self) -> SimulatedSession:

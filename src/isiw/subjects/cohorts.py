@@ -20,7 +20,7 @@ from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse,
 from isiw.subjects.subject import Drift, SimulatedSubject
 from isiw.subjects.supra import supra_threshold
 
-__all__ = ["COHORTS", "cohort"]
+__all__ = ["COHORTS", "cohort", "person_of"]
 
 _Pair: TypeAlias = tuple[float, float]
 _Shape: TypeAlias = Callable[[np.random.Generator, float, float], Profile]
@@ -234,12 +234,28 @@ def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
     """
     choice("the cohort", name, COHORTS)
     n, seed = whole("n", n, least=0), whole("seed", seed, least=0)
+    return [person_of(name, number, seed) for number in range(n)]
+
+
+def person_of(name: str, number: int, seed: int) -> SimulatedSubject:
+    """One person of a cohort, without the others.
+
+    Args:
+        name: as for `cohort`.
+        number: which person, from 0.
+        seed: as for `cohort`.
+
+    Raises:
+        InvalidValueError: an unknown name, or a negative number.
+    """
+    choice("the cohort", name, COHORTS)
+    number, seed = whole("number", number, least=0), whole("seed", seed, least=0)
     if name in _ELEVEN:
-        return [_ELEVEN[name](i % len(WIDTHS_KIM_MS)) for i in range(n)]
+        return _ELEVEN[name](number % len(WIDTHS_KIM_MS))
     if name == "another-day":
-        return [_on_either_day(seed, i) for i in range(n)]
-    generators = [np.random.default_rng([zlib.crc32(name.encode()), seed, i]) for i in range(n)]
+        return _on_either_day(seed, number)
+    rng = np.random.default_rng([zlib.crc32(name.encode()), seed, number])
     if name == "nonresponder":
-        return [_nonresponder(rng, kind=i % 2 == 0) for i, rng in enumerate(generators)]
+        return _nonresponder(rng, kind=number % 2 == 0)
     draw = lab(name, seed).subject if name in LABS else _DRAW[name]
-    return [draw(rng) for rng in generators]
+    return draw(rng)
