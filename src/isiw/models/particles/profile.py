@@ -93,20 +93,20 @@ _AFTER: Final[Mapping[Conditioning, _Windows]] = MappingProxyType(
 class ProfilePrior:
     """Of the facilitation by ISI.
 
-    Starts and widths that are those of one kind of conditioning stimulus become those of the other with it.
+    Where `start` and `widths` are not a user's own, they are those of the conditioning stimulus.
 
     Args:
         p_window: probability that there is any facilitation.
         shapes: probabilities of the families.
         start: where windows start.
         widths: how wide they are.
-        conditioning: what the first stimulus of a pair is: a tap on the tendon, or an electrical pulse to the nerve.
         places: where and how wide they are as far as earlier sessions say; the rest of the probability is that of
             `start` and `widths`.
+        conditioning: what the first stimulus of a pair is: a tap on the tendon, or an electrical pulse to the nerve.
 
     Raises:
-        InvalidValueError: an invalid probability, widths whose shares do not sum to 1, places that leave nothing to the
-            rest, or that count from different events.
+        InvalidValueError: an invalid probability, an unknown conditioning stimulus, widths whose shares do not sum to 1,
+            places that leave nothing to the rest, or that count from different events.
     """
 
     p_window: float = 0.72
