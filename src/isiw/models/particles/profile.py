@@ -105,7 +105,7 @@ class ProfilePrior:
         conditioning: what the first stimulus of a pair is: a tap on the tendon, or an electrical pulse to the nerve.
 
     Raises:
-        InvalidValueError: an invalid probability, an unknown conditioning stimulus, widths whose shares do not sum to 1,
+        InvalidValueError: an invalid probability or conditioning stimulus, widths whose shares do not sum to 1,
             places that leave nothing to the rest, or that count from different events.
     """
 
