@@ -15,6 +15,7 @@ import isiw
 from isiw.testing import Lie
 
 
+@pytest.mark.slow
 def test_nothing_is_lost_or_given_twice_in_thirty_sessions(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.ERROR, "isiw.devices.transports")
     counts, lies = Counter[str](), Counter[Lie]()

@@ -11,6 +11,7 @@ throughput = pytest.importorskip("benchmarks.lsl_throughput", reason="the extra 
 assert lsl_network
 
 
+@pytest.mark.slow
 def test_every_sample_of_eight_channels_arrives_once_and_in_its_place() -> None:
     with throughput.staged(5000.0, sweep_s=1.0) as device:
         numbers, took_s, mixed = throughput.measure(device, 2.0)

@@ -20,6 +20,7 @@ def told_everything(person: SimulatedSubject, space: DesignSpace) -> Oracle:
     return Oracle(person, space, span)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gaussian", "recruitment"])
 @pytest.mark.parametrize("high_ms", [500, 300])
 def test_told_start_and_width_it_reports_the_true_window_wherever_the_range_ends(name: str, high_ms: int) -> None:

@@ -50,6 +50,7 @@ def test_a_killed_server_loses_nothing_and_a_new_one_resumes_by_the_id(tmp_path:
     assert "came too late" in record.events[-1].text
 
 
+@pytest.mark.slow
 def test_a_session_whose_server_was_killed_can_be_closed_at_once_and_its_log_is_finished(tmp_path: Path) -> None:
     with server(tmp_path) as (process, url), client_at(url) as client:
         session = created(client)
