@@ -19,7 +19,8 @@ from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
 from isiw.signals.plausibility import DoubtKind, doubt_of, is_silent, require_plausible
-from isiw.strategy.choosing import Choice, Cost, Method, evenly_spaced
+from isiw.strategy.choosing import Choice, Cost, evenly_spaced
+from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision, StoppingRule
 from isiw.text.found import NO_MEP
 from isiw.types import FloatArray

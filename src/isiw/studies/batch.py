@@ -1,7 +1,7 @@
 """The vectorised engine: a batch of people, examined side by side by one strategy.
 
 Models hold b people at once, on a CPU or a GPU. Each person's session follows the rules of a single one
-(`isiw.strategy.choosing`); only the draws of the models' randomness differ, so that a batch of one is that one session.
+(`isiw.strategy.course`); only the draws of the models' randomness differ, so that a batch of one is that one session.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import torch
 
 from isiw.errors import StudyError
 from isiw.models.protocol import Observation, ReportsTrouble, ResponseModel
-from isiw.strategy.choosing import Choice, Method
+from isiw.strategy.choosing import Choice
+from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision
 from isiw.studies.sessions import SimulatedSession, examine
 from isiw.subjects.subject import Response

@@ -49,6 +49,11 @@ class BayesThreshold:
         check_numbers(self, "prior_sd_pct_mso", "stop_sd_pct_mso", above=0)
         check_wholes(self, "max_pulses", least=1)
 
+    @property
+    def budget(self) -> int:
+        """How many pulses at most; see `HasPulseBudget`."""
+        return self.max_pulses
+
     def posterior(self, pulses: Sequence[Pulse]) -> FloatArray:
         """Probability of each of `THRESHOLDS_PCT_MSO`.
 

@@ -42,6 +42,11 @@ class MaximumLikelihood:
         check_numbers(self, "relative_spread", above=0, most=1)
         check_wholes(self, "pulses", least=1)
 
+    @property
+    def budget(self) -> int:
+        """How many pulses; see `HasPulseBudget`."""
+        return self.pulses
+
     def ask(self, pulses: Sequence[Pulse], space: IntensityRange) -> float:
         """The most likely threshold, on the grid."""
         granted = [Pulse(space.low_pct_mso, response=False), Pulse(space.high_pct_mso, response=True)]

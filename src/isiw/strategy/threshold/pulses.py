@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
 __all__ = [
+    "HasPulseBudget",
     "IntensityRange",
     "Pulse",
     "ThresholdEstimate",
@@ -207,6 +208,15 @@ class ThresholdMethod(Protocol):
             pulses: what was told so far, in order.
             space: the intensities that may be asked.
         """
+
+
+@runtime_checkable
+class HasPulseBudget(Protocol):
+    """Capability: a method that stops after so many pulses, whatever it knows then."""
+
+    @property
+    def budget(self) -> int:
+        """How many pulses."""
 
 
 def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | None:

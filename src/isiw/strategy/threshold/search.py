@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from typing import Any, Final
@@ -13,6 +12,7 @@ from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.bayes import BayesThreshold
 from isiw.strategy.threshold.hunting import MaximumLikelihood
 from isiw.strategy.threshold.pulses import (
+    HasPulseBudget,
     IntensityRange,
     Pulse,
     ThresholdEstimate,
@@ -138,22 +138,18 @@ class ThresholdSearch:
     def _refused(self) -> StopDecision | None:
         """Why the pulses give no number, whatever the method says; None where they may."""
         refused = one_sided(self.pulses, self.space) or self._like_hum()
-        if refused is None or refused.stop or len(self.pulses) < (budget := _budget(self.method)):
+        budget = self._budget
+        if refused is None or refused.stop or budget is None or len(self.pulses) < budget:
             return refused
-        return StopDecision(stop=True, reason=f"{refused.reason} The budget of {budget:g} pulses is used up. {_LOOK}")
+        return StopDecision(stop=True, reason=f"{refused.reason} The budget of {budget} pulses is used up. {_LOOK}")
+
+    @property
+    def _budget(self) -> int | None:
+        return self.method.budget if isinstance(self.method, HasPulseBudget) else None
 
     def _like_hum(self) -> StopDecision | None:
         seen = not_growing(self.pulses) or hardly_larger(self.pulses)
         if seen is None or self.method.estimate(self.pulses, self.space).threshold_pct_mso is None:
             return None
-        over = math.isinf(_budget(self.method)) and self.method.decision(self.pulses, self.space).stop
+        over = self._budget is None and self.method.decision(self.pulses, self.space).stop
         return StopDecision(stop=over, reason=f"{seen} {_LOOK}" if over else seen)
-
-
-def _budget(method: ThresholdMethod) -> float:
-    """After how many pulses a method stops whatever it knows; infinite where it does not say."""
-    match method:
-        case BayesThreshold(max_pulses=most) | MaximumLikelihood(pulses=most):
-            return most
-        case _:
-            return math.inf

@@ -1,0 +1,202 @@
+"""How the examination of b people goes on: what is asked of each next, and what a stopping rule looks back on.
+
+A `Course` never changes: telling it a trial gives the next one. One person's `Strategy` and a batch of people wrap the
+same course, so that both follow the same rules.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+from isiw.acquisition.batch import own_plan
+from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan
+from isiw.design import DesignSpace
+from isiw.models.protocol import ExpectsTheUsual, Observation, Posterior, ProposesIsi, ResponseModel
+from isiw.strategy.choosing import Choice, Cost, best_choices
+from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
+from isiw.window import WindowEstimate
+
+__all__ = ["Belief", "Course", "Method"]
+
+
+@dataclass(frozen=True)
+class Method:
+    """How people are examined.
+
+    Args:
+        space: the ISIs that may be asked.
+        model: the model of a person's responses.
+        acquisitions: what scores candidate ISIs: one for all people, or one a person where they draw.
+        stopping: the rule that says when to stop.
+        initial_ms: ISIs to ask for first [ms], on the grid, whatever the responses.
+        cost: is taken off the scores.
+    """
+
+    space: DesignSpace
+    model: ResponseModel
+    acquisitions: tuple[AcquisitionFunction, ...]
+    stopping: StoppingRule
+    initial_ms: tuple[float, ...] = ()
+    cost: Cost | None = None
+
+    def begin(self, seed: int, people: int = 1) -> Course:
+        """The course before the first trial.
+
+        Args:
+            seed: seed of the model's draws.
+            people: how many people are examined side by side.
+        """
+        return Course(self, self.model.begin(self.space, seed, people), people)
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """What is believed of b people after some trials; a window is estimated once, and only where somebody asks.
+
+    Args:
+        posterior: what is believed; None where all estimates are made.
+        pairs: how many pairs of stimuli each person was told of.
+        estimates: those made so far, by person.
+    """
+
+    posterior: Posterior | None
+    pairs: int
+    estimates: dict[int, WindowEstimate] = field(default_factory=dict)
+
+    def estimate(self, person: int) -> WindowEstimate:
+        """What is believed about the window of one person."""
+        if person not in self.estimates and self.posterior is not None:
+            self.estimates[person] = replace(self.posterior.estimate(person), pairs=self.pairs)
+        return self.estimates[person]
+
+    def looked_back_on(self, people: int) -> Belief:
+        """The same, without a posterior where the estimates of all people are made."""
+        return replace(self, posterior=None) if len(self.estimates) == people else self
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What was told of b people, what is believed of them, and what is asked of each next.
+
+    Args:
+        method: how they are examined.
+        posterior: what is believed.
+        people: how many there are.
+        told: trials told of each.
+        alone: how many of those were TMS alone.
+        earlier: what was believed before the last trial, as far as the stopping rule looks back on it.
+        paired: whether the last trial was a pair of stimuli.
+    """
+
+    method: Method
+    posterior: Posterior
+    people: int
+    told: int = 0
+    alone: int = 0
+    earlier: tuple[Belief, ...] = ()
+    paired: bool = False
+
+    def after(self, observation: Observation) -> Course:
+        """The course after one more trial of each person; all of them pairs of stimuli, or all TMS alone."""
+        alone = bool(observation.isi_ms.isnan().all())
+        return replace(
+            self,
+            posterior=self.method.model.update(self.posterior, observation),
+            told=self.told + 1,
+            alone=self.alone + alone,
+            earlier=tuple(belief.looked_back_on(self.people) for belief in self.past),
+            paired=not alone,
+        )
+
+    @property
+    def paired_trials(self) -> int:
+        """How many pairs of stimuli were told of each person."""
+        return self.told - self.alone
+
+    @cached_property
+    def belief(self) -> Belief:
+        """What is believed now."""
+        return Belief(self.posterior, self.paired_trials)
+
+    @cached_property
+    def past(self) -> tuple[Belief, ...]:
+        """What the stopping rule looks back on, the first after the last initial ISI."""
+        kept = looks_back(self.method.stopping)
+        if not kept or not self.paired or self.paired_trials < len(self.method.initial_ms):
+            return self.earlier
+        return (*self.earlier, self.belief)[-kept:]
+
+    @property
+    def initial_left(self) -> tuple[float, ...]:
+        """What is left of the initial ISIs [ms]."""
+        return self.method.initial_ms[self.paired_trials :]
+
+    def ahead_ms(self, n: int) -> list[float]:
+        """The next ISIs [ms] of one person that stand already, whatever will be told; at most n of a design's.
+
+        Args:
+            n: how many are wanted.
+        """
+        first, space, left = self.method.acquisitions[0], self.method.space, self.initial_left
+        if isinstance(first, FollowsPlan):
+            pairs = range(self.paired_trials + len(left), self.paired_trials + n)
+            return [*left, *(first.planned_isi_ms(space, pair) for pair in pairs)]
+        return [*left, *map(space.snap, own_plan(self.posterior, first))]
+
+    @property
+    def plans_ahead(self) -> bool:
+        """Whether the model itself proposes the ISIs, whatever an acquisition function would choose."""
+        return ProposesIsi in self.method.acquisitions[0].needs and isinstance(self.posterior, ProposesIsi)
+
+    @cached_property
+    def planned(self) -> tuple[Choice, ...] | None:
+        """What is asked of each person where that stands already; None where the acquisition function chooses."""
+        if self.initial_left:
+            return (Choice(self.initial_left[0], by="initial"),) * self.people
+        if isinstance(first := self.method.acquisitions[0], FollowsPlan):
+            isi_ms = first.planned_isi_ms(self.method.space, self.paired_trials)
+            return (Choice(isi_ms, by="plan"),) * self.people
+        if self.plans_ahead and isinstance(self.posterior, ProposesIsi):
+            wanted_ms = self.posterior.proposed_isis_ms()[:, 0].tolist()
+            return tuple(Choice(self.method.space.snap(isi_ms), by="plan") for isi_ms in wanted_ms)
+        return None
+
+    @cached_property
+    def choices(self) -> tuple[Choice, ...]:
+        """What is asked of each person next."""
+        return self.planned or self.chosen(self.posterior)
+
+    def chosen(self, posterior: Posterior) -> tuple[Choice, ...]:
+        """What the acquisition function chooses for each person, whatever is planned.
+
+        Args:
+            posterior: what is believed, or imagined.
+        """
+        if isinstance(posterior, ExpectsTheUsual):
+            posterior = posterior.as_usual
+        first, *others = self.method.acquisitions
+        best = self._best(posterior, first)
+        return best if not others else (best[0], *(self._best(posterior, a)[1 + i] for i, a in enumerate(others)))
+
+    def _best(self, posterior: Posterior, acquisition: AcquisitionFunction) -> tuple[Choice, ...]:
+        return best_choices(
+            posterior, acquisition, self.method.space, told=self.told, people=self.people, cost=self.method.cost
+        )
+
+    def estimate(self, person: int = 0) -> WindowEstimate:
+        """What is believed about the window of one person."""
+        return self.belief.estimate(person)
+
+    def decision(self, person: int = 0, mistrials: int = 0, *, silent: bool = False) -> StopDecision:
+        """Whether to stop with one person, and why.
+
+        Args:
+            person: which.
+            mistrials: pairs of stimuli that were delivered to the person and not told.
+            silent: whether no trial of the person showed an MEP; see `WindowEstimate.silent`.
+        """
+        past = tuple(belief.estimate(person) for belief in self.past)
+        estimate = replace(self.estimate(person), silent=silent)
+        progress = Progress(self.paired_trials + mistrials, self.told, estimate, past=past)
+        return self.method.stopping(progress)
