@@ -5,17 +5,21 @@
 
 In each lab ten people are measured with the default, and a prior is learnt from their logs; then other people of the
 lab, and people who do not belong there, are measured with the built-in prior, with the learnt one, and with a prior
-that was told the lab's law. With `--stated` the lab's rig states its hit delay, in earlier sessions and in later ones.
+that was told the lab's law. A bound stands beside these: told the law but for start and width, which are learnt from
+the windows of the ten people as they are. With `--stated` the lab's rig states its hit delay, in earlier sessions and
+in later ones.
 """
 
 from __future__ import annotations
 
 import math
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import pandas as pd
 import torch
 import typer
@@ -23,17 +27,25 @@ import typer
 import isiw
 from acquisition import facts_of
 from earlier import logged_session, measured, write
+from isiw.design import VALVE_SPACE
 from isiw.models.particles.laws import Floor, Muscle, NoiseShares
 from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ShapeShares
 from isiw.models.shared.scales import Scale
 from isiw.priors import LabPrior
+from isiw.priors.components import place
+from isiw.priors.lab import share_of
+from isiw.priors.people import hyper_prior
+from isiw.priors.population import Block, People
+from isiw.priors.population import learnt as law_of
 from isiw.studies import SimulatedSession, simulate
-from isiw.subjects import LABS, Lab, cohort, lab
+from isiw.subjects import LABS, Lab, SimulatedSubject, cohort, lab
 
 MARKS = (1, 5, 10, 20, 40)
 TOLD_SHARE = 0.95
+CERTAIN = -1e6
+"""Log density of windows that are certainly of the lab under the prior of people in general."""
 LEARNT, EARLIER_TRIALS = 10, 40
 
 
@@ -85,18 +97,38 @@ def told(law: Lab) -> Prior:
     ).joined()
 
 
+def with_known_windows(prior: Prior, people: Sequence[SimulatedSubject]) -> Prior:
+    """The same prior, but start and width are learnt from people whose windows are known.
+
+    Args:
+        prior: of who was told a lab's law.
+        people: some of the lab.
+    """
+    windows = [[p.profile.start_ms + p.hit_delay_ms, math.log(p.profile.width_ms)] for p in people]
+    block = Block(
+        np.array(windows)[:, None], np.full((len(people), 1), CERTAIN), np.full((len(people), 1), fill_value=True)
+    )
+    hyper = {"place": hyper_prior(Prior(), VALVE_SPACE)["place"]}
+    law = law_of(People({"place": block}, {}), hyper, {}, np.random.default_rng(0)).laws["place"]
+    learnt = place(share_of(law.members), law.mean, law.sd, "valve")
+    return replace(prior, profile=replace(prior.profile, places=(learnt,)))
+
+
 def examine(unit: Unit) -> pd.DataFrame:
     """All sessions with later people of one lab; columns as in `isiw.studies.simulate`, and the kind of `people`."""
     torch.set_num_threads(1)
     law = lab(unit.name, unit.seed)
     hit_delay_ms = law.hit_delay_ms if unit.stated else None
     with tempfile.TemporaryDirectory() as folder:
+        earlier = cohort(unit.name, LEARNT, unit.seed)
         logs = [
             logged_session(person, f"P{number}", unit.seed + number, EARLIER_TRIALS, Path(folder), hit_delay_ms)
-            for number, person in enumerate(cohort(unit.name, LEARNT, unit.seed))
+            for number, person in enumerate(earlier)
         ]
         learnt = isiw.priors.learn(logs).joined()
-    priors = {"built-in": Prior(), "learnt": learnt, "told": told(law)}
+    informed = told(law)
+    known = with_known_windows(informed, earlier)
+    priors = {"built-in": Prior(), "learnt": learnt, "windows known": known, "told": informed}
     own = [(unit.name, number) for number in range(LEARNT, LEARNT + unit.people)]
     odd = [("odd", number) for number in range(unit.misfits)]
     marks = tuple(mark for mark in MARKS if mark <= unit.trials)

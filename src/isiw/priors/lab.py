@@ -30,7 +30,7 @@ from isiw.priors.recall import (
 )
 from isiw.types import Conditioning, Reference
 
-__all__ = ["LabPrior", "LearntSession", "learn"]
+__all__ = ["LabPrior", "LearntSession", "learn", "share_of"]
 
 _T = TypeVar("_T")
 
@@ -239,9 +239,17 @@ def _lab_prior(
     )
 
 
+def share_of(members: float) -> float:
+    """The share of a lab's own law beside what is believed of people in general.
+
+    Args:
+        members: how many people it was learnt from, expected.
+    """
+    return 1.0 - max(LEAST_USUAL, PEOPLE_FOR_HALF / (PEOPLE_FOR_HALF + members))
+
+
 def _where_known(law: Law, component: Callable[..., _T]) -> _T | None:
     """The law as a component of the prior; None where fewer than one person was learnt from."""
     if law.members < 1.0:
         return None
-    share = 1.0 - max(LEAST_USUAL, PEOPLE_FOR_HALF / (PEOPLE_FOR_HALF + law.members))
-    return component(share, law.mean, law.sd)
+    return component(share_of(law.members), law.mean, law.sd)
