@@ -77,6 +77,11 @@ def test_a_channel_that_is_not_a_waveform_is_refused(values: list[object], rate_
         Channel(np.array(values), rate_hz, "mV", t0_ms)
 
 
+def test_the_unit_of_a_channel_is_a_text() -> None:
+    with pytest.raises(InvalidValueError, match=r"Channel\.unit must be a text$"):
+        Channel(np.array([1.0]), 1000.0, None)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("times", [{"t_tms_ms": math.nan}, {"t_hit_ms": math.inf}, {"isi_sd_ms": -1.0}])
 def test_a_sweep_with_impossible_times_is_refused(times: dict[str, float]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(times))):

@@ -6,11 +6,12 @@ The others check fields of a frozen dataclass in its `__post_init__`, and put th
 
 from __future__ import annotations
 
+import inspect
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
-from typing import Any, TypedDict, Unpack
+from typing import Any, TypedDict, TypeVar, Unpack
 
 import numpy as np
 
@@ -30,12 +31,15 @@ __all__ = [
     "check_wholes",
     "choice",
     "deadline",
+    "from_table",
     "mean_and_sd",
     "number",
     "require_sum_of_one",
     "text",
     "whole",
 ]
+
+_T = TypeVar("_T")
 
 
 LEAST_DELAY_MS = 1.0
@@ -192,8 +196,33 @@ def text(what: str, value: object) -> str:
         InvalidValueError: anything else.
     """
     if not isinstance(value, str):
-        raise InvalidValueError(f"{what} must be a text", got=value, remedy=f'Write it in quotes: "{value}".')
+        remedy = f'Write it in quotes: "{value}".' if isinstance(value, int | float) else None
+        raise InvalidValueError(f"{what} must be a text", got=value, remedy=remedy)
     return str(value)
+
+
+def from_table(kind: type[_T], table: _T | Mapping[str, Any], what: str) -> _T:
+    """An instance of a dataclass.
+
+    Args:
+        kind: the dataclass.
+        table: its fields by name, or the instance itself.
+        what: what the table is, for the message.
+
+    Raises:
+        InvalidValueError: a field that it does not have, or one that is missing.
+    """
+    if isinstance(table, kind):
+        return table
+    if not isinstance(table, Mapping):
+        raise InvalidValueError(f"{what} must be a table", got=table)
+    parameters = inspect.signature(kind)
+    try:
+        given = parameters.bind(**table)
+    except TypeError as error:
+        remedy = f"Its keys are {', '.join(parameters.parameters)}."
+        raise InvalidValueError(f"the table {what}: {error}", got=dict(table), remedy=remedy) from error
+    return kind(*given.args, **given.kwargs)
 
 
 def choice(what: str, value: Any, known: Iterable[Any]) -> Any:

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-from isiw.checks import check_amplitude, check_numbers, check_wholes
+from isiw.checks import check_amplitude, check_numbers, check_texts, check_wholes
 from isiw.errors import InvalidValueError
 from isiw.types import FloatArray
 
@@ -91,7 +91,7 @@ class Channel:
         t0_ms: time of the first sample on the sweep's clock [ms].
 
     Raises:
-        InvalidValueError: samples that are not a vector, or a rate that is not positive.
+        InvalidValueError: samples that are not a vector, a rate that is not positive, or a unit that is no text.
     """
 
     values: FloatArray
@@ -105,6 +105,7 @@ class Channel:
             raise InvalidValueError("a channel holds one waveform", got=values.shape, expected="shape (w,)")
         check_numbers(self, "rate_hz", above=0)
         check_numbers(self, "t0_ms")
+        check_texts(self, "unit")
         object.__setattr__(self, "values", values)
 
 

@@ -53,6 +53,14 @@ def test_a_starting_point_is_never_overwritten(template: Path) -> None:
     assert (template / "rig.py").read_bytes() == before["rig.py"]
 
 
+def test_an_error_of_the_labs_own_code_is_no_wrong_setting(tmp_path: Path) -> None:
+    (tmp_path / "broken_rig.py").write_text("def make(port='COM3'):\n    return None + 1\n", encoding="utf-8")
+    with pytest.raises(TypeError, match="unsupported operand"):
+        device_from_factory("broken_rig:make", {}, tmp_path)
+    with pytest.raises(ConfigError, match=r"do not fit the factory.*'prot'"):
+        device_from_factory("broken_rig:make", {"prot": "COM4"}, tmp_path)
+
+
 def test_a_session_runs_with_the_users_own_rig_and_the_log_does_not_name_it(template: Path) -> None:
     text = (template / "session.toml").read_text(encoding="utf-8").replace("max_trials = 40", "max_trials = 3")
     (template / "session.toml").write_text(text, encoding="utf-8")

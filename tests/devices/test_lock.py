@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -40,6 +41,16 @@ def test_two_objects_of_one_address_are_one_device() -> None:
         pytest.raises(DeviceError, match="rig at port of this test"),
         driven(ScriptedDevice(), PORT),
     ):
+        pass
+
+
+def test_a_lock_that_cannot_be_taken_is_told_with_the_way_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("isiw.devices.lock.tempfile.gettempdir", lambda: str(tmp_path))
+    with driven(ScriptedDevice(), PORT):
+        (left,) = tmp_path.iterdir()
+    left.unlink(missing_ok=True)
+    left.mkdir()
+    with pytest.raises(DeviceError, match=r"cannot be taken.*Delete it"), driven(ScriptedDevice(), PORT):
         pass
 
 

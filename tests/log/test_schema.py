@@ -52,6 +52,12 @@ def test_a_waveform_survives_with_what_is_not_finite() -> None:
     assert (again.rate_hz, again.unit, again.t0_ms) == (3000.0, "mV", -50.0)
 
 
+def test_a_header_in_which_a_version_is_a_number_can_be_read(header: Header) -> None:
+    written = json.loads(encode("/header", header))
+    written["device"]["version"] = 2.1
+    assert instance(Header, decode("/header", json.dumps(written).encode())).device.version == "2.1"
+
+
 def test_a_header_from_before_the_times_allowed_were_logged_can_be_read(header: Header) -> None:
     written = json.loads(encode("/header", header))
     assert written.pop("timeout_s") == 30.0

@@ -82,6 +82,14 @@ def test_where_no_mep_stands_out_of_emg_at_rest_the_statement_asks_whether_the_s
     assert nothing_stood_out([at_rest(0.01, None)] * 20) is None
 
 
+def test_that_no_mep_is_seen_any_more_is_said_with_the_trial_from_which_on() -> None:
+    meps_mv = [0.2, 0.1] * 4 + [0.006] * 12
+    trials = [replace(at_rest(mep_mv), index=index) for index, mep_mv in enumerate(meps_mv)]
+    assert str(nothing_stood_out(trials)).startswith("From trial 8 on, the EMG after the pulse was never larger than")
+    assert nothing_stood_out(trials[:17]) is None
+    assert nothing_stood_out(trials[:3] + trials[8:]) is None
+
+
 def test_amplitudes_that_are_all_zero_are_doubted_and_find_nothing(tmp_path: Path) -> None:
     with isiw.open_session(scripted_strategy(12), tmp_path / "zeros.mcap") as session:
         for _ in range(9):

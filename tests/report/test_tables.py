@@ -47,7 +47,8 @@ def test_a_stimulus_whose_trial_is_missing_is_lost_too(record: SessionRecord) ->
 
 
 def test_events_are_listed_in_the_order_of_the_log(record: SessionRecord) -> None:
-    assert event_rows(record) == [("4", "exclusion", "sneezed")]
+    assert [row[:2] for row in event_rows(record)] == [("5", "doubt"), ("4", "exclusion")]
+    assert event_rows(record)[-1] == ("4", "exclusion", "sneezed")
 
 
 def test_what_was_delivered_stands_beside_what_may_be(record: SessionRecord) -> None:

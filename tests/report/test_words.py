@@ -162,10 +162,27 @@ def test_a_hit_delay_that_nobody_stated_is_said_to_have_cost_stimuli(record: Ses
     assert f"{said}; isiw timing 'a lab/s.mcap' measures it." in final_statement(with_sensor)
 
 
+def test_a_hit_delay_that_only_the_device_was_told_is_said_to_have_cost_stimuli(record: SessionRecord) -> None:
+    said = final_statement(run_by(record, "default", delay_ms=(150.0, 5.0)))
+    assert "was not told the device's hit delay" in said
+    assert "make_strategy(..., hit_delay_ms=(150, 5))" in said
+
+
+@pytest.mark.parametrize(("name", "said"), [("gp-straddle", True), ("default", False), ("", False)])
+def test_what_a_strategy_for_taps_says_of_an_electrical_pulse_is_not_to_be_relied_on(
+    record: SessionRecord, name: str, *, said: bool
+) -> None:
+    run = run_by(record, name, delay_ms=None)
+    device = replace(run.header.device, conditioning="electrical")
+    electrical = replace(run, header=run.header.model_copy(update={"device": device}))
+    assert ("gp-straddle expects windows as after a tap" in final_statement(electrical)) is said
+    assert "expects windows as after a tap" not in final_statement(run)
+
+
 @pytest.mark.parametrize(
     ("name", "delay_ms", "settings"),
     [
-        ("default", (150.0, 5.0), {}),
+        ("default", (150.0, 5.0), {"hit_delay_ms": [150.0, 5.0]}),
         ("default", None, {"hit_delay_ms": [150.0, 5.0]}),
         ("nr", None, {}),
         ("one-of-another-version", None, {}),

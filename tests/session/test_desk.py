@@ -21,6 +21,10 @@ class Operated:
         self.trials = TrialTable(trials)
         self.done: list[tuple[object, ...]] = []
 
+    @property
+    def last_excluded(self) -> int | None:
+        return max((trial.index for trial in self.trials if trial.excluded), default=None)
+
     def pause(self, reason: str) -> None:
         self.done.append(("pause", reason))
 

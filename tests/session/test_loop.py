@@ -5,15 +5,17 @@ import math
 import os
 import signal
 import threading
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Never, cast
 
 import numpy as np
 import pytest
 
-from isiw.design import DesignSpace
+from isiw.design import IMPACT_SPACE, DesignSpace
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate, Intent
@@ -300,6 +302,16 @@ def test_a_device_on_another_reference_is_refused(log: Path) -> None:
     object.__setattr__(device.info, "reference", "impact")
     with pytest.raises(DeviceError, match="different events"):
         Session(device, scripted_strategy(), log=log)
+
+
+@pytest.mark.parametrize("settings", [{}, {"conditioning": "electrical"}])
+def test_a_strategy_is_told_of_a_devices_electrical_pulse_or_refused(log: Path, settings: dict[str, Any]) -> None:
+    device = ScriptedDevice()
+    device.info = DeviceInfo("stimulator", "impact", simulated=True, conditioning="electrical")
+    strategy = make_strategy(space=IMPACT_SPACE, particles=50, **settings)
+    refused = pytest.raises(DeviceError, match=r'make_strategy\(..., conditioning="electrical"\)')
+    with nullcontext() if settings else refused:
+        Session(device, strategy, log=log)
 
 
 def test_an_existing_log_stops_the_session_before_anything_is_delivered(log: Path) -> None:

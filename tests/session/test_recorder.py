@@ -185,6 +185,16 @@ def test_doubts_go_to_who_wants_them_in_place_of_a_warning(log: Path) -> None:
     assert "in µV" in doubts[1]
 
 
+@pytest.mark.parametrize("limit", [{"intensity_pct_mso": 55.0}, {"max_coil_c": 40.0}])
+def test_a_limit_on_what_a_loop_of_ones_own_does_not_report_is_refused_at_once(
+    log: Path, space: DesignSpace, limit: dict[str, float]
+) -> None:
+    limits = Limits.of_space(space, min_iti_s=5.0)
+    with pytest.raises(InvalidValueError, match="neither intensity nor coil temperature"):
+        open_session(scripted_strategy(9), log, limits=replace(limits, **limit))  # type: ignore[arg-type] # all are numbers
+    assert not log.exists()
+
+
 def test_it_says_what_is_open_and_how_long_the_next_ask_would_wait(log: Path, space: DesignSpace) -> None:
     limits = Limits.of_space(space, min_iti_s=7.0)
     with open_session(scripted_strategy(9), log, limits=limits, clock=VirtualClock()) as session:
@@ -349,17 +359,6 @@ def test_a_resumed_session_logs_what_is_believed_after_trials_were_judged_anew(l
     record = read_session(log)
     assert not record.is_judged_since
     assert record.estimates[-1].trial == 3
-
-
-@pytest.mark.parametrize("limit", [{"max_coil_c": 40.0}, {"intensity_pct_mso": 60.0}])
-def test_a_limit_of_what_nobody_reports_here_allows_nothing(
-    log: Path, space: DesignSpace, limit: dict[str, float]
-) -> None:
-    limits = replace(Limits.of_space(space, min_iti_s=0.0), **limit)  # type: ignore[arg-type] # all are numbers
-    with open_session(scripted_strategy(9), log, limits=limits) as session:
-        with pytest.raises(LimitExceededError, match="not known"):
-            session.ask()
-        assert not read_session(log).intents
 
 
 def test_an_error_without_words_of_its_own_is_logged_and_the_log_closed(log: Path) -> None:

@@ -152,6 +152,14 @@ def test_the_intensity_that_a_session_began_with_is_locked_also_when_it_is_resum
     assert header.asks_from == 0
 
 
+def test_a_loop_of_the_labs_own_cannot_keep_a_locked_intensity_and_is_told_so(log: Path) -> None:
+    Session(Stimulator(simulated=False), scripted_strategy(2), log=log, clock=FakeRealClock()).run()
+    before = log.read_bytes()
+    with pytest.raises(InvalidValueError, match=r"neither intensity nor coil temperature.*60"):
+        open_session(scripted_strategy(9), log, resume=True)
+    assert log.read_bytes() == before
+
+
 def test_what_a_session_went_on_with_holds_when_it_is_resumed_again(interrupted: Path, space: DesignSpace) -> None:
     before, limits, device = read_session(interrupted).header, Limits.of_space(space, max_pulses=6), ScriptedDevice()
     device.info = dataclasses.replace(device.info, version="2.1")

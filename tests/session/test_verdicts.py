@@ -98,6 +98,19 @@ def test_including_undoes_an_exclusion(log: Path, tmp_path: Path) -> None:
     assert [kind for kind, _, _ in verdicts(log)] == ["exclusion", "inclusion"]
 
 
+def test_the_trial_that_was_excluded_last_is_known_whatever_its_number(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        for mep_mv in (0.1, 0.2, 0.05, 0.3):
+            session.tell(session.ask(), mep_mv)
+        session.exclude(3)
+        session.exclude(1)
+        assert session.last_excluded == 1
+        session.include(1)
+        assert session.last_excluded == 3
+        session.include(3)
+        assert session.last_excluded is None
+
+
 def test_rejecting_is_an_exclusion_with_its_own_reason_and_accepting_undoes_it(log: Path) -> None:
     session_that({2: lambda session: session.reject(2), 4: lambda session: session.accept(2)}, log).run()
     assert verdicts(log) == [("exclusion", 2, LOOKED_AT), ("inclusion", 2, "Included again by the operator.")]

@@ -15,6 +15,7 @@ from isiw.report import final_statement
 from isiw.session import progress_row
 from isiw.session.loop import Session
 from isiw.session.resume import resume
+from isiw.session.safeguards import Safeguards
 from isiw.session.watch import Watch
 from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
@@ -127,6 +128,15 @@ def test_microvolts_pause_a_session_once(log: Path) -> None:
 
 def early(isi_ms: float, commanded_ms: float) -> Trial:
     return Trial(0, Status.MISTRIAL, commanded_ms, MistrialReason.TMS_BEFORE_IMPACT, isi_ms=isi_ms)
+
+
+def test_what_a_person_was_asked_to_look_at_is_told_with_the_finding_though_the_session_went_on(log: Path) -> None:
+    frozen = ScriptedDevice(lambda stimulus: Measurement(0.12, stimulus.isi_ms))
+    going_on = Safeguards(on_pause=lambda _reason: True)
+    Session(frozen, scripted_strategy(6), log=log, safeguards=going_on).run()
+    record = read_session(log)
+    assert [event.kind for event in record.events][:2] == ["doubt", "pause"]
+    assert "Doubt since trial 3: The last 4 amplitudes are exactly equal" in final_statement(record)
 
 
 @pytest.mark.parametrize(("isi_ms", "commanded_ms", "paused"), [(-2.0, 1.0, False), (-147.0, 20.0, True)])

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
 from isiw.design import DesignSpace
 from isiw.devices.robot.presets import preset
@@ -109,6 +110,25 @@ def test_an_artefact_that_saturates_outside_the_mep_window_is_no_saturation() ->
 def test_a_coarse_converter_at_rest_is_not_saturated() -> None:
     steps = np.round(np.random.default_rng(0).standard_normal(5000) * 0.7)
     assert not is_saturated(0.001 * steps, 5000.0)
+
+
+def coarse_sweeps_mv(step_mv: float, mep_mv: float) -> FloatArray:
+    """Thirty sweeps of EMG at rest with an MEP of this peak, as a converter with such steps shows them."""
+    t_ms = np.arange(0, 700, 0.2)
+    band = butter(2, (10, 500), "bandpass", fs=5000.0, output="sos")
+    noise = sosfilt(band, np.random.default_rng(0).standard_normal((30, t_ms.size)))
+    mep = mep_mv * np.sin(2 * np.pi * (t_ms - 420) / 20) * (np.abs(t_ms - 430) <= 10)
+    return np.asarray(step_mv * np.round((0.0015 * noise / noise.std() + mep) / step_mv))
+
+
+@pytest.mark.parametrize("step_mv", [0.00244, 0.00488])
+@pytest.mark.parametrize("mep_mv", [0.0, 0.06])
+def test_emg_of_a_coarse_converter_is_not_saturated(step_mv: float, mep_mv: float) -> None:
+    assert not any(is_saturated(emg_mv, 5000.0) for emg_mv in coarse_sweeps_mv(step_mv, mep_mv))
+
+
+def test_a_clipped_mep_of_a_coarse_converter_is_saturated() -> None:
+    assert all(is_saturated(emg_mv.clip(-0.25, 0.25), 5000.0) for emg_mv in coarse_sweeps_mv(0.00488, 0.5))
 
 
 def test_an_isi_that_is_off_by_more_than_the_tolerance() -> None:

@@ -53,6 +53,7 @@ def test_an_isi_far_from_the_one_asked_is_a_doubt(space: DesignSpace) -> None:
         ([8.0, 6.0, 12.0], DoubtKind.LARGE),
         ([0.008, 0.01, 0.1, 8.0, 11.0, 9.0], DoubtKind.JUMP),
         ([0.0] * 10, DoubtKind.SILENT),
+        ([0.1, 0.2] * 4 + [0.0] * 10, DoubtKind.STOPPED),
     ],
 )
 def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv: list[float], kind: DoubtKind) -> None:

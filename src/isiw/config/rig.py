@@ -6,6 +6,7 @@ A log never names it: what is imported is what the person at the keyboard has co
 from __future__ import annotations
 
 import importlib
+import inspect
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -46,11 +47,12 @@ def device_from_factory(factory: str, settings: Mapping[str, Any], folder: Path 
                 remedy=f"The module is looked for in {folder or 'the installed packages'} first.",
             ) from error
     try:
-        device = make(**settings)
+        inspect.signature(make).bind(**settings)
     except TypeError as error:
         raise ConfigError(
             f"device.settings do not fit the factory: {error}", got=dict(settings), remedy="Correct their names."
         ) from error
+    device = make(**settings)
     if not isinstance(device, Device):
         raise ConfigError(
             "device.factory makes no device",

@@ -29,7 +29,7 @@ def driven(device: Device, info: DeviceInfo) -> Iterator[None]:
         info: what it says about itself.
 
     Raises:
-        DeviceError: another session drives it.
+        DeviceError: another session drives it, or its lock cannot be taken.
     """
     with ExitStack() as held:
         held.enter_context(_object_claimed(device, info))
@@ -53,11 +53,18 @@ def _object_claimed(device: Device, info: DeviceInfo) -> Iterator[None]:
 @contextmanager
 def _address_claimed(info: DeviceInfo) -> Iterator[None]:
     digest = hashlib.sha256(info.address.encode(errors="backslashreplace")).hexdigest()[:16]
-    lock = FileLock(Path(tempfile.gettempdir()) / f"isiw-device-{digest}.lock")
+    path = Path(tempfile.gettempdir()) / f"isiw-device-{digest}.lock"
+    lock = FileLock(path)
     try:
         lock.acquire(timeout=0)
     except Timeout as error:
         raise _taken(f"{info.name} at {info.address}") from error
+    except OSError as error:
+        raise DeviceError(
+            f"the device's lock cannot be taken: {error.strerror}",
+            got=str(path),
+            remedy="Another account of this computer may have made it. Delete it once no session runs there.",
+        ) from error
     try:
         yield
     finally:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, get_args, runtime_checkable
 
-from isiw.checks import check_choice, check_flags, check_numbers, mean_and_sd
+from isiw.checks import check_choice, check_flags, check_numbers, check_texts, mean_and_sd, text
 from isiw.errors import NotDelivered
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Conditioning, Reference
@@ -37,7 +37,7 @@ class DeviceInfo:
 
     Raises:
         InvalidValueError: an unknown reference or conditioning stimulus, a detection limit or a hit delay that is not
-            positive, or a word where True or False is due.
+            positive, a name, version, address or unit that is no text, or a word where True or False is due.
     """
 
     name: str
@@ -52,6 +52,9 @@ class DeviceInfo:
     conditioning: Conditioning = "tap"
 
     def __post_init__(self) -> None:
+        check_texts(self, "name", "version", "address")
+        for channel, unit in self.channels.items():
+            text(f"the unit of {channel!r} in DeviceInfo.channels", unit)
         check_choice(self, "reference", get_args(Reference))
         check_choice(self, "conditioning", get_args(Conditioning))
         check_flags(self, "simulated", "tap_alone")

@@ -73,7 +73,12 @@ Numbers: TypeAlias = Annotated[
 class _Record(BaseModel):
     """A frozen record; keys that a newer version added are ignored."""
 
-    model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", extra="ignore")
+    model_config = ConfigDict(
+        frozen=True,
+        ser_json_inf_nan="strings",
+        extra="ignore",
+        coerce_numbers_to_str=True,  # an earlier version wrote a device's version as the number that it was given
+    )
 
 
 class StrategyRecipe(_Record):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from isiw.log.reader import SessionRecord
-from isiw.text.found import SURE, rules_out
+from isiw.text.found import STIMULI, SURE, rules_out
 
 __all__ = ["depression_sentence"]
 
@@ -11,7 +11,7 @@ THRESHOLD_PCT_RMT = 100.0
 
 
 def depression_sentence(record: SessionRecord) -> str:
-    """Where the tap depresses the MEP, or that the strategy does not look for it above the motor threshold.
+    """Where the MEP is depressed, or that the strategy does not look for it above the motor threshold.
 
     Args:
         record: the session, with an estimate.
@@ -19,18 +19,19 @@ def depression_sentence(record: SessionRecord) -> str:
     Returns:
         One sentence; empty where the strategy did not look, and the pulse is not known to be above the threshold.
     """
+    stimulus = STIMULI[record.header.conditioning]
     estimate, intensity_pct = record.estimates[-1], record.header.visit.intensity_pct_rmt
     if estimate.depressed_probability is not None:
         chance = f" (probability that it does so anywhere: {estimate.depressed_probability:.2f})"
         if estimate.depressed is not None:
             likely = "" if estimate.depressed_probability >= SURE else "probably "
-            return f"The tap {likely}depresses the MEP at ISIs of {estimate.depressed}{chance}."
+            return f"The {stimulus} {likely}depresses the MEP at ISIs of {estimate.depressed}{chance}."
         if rules_out(estimate.depressed_probability):
-            return f"No ISIs were found at which the tap depresses the MEP{chance}."
-        return f"It is undecided whether the tap depresses the MEP at any ISI{chance}."
+            return f"No ISIs were found at which the {stimulus} depresses the MEP{chance}."
+        return f"It is undecided whether the {stimulus} depresses the MEP at any ISI{chance}."
     if intensity_pct is None or intensity_pct <= THRESHOLD_PCT_RMT:
         return ""
     return (
-        f"This strategy looks for enhancement alone. At {intensity_pct:g} % of RMT the tap may depress the MEP too: "
-        "the strategy supra-threshold looks for both."
+        f"This strategy looks for enhancement alone. At {intensity_pct:g} % of RMT the {stimulus} may depress "
+        "the MEP too: the strategy supra-threshold looks for both."
     )

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from scipy.stats import mannwhitneyu
 
 from isiw.log.reader import SessionRecord
+from isiw.signals.plausibility import stopped_after
 from isiw.text.found import NO_MEP
 from isiw.trials import Trial
 from isiw.window import Window
@@ -108,17 +109,21 @@ def contradiction(window: Window | None, trials: Sequence[Trial], *, without_pro
 
 
 def nothing_stood_out(trials: Sequence[Trial]) -> str | None:
-    """That no MEP was larger than EMG at rest; None where one was, or where too few trials say so.
+    """That no MEP was larger than EMG at rest, or none any more; None where some were, or too few trials say so.
 
     A muscle that the pulse alone does not reach looks like this, and so does a stimulator that does not fire.
 
     Args:
         trials: the trials that count.
     """
-    known = [(t.mep_mv, t.background_rms_uv) for t in trials if t.mep_mv is not None and t.background_rms_uv]
-    if len(known) < ENOUGH_TO_STAND_OUT or any(1e3 * mep_mv > OF_REST * rest_uv for mep_mv, rest_uv in known):
+    known = [(t.index, t.mep_mv, t.background_rms_uv) for t in trials if t.mep_mv is not None and t.background_rms_uv]
+    stood_out = [1e3 * mep_mv > OF_REST * rest_uv for _, mep_mv, rest_uv in known]
+    if len(known) >= ENOUGH_TO_STAND_OUT and not any(stood_out):
+        return f"In no trial was the EMG after the pulse larger than at rest. {_LOOK}"
+    first = stopped_after(stood_out)
+    if first is None:
         return None
-    return f"In no trial was the EMG after the pulse larger than at rest. {_LOOK}"
+    return f"From trial {known[first][0]} on, the EMG after the pulse was never larger than at rest. {_LOOK}"
 
 
 def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:

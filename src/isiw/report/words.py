@@ -6,8 +6,6 @@ import math
 import re
 import shlex
 from collections import Counter
-from collections.abc import Mapping
-from types import MappingProxyType
 
 from isiw.design import DesignSpace
 from isiw.log.durable import log_of
@@ -25,8 +23,7 @@ from isiw.report.evidence import (
 from isiw.session.header import OWN_LOOP
 from isiw.session.progress import asked, outcome
 from isiw.strategy.catalogue import known_settings, list_strategies
-from isiw.text.found import SURE, rules_out
-from isiw.types import Conditioning
+from isiw.text.found import STIMULI, SURE, rules_out
 from isiw.window import MIN_EXCESS_MV, Window
 
 __all__ = [
@@ -62,8 +59,6 @@ _OF_THE_WINDOW = re.compile(r"^(?!The session is paused).*(window|F1|particles)"
 JUDGED_SINCE = "Trials were judged anew after this estimate; resume the session to have it with what counts now."
 """What is said where `SessionRecord.is_judged_since`."""
 
-_FIRST: Mapping[Conditioning, str] = MappingProxyType({"tap": "tap", "electrical": "electrical pulse"})
-
 
 def final_statement(record: SessionRecord) -> str:
     """What a session found, in a few sentences.
@@ -82,6 +77,7 @@ def final_statement(record: SessionRecord) -> str:
             counts_sentence(record),
             fit_sentence(record),
             _unstated_hit_delay(record),
+            _expects_a_tap(record),
             "" if record.is_silent and _OF_THE_WINDOW.search(last.reason) else last.reason,
         ]
     if record.end_lost:
@@ -151,7 +147,7 @@ def finding_sentence(record: SessionRecord, estimate: Estimate) -> str:
     if window is None:
         is_none = rules_out(probability)
         return f"No window was found{chance}." if is_none else f"It is undecided whether there is a window{chance}."
-    enhances = f"The {_FIRST[record.header.conditioning]} {'' if probability >= SURE else 'probably '}enhances the MEP"
+    enhances = f"The {STIMULI[record.header.conditioning]} {'' if probability >= SURE else 'probably '}enhances the MEP"
     isis = f"{window} {_after(record)}{chance}"
     if estimate.expected_f1 is not None and estimate.expected_f1 < A_GUESS:
         return f"{enhances}, but at which ISIs is not known well; the best guess is {isis}."
@@ -162,14 +158,13 @@ def _after(record: SessionRecord) -> str:
     """Which event the session's ISIs count from, in words."""
     if record.header.space.reference == "valve":
         return "after the valve command"
-    return (
-        "after the impact" if record.header.conditioning == "tap" else f"after the {_FIRST[record.header.conditioning]}"
-    )
+    stimulus = record.header.conditioning
+    return "after the impact" if stimulus == "tap" else f"after the {STIMULI[stimulus]}"
 
 
 def _without_probability(record: SessionRecord, estimate: Estimate) -> str:
     """The same, of a method that gives none."""
-    first, space = _FIRST[record.header.conditioning], record.header.space
+    first, space = STIMULI[record.header.conditioning], record.header.space
     if estimate.window is not None:
         isis = f"{estimate.window} {_after(record)}"
         return f"By this method, which gives no probability, the {first} enhances the MEP at ISIs of {isis}."
@@ -291,18 +286,33 @@ def fit_sentence(record: SessionRecord) -> str:
 
 
 def _unstated_hit_delay(record: SessionRecord) -> str:
-    """That stimuli went into what the rig could have stated, where the strategy could have used it."""
+    """That stimuli went into what the rig states, or could have stated, where the strategy could have used it."""
     header, recipe = record.header, record.header.strategy
-    if header.space.reference != "valve" or header.device.hit_delay_ms is not None or not record.rests_on_data:
+    if header.space.reference != "valve" or "hit_delay_ms" in recipe.settings or not record.rests_on_data:
         return ""
-    if recipe.name not in list_strategies() or "hit_delay_ms" in recipe.settings:
+    if recipe.name not in list_strategies() or not known_settings(recipe.name, {"hit_delay_ms": True}):
         return ""
-    if not known_settings(recipe.name, {"hit_delay_ms": True}):
-        return ""
+    if (stated_ms := header.device.hit_delay_ms) is not None:
+        call = f"make_strategy(..., hit_delay_ms=({stated_ms[0]:g}, {stated_ms[1]:g}))"
+        return f"The strategy was not told the device's hit delay, which would have saved stimuli: {call}."
     said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms), which would have saved stimuli"
     if not any(name == "acceleration" for _, name in record.waveforms):
         return f"{said}."
     return f"{said}; isiw timing {shlex.quote(str(record.path))} measures it."
+
+
+def _expects_a_tap(record: SessionRecord) -> str:
+    """That what a strategy believes of windows is true of those after a tap, where an electrical pulse came first."""
+    name, estimate = record.header.strategy.name, record.estimates[-1]
+    states_beliefs = estimate.probability is not None and estimate.depressed_probability is None
+    if record.header.conditioning == "tap" or not states_beliefs or name not in list_strategies():
+        return ""
+    if known_settings(name, {"conditioning": record.header.conditioning}):
+        return ""
+    return (
+        f"{name} expects windows as after a tap, and cannot be told of the electrical pulse: do not rely on its "
+        "probabilities. The default strategy can be told."
+    )
 
 
 def truth_sentence(record: SessionRecord, truth: Window | None) -> str:

@@ -27,6 +27,10 @@ class Operated(Protocol):
     def trials(self) -> TrialTable:
         """All trials so far."""
 
+    @property
+    def last_excluded(self) -> int | None:
+        """The trial that was excluded last, of those that are; None where none is."""
+
     def pause(self, reason: str) -> None:
         """Disarm now, and pause."""
 
@@ -176,11 +180,10 @@ class Desk:
         )
 
     def _undo(self) -> None:
-        excluded = [trial.index for trial in self._session.trials if trial.excluded]
-        if not excluded:
+        if (number := self._session.last_excluded) is None:
             raise InvalidValueError("no trial is excluded")
-        self._session.include(excluded[-1])
-        self.screen.say(f"Trial {excluded[-1]} counts again.")
+        self._session.include(number)
+        self.screen.say(f"Trial {number} counts again.")
 
     def _begin_note(self) -> None:
         self._note = ""

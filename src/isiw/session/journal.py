@@ -54,10 +54,13 @@ class Journal:
 
     Args:
         trials: what was delivered before.
+
+    `excluded` are the trials that do not count, the one that was excluded last at the end.
     """
 
     def __init__(self, trials: TrialTable | None = None) -> None:
         self.trials = trials or TrialTable()
+        self.excluded = [trial.index for trial in self.trials if trial.excluded]
         self.unconcluded: Trial | None = None
         self.overruled = False
         self._log: LogWriter | None = None
@@ -130,6 +133,9 @@ class Journal:
             event = verdict(self.trials)
             self.log.append(event)
             self.trials = under_all(self.trials, [event])
+            self.excluded = [number for number in self.excluded if number != event.trial]
+            if event.trial is not None and event.kind == "exclusion":
+                self.excluded.append(event.trial)
             self.overruled = True
         self.log.sync()
         return event

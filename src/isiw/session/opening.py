@@ -68,7 +68,8 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
         DeviceError: the log is of a simulated device.
         InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; a subject that is no text,
-            or another than the log's; a protocol with control trials; a rest or a period that limits nothing.
+            or another than the log's; a protocol with control trials; a rest or a period that limits nothing, or a
+            limit on intensity or coil temperature, which nobody reports here.
         LogError: there is a log already, or it cannot be written or read.
         StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
 
@@ -98,6 +99,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         signals=SignalLimits(),
         config=dict(config or {}),
     )
+    _require_reported(header.limits)
     header.limits.require_effect()
     header.protocol.require_effect(header.limits.min_iti_s)
     clock = clock or MonotonicClock()
@@ -126,6 +128,7 @@ def _resumed(
     warn_where_differing(replayed, record.header)
     logged = {name: getattr(record.header, name) for name in unsaid}
     header = as_resumed(header.model_copy(update=logged), record.header, replayed)
+    _require_reported(header.limits)
     writer = LogWriter.continuing(path, salvaged, record.header, header)
     ages = ages_s(salvaged, len(replayed.trials))
     for trial in replayed.unknown:
@@ -136,6 +139,18 @@ def _resumed(
         writer.append(believed(strategy, len(replayed.trials) - 1, strategy.decision(), None))
     writer.sync()
     return Recorder(replayed.strategy, writer, header, clock, replayed.trials, ages, on_doubt)
+
+
+def _require_reported(limits: Limits) -> None:
+    """Raise where limits need what a loop of one's own reports nothing of: such a session could never ask."""
+    states = {"intensity_pct_mso": limits.intensity_pct_mso, "max_coil_c": limits.max_coil_c}
+    given = {name: value for name, value in states.items() if value is not None}
+    if given:
+        raise InvalidValueError(
+            "a loop of one's own reports neither intensity nor coil temperature, so these limits cannot be kept",
+            got=given,
+            remedy="Keep them yourself, and state others: limits=isiw.Limits.of_space(space, min_iti_s=5).",
+        )
 
 
 def _without_controls(protocol: VisitProtocol) -> VisitProtocol:

@@ -171,7 +171,7 @@ def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtoc
         protocol: which control trials there are.
 
     Raises:
-        DeviceError: another reference, another detection limit, or no tap alone.
+        DeviceError: another reference, conditioning stimulus or detection limit, or no tap alone.
         InvalidValueError: a channel whose name or unit a session cannot use.
     """
     if info.reference != strategy.space.reference:
@@ -180,6 +180,14 @@ def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtoc
             got=info.reference,
             expected=strategy.space.reference,
             remedy="Give the DesignSpace the device's reference.",
+        )
+    assumed = strategy.recipe.settings.get("conditioning", info.conditioning)
+    if info.conditioning not in {"tap", assumed}:  # a tap is also what a device says that states nothing
+        raise DeviceError(
+            "the device gives another conditioning stimulus than the strategy expects, so windows would be missed",
+            got=info.conditioning,
+            expected=assumed,
+            remedy=f'Make the strategy with the device\'s: make_strategy(..., conditioning="{info.conditioning}").',
         )
     if protocol.tap_alone and not info.tap_alone:
         raise DeviceError(

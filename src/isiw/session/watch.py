@@ -35,6 +35,7 @@ class Watch:
         settled: doubts that a person has seen.
         seen_reasons: why it paused before, as a person has seen; of trials that count, the same fault is said once.
         reason: why to pause now, and what to do; None where there is no reason.
+        doubt: what the last trial made odd about the amplitudes so far; None where it made nothing.
     """
 
     space: DesignSpace
@@ -48,6 +49,7 @@ class Watch:
     settled: frozenset[DoubtKind] = frozenset()
     seen_reasons: frozenset[str] = frozenset()
     reason: str | None = None
+    doubt: str | None = None
 
     def resumed(self, trials: TrialTable, reasons: Iterable[str]) -> Watch:
         """The same after earlier trials; whoever resumes the session has seen their doubts and its pauses.
@@ -72,6 +74,8 @@ class Watch:
             trial: the trial.
             answer: what the device answered.
         """
+        if self.doubt is not None:
+            return replace(self, doubt=None).after(trial, answer)
         if too_early_by_chance(trial, self.space):
             return self._after_early(trial)
         fault = likely_fault(answer, trial, self.signals)
@@ -102,4 +106,5 @@ def _with_amplitude(watch: Watch, mep_mv: float) -> Watch:
     doubt = doubt_of(meps_mv, watch.detection_limit_mv)
     if doubt is None or doubt.kind in watch.settled:
         return replace(watch, meps_mv=meps_mv)
-    return replace(watch, meps_mv=meps_mv, settled=watch.settled | {doubt.kind}, reason=watch.reason or doubt.text)
+    settled, reason = watch.settled | {doubt.kind}, watch.reason or doubt.text
+    return replace(watch, meps_mv=meps_mv, settled=settled, reason=reason, doubt=doubt.text)

@@ -12,6 +12,11 @@ from isiw.types import ArrayLike, BoolArray, FloatArray
 __all__ = ["is_blanked", "is_saturated"]
 
 FLAT_MS = 1.0
+FAR_OUT = 10.0
+"""A limit is farther from the sweep's middle than this many times the median distance from it."""
+
+FAR_OUT_STEPS = 30.0
+"""And farther than this many steps of the converter: of EMG at rest, a coarse one shows a few codes only."""
 
 BLANKED_MS = 5.0
 BLANKED_TIMES = 3
@@ -48,10 +53,13 @@ def is_saturated(
     if full_scale_mv is not None and np.abs(counts).max() >= NEARLY_FULL * full_scale_mv:
         return True
     level = np.median(emg)
-    usual = np.median(np.abs(emg - level))
     samples = max(3, round(FLAT_MS * rate_hz / 1000))
     tops = (float(counts.max()), float(counts.min()))
-    return any(abs(top - level) > 10 * usual and _longest_run(counts == top) >= samples for top in tops)
+    flat = [top for top in tops if top != level and _longest_run(counts == top) >= samples]
+    if not flat:
+        return False
+    usual, step = np.median(np.abs(emg - level)), np.diff(np.unique(emg)).min()
+    return any(abs(top - level) > max(FAR_OUT * usual, FAR_OUT_STEPS * step) for top in flat)
 
 
 def is_blanked(emg_mv: FloatArray, rate_hz: float, pulse_ms: float, span_ms: tuple[float, float]) -> bool:

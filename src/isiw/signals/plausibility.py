@@ -7,11 +7,14 @@ largest compound action potentials some 25 mV.
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, NamedTuple
+
+from scipy.special import betaln
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
@@ -30,6 +33,7 @@ __all__ = [
     "off_by",
     "require_amplitude",
     "require_plausible",
+    "stopped_after",
 ]
 
 SMALLEST_MV = 2e-4
@@ -51,6 +55,10 @@ IN_A_ROW = 3
 EQUAL_IN_A_ROW = 4
 SILENT_FROM_THE_START = 10
 
+STOPPED_IN_A_ROW = 10
+STOPPED_BY_CHANCE = 1e-4
+"""So many pulses without an answer, after some with one, are due to chance less often than this."""
+
 ALIKE_IN_A_ROW = 6
 ALIKE_CV = 0.015
 """From pulse to pulse MEPs have a CV of .3 and more; what a stimulator itself puts into the EMG has less than this. So
@@ -66,6 +74,7 @@ class DoubtKind(StrEnum):
     ISI_OFF = "ISI far from the one asked"
     EQUAL = "equal amplitudes"
     SILENT = "no MEP at all"
+    STOPPED = "no MEP any more"
     SMALL = "small amplitudes"
     LARGE = "large amplitudes"
     JUMP = "a jump of the scale"
@@ -211,6 +220,10 @@ def doubt_of(meps_mv: Sequence[float], detection_limit_mv: float | None = None) 
         text = f"None of the first {len(meps_mv)} pulses gave an MEP: every amplitude is 0."
         ask = "Does the stimulator fire, is the EMG recorded, is the intensity enough?"
         return Doubt(DoubtKind.SILENT, f"{text} {ask}")
+    first = None if _zeros_are_usual(detection_limit_mv) else stopped_after([mep_mv > 0 for mep_mv in meps_mv])
+    if first is not None:
+        text = f"None of the last {len(meps_mv) - first} pulses gave an MEP, though earlier ones did."
+        return Doubt(DoubtKind.STOPPED, f"{text} Does the stimulator still fire, is the coil in its place?")
     return _doubt_of_scale(seen[:-IN_A_ROW], seen[-IN_A_ROW:]) if len(seen) >= IN_A_ROW else None
 
 
@@ -248,6 +261,22 @@ def is_silent(meps_mv: Sequence[float], detection_limit_mv: float | None = None)
     """
     enough = len(meps_mv) >= ENOUGH_PAIRS and not _zeros_are_usual(detection_limit_mv)
     return enough and not any(meps_mv)
+
+
+def stopped_after(answered: Sequence[bool]) -> int | None:
+    """After how many pulses there was no answer any more; None where chance may explain those without one.
+
+    Args:
+        answered: whether each pulse so far was answered, in order.
+    """
+    silent = next((k for k, yes in enumerate(reversed(answered)) if yes), 0)
+    if silent < STOPPED_IN_A_ROW:
+        return None
+    hits = sum(answered)
+    misses = len(answered) - silent - hits
+    # How probable so many misses are after these, whatever the share of answers is.
+    by_chance = math.exp(betaln(hits + 1, misses + silent + 1) - betaln(hits + 1, misses + 1))
+    return len(answered) - silent if by_chance < STOPPED_BY_CHANCE else None
 
 
 def _zeros_are_usual(detection_limit_mv: float | None) -> bool:

@@ -299,7 +299,8 @@ def test_what_an_earlier_run_left_behind_is_never_taken(tmp_path: Path) -> None:
         assert left.exists()
 
 
-def test_a_tap_alone_is_refused(tmp_path: Path) -> None:
+def test_a_tap_alone_is_refused_whatever_the_table_says(tmp_path: Path) -> None:
+    assert not device(tmp_path, info={"name": "MATLAB", "reference": "impact", "tap_alone": True}).describe().tap_alone
     with staged(tmp_path) as made, pytest.raises(NotDelivered, match="tap alone"):
         made.deliver(Stimulus(0, None, tap_alone=True), 1.0)
 
@@ -321,6 +322,7 @@ def test_a_request_is_written_whole_and_with_what_a_script_needs(tmp_path: Path)
         {"stage_timeout_s": float("nan")},
         {"rate_hz": 2000.0},
         {"info": WAVEFORMS["info"]},
+        {"info": {"name": "MATLAB", "refrence": "impact"}},
     ],
 )
 def test_settings_that_make_no_sense_are_refused(tmp_path: Path, changed: dict[str, Any]) -> None:

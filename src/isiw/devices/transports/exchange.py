@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final, Protocol, TypeVar
 
-from isiw.checks import number
+from isiw.checks import from_table, number
 from isiw.devices.protocol import DeviceInfo, require_staged
 from isiw.devices.transports.reply import Reply
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
@@ -284,5 +284,4 @@ def described(info: DeviceInfo | Mapping[str, Any], **known: Any) -> DeviceInfo:
         info: the fields of a `DeviceInfo`.
         **known: fields that the device itself knows.
     """
-    given = info if isinstance(info, DeviceInfo) else DeviceInfo(**info)
-    return dataclasses.replace(given, **known)
+    return dataclasses.replace(from_table(DeviceInfo, info, "info"), **known)

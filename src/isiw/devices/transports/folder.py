@@ -63,7 +63,7 @@ class FolderDevice:
         poll_s: float = 0.01,
     ) -> None:
         place = Path(folder).absolute()
-        self._info = described(info, address=str(place))
+        self._info = described(info, address=str(place), tap_alone=False)
         if (rate_hz is not None) is not bool(self._info.channels):
             raise InvalidValueError(
                 "channels and their rate belong together",

@@ -13,8 +13,9 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from isiw.checks import text
+from isiw.checks import from_table, text
 from isiw.devices.protocol import Answer, DeviceInfo, Readiness, require_staged
+from isiw.devices.transports.exchange import described
 from isiw.devices.transports.line_connection import open_connection, require_address
 from isiw.devices.transports.line_exchange import Line, LineSettings
 from isiw.devices.transports.line_table import Exchange, LineCommands, isi_ms_of, mep_mv_of, number_of
@@ -52,9 +53,9 @@ class LineDevice:
         measure: Callable[[Stimulus, float | None, float], Answer] | None = None,
     ) -> None:
         require_address(text("address", address))
-        self._commands = commands if isinstance(commands, LineCommands) else LineCommands(**commands)
-        self._settings = line if isinstance(line, LineSettings) else LineSettings(**(line or {}))
-        self._info = DeviceInfo(address=address, tap_alone=self._commands.tap_alone is not None, **info)
+        self._commands = from_table(LineCommands, commands, "commands")
+        self._settings = from_table(LineSettings, line or {}, "line")
+        self._info = described(info, address=address, tap_alone=self._commands.tap_alone is not None)
         self._measure = measure
         self._require_measured()
         self._line: Line | None = None

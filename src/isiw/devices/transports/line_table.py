@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 from string import Formatter
 from typing import Any, Final
 
-from isiw.checks import check_numbers, check_texts, number
+from isiw.checks import check_numbers, check_texts, from_table, number
 from isiw.errors import InvalidValueError
 
 __all__ = ["Exchange", "LineCommands", "command_values", "isi_ms_of", "mep_mv_of", "number_of"]
@@ -133,7 +133,7 @@ class LineCommands:
     def __post_init__(self) -> None:
         for name, value in list(self._given()):
             if isinstance(value, Mapping):
-                object.__setattr__(self, name, Exchange(**value))
+                object.__setattr__(self, name, from_table(Exchange, value, f"commands.{name}"))
         for name, exchange in self._given():
             if not isinstance(exchange, Exchange):
                 raise InvalidValueError(

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Any, Final
 
-from isiw.checks import number, text
+from isiw.checks import from_table, number, text
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.transports.exchange import Exchange, described
 from isiw.devices.transports.lsl_markers import Markers
@@ -64,11 +64,11 @@ class LslDevice:
         stop_timeout_s: float = 4.0,
     ) -> None:
         self._lsl = _pylsl()
-        self._channels = {
-            name: each if isinstance(each, LslChannel) else LslChannel(**each) for name, each in channels.items()
-        }
+        self._channels = {name: from_table(LslChannel, each, f"channels.{name}") for name, each in channels.items()}
         units = {name: channel.unit for name, channel in self._channels.items()}
-        self._info = described(info, channels=units, address=f"the LSL stream {text('markers', markers)}")
+        self._info = described(
+            info, channels=units, address=f"the LSL stream {text('markers', markers)}", tap_alone=False
+        )
         self._rates_hz = _rates_hz(self._channels)
         self._before_s = number("before_ms", before_ms, above=0) / 1e3
         self._after_s = number("after_ms", after_ms, above=0) / 1e3

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+import isiw
 from isiw.devices.transports.line_exchange import LineSettings
 from isiw.devices.transports.line_table import Exchange, LineCommands, command_values, isi_ms_of
 from isiw.errors import InvalidValueError
@@ -41,8 +42,9 @@ def test_a_command_that_cannot_work_is_named(name: str, exchange: Any, words: st
 
 
 def test_what_an_instrument_must_understand_cannot_be_left_out() -> None:
-    with pytest.raises(TypeError, match="disarm"):
-        LineCommands(**{name: each for name, each in PEER_COMMANDS.items() if name != "disarm"})
+    commands = {name: each for name, each in PEER_COMMANDS.items() if name != "disarm"}
+    with pytest.raises(InvalidValueError, match=r"the table commands: missing a required argument: 'disarm'"):
+        isiw.LineDevice("socket://127.0.0.1:5000", {"name": "bench", "reference": "impact"}, commands)
 
 
 @pytest.mark.parametrize(
