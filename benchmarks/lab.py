@@ -2,11 +2,12 @@
 
     python benchmarks/lab.py --labs 20 --seed 100000 --out benchmarks/results/lab
     python benchmarks/lab.py --labs 20 --seed 100000 --stated --out benchmarks/results/lab_stated
+    python benchmarks/lab.py --labs 20 --misfits 0 --priors "told,windows known" --out benchmarks/results/lab_bound
 
 In each lab ten people are measured with the default, and a prior is learnt from their logs; then other people of the
 lab, and people who do not belong there, are measured with the built-in prior, with the learnt one, and with a prior
-that was told the lab's law. A bound stands beside these: told the law but for start and width, which are learnt from
-the windows of the ten people as they are. With `--stated` the lab's rig states its hit delay, in earlier sessions and
+that was told the lab's law. "windows known" is a bound: told the law but for start and width, which are learnt from the
+windows of the ten people as they are. With `--stated` the lab's rig states its hit delay, in earlier sessions and
 in later ones.
 """
 
@@ -14,8 +15,9 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -27,6 +29,7 @@ import typer
 import isiw
 from acquisition import facts_of
 from earlier import logged_session, measured, write
+from isiw.checks import choice
 from isiw.design import VALVE_SPACE
 from isiw.models.particles.laws import Floor, Muscle, NoiseShares
 from isiw.models.particles.places import Place
@@ -43,6 +46,7 @@ from isiw.studies import SimulatedSession, simulate
 from isiw.subjects import LABS, Lab, SimulatedSubject, cohort, lab
 
 MARKS = (1, 5, 10, 20, 40)
+PRIORS = ("built-in", "learnt", "told", "windows known")
 TOLD_SHARE = 0.95
 CERTAIN = -1e6
 """Log density of windows that are certainly of the lab under the prior of people in general."""
@@ -59,6 +63,7 @@ class Unit:
         people: how many are measured then.
         misfits: how many people of `odd` are measured then.
         trials: of each session that is measured then.
+        priors: which of `PRIORS` they are measured with.
         stated: whether the lab's rig states its hit delay.
     """
 
@@ -67,6 +72,7 @@ class Unit:
     people: int
     misfits: int
     trials: int
+    priors: tuple[str, ...]
     stated: bool
 
 
@@ -114,26 +120,39 @@ def with_known_windows(prior: Prior, people: Sequence[SimulatedSubject]) -> Prio
     return replace(prior, profile=replace(prior.profile, places=(learnt,)))
 
 
+def learnt_from(people: Sequence[SimulatedSubject], seed: int, hit_delay_ms: tuple[float, float] | None) -> Prior:
+    """The prior that sessions with some people of a lab teach.
+
+    Args:
+        people: the people.
+        seed: of the lab.
+        hit_delay_ms: what its rig states, mean and SD [ms]; None where it states nothing.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        logs = [
+            logged_session(person, f"P{number}", seed + number, EARLIER_TRIALS, Path(folder), hit_delay_ms)
+            for number, person in enumerate(people)
+        ]
+        return isiw.priors.learn(logs).joined()
+
+
 def examine(unit: Unit) -> pd.DataFrame:
     """All sessions with later people of one lab; columns as in `isiw.studies.simulate`, and the kind of `people`."""
     torch.set_num_threads(1)
-    law = lab(unit.name, unit.seed)
+    law, earlier = lab(unit.name, unit.seed), cohort(unit.name, LEARNT, unit.seed)
     hit_delay_ms = law.hit_delay_ms if unit.stated else None
-    with tempfile.TemporaryDirectory() as folder:
-        earlier = cohort(unit.name, LEARNT, unit.seed)
-        logs = [
-            logged_session(person, f"P{number}", unit.seed + number, EARLIER_TRIALS, Path(folder), hit_delay_ms)
-            for number, person in enumerate(earlier)
-        ]
-        learnt = isiw.priors.learn(logs).joined()
-    informed = told(law)
-    known = with_known_windows(informed, earlier)
-    priors = {"built-in": Prior(), "learnt": learnt, "windows known": known, "told": informed}
+    made: dict[str, Callable[[], Prior]] = {
+        "built-in": Prior,
+        "learnt": partial(learnt_from, earlier, unit.seed, hit_delay_ms),
+        "windows known": lambda: with_known_windows(told(law), earlier),
+        "told": lambda: told(law),
+    }
     own = [(unit.name, number) for number in range(LEARNT, LEARNT + unit.people)]
     odd = [("odd", number) for number in range(unit.misfits)]
     marks = tuple(mark for mark in MARKS if mark <= unit.trials)
     rows = []
-    for label, prior in priors.items():
+    for label in unit.priors:
+        prior = made[label]()
         for name, person in own + odd:
             session = SimulatedSession(
                 "default",
@@ -164,13 +183,26 @@ def main(  # noqa: PLR0913, PLR0917 - the options of the command line
     misfits: Annotated[int, typer.Option(help="People of `odd` in each lab.")] = 5,
     trials: Annotated[int, typer.Option(help="Trials of each new session.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the first lab.")] = 100_000,
+    priors: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(PRIORS[:3]),
     stated: Annotated[bool, typer.Option("--stated", help="The labs' rigs state their hit delay.")] = False,  # noqa: FBT002 - a flag of the command line
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("lab"),
 ) -> None:
     """Measure the eleventh person of a lab."""
     seeds = range(seed, seed + 100 * labs, 100)  # people have seeds of their own
-    units = [Unit(kind, s, people, misfits, trials, stated) for kind in kinds.split(",") for s in seeds]
+    units = [
+        Unit(
+            kind,
+            s,
+            people,
+            misfits,
+            trials,
+            tuple(choice("the prior", name, PRIORS) for name in priors.split(",")),
+            stated,
+        )
+        for kind in kinds.split(",")
+        for s in seeds
+    ]
     rows = measured(examine, units, workers, out)
     write(summary(rows), facts_of("benchmarks/lab.py", seed, people), out)
 

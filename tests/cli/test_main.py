@@ -262,6 +262,7 @@ def test_resume_of_another_softwares_log_says_how(isiw: Command, tmp_path: Path)
 COMMAND = [sys.executable, "-c", "from isiw.cli import app; app()"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 def test_ctrl_c_closes_the_log_and_the_exit_code_says_so(tmp_path: Path) -> None:
     (tmp_path / "long.toml").write_text("[strategy.settings]\nmax_trials = 190\nstop_width_ms = 0.01\n")
@@ -281,6 +282,7 @@ def test_ctrl_c_closes_the_log_and_the_exit_code_says_so(tmp_path: Path) -> None
     assert len(record.table) >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 def test_a_killed_run_is_resumed_to_where_it_would_have_come(tmp_path: Path, isiw: Command) -> None:
     text = "[strategy.settings]\nmax_trials = 12\nstop_width_ms = 0.01\nstop_expected_f1 = 1.0\n"

@@ -82,6 +82,7 @@ def shares_after_nothing(seed: int) -> FloatArray:
     return learnt(people, {"x": HYPER}, {"kind": KINDS}, rng).shares["kind"]
 
 
+@pytest.mark.slow
 def test_people_of_whom_nothing_is_known_teach_nothing() -> None:
     found = [shares_after_nothing(seed) for seed in range(12)]
     assert np.mean(found, axis=0) == pytest.approx(KINDS, abs=0.06)

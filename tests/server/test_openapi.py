@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
 from benchmarks.server_tries import tried
 
 from isiw.server import Rules, make_app
@@ -18,6 +19,7 @@ def test_the_committed_description_is_todays(tmp_path: Path) -> None:
     assert json.loads(COMMITTED.read_text("utf-8")) == today, "run: python docs/write_openapi.py"
 
 
+@pytest.mark.slow
 def test_no_call_fails_the_server_or_is_answered_otherwise_than_described(tmp_path: Path) -> None:
     with client_of(tmp_path) as client:
         answers, wrong = tried(str(client.base_url), BEARER, examples=4)

@@ -28,6 +28,7 @@ def client_at(url: str) -> httpx.Client:
     return httpx.Client(base_url=url, headers=BEARER, timeout=30.0)
 
 
+@pytest.mark.slow
 def test_a_killed_server_loses_nothing_and_a_new_one_resumes_by_the_id(tmp_path: Path) -> None:
     with server(tmp_path) as (process, url), client_at(url) as client:
         session = created(client)

@@ -12,6 +12,7 @@ from benchmarks.server_tries import Served, fuzzed, killed
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="the server is a fork")
 
 
+@pytest.mark.slow
 def test_malformed_requests_neither_fail_the_server_nor_change_a_session(tmp_path: Path) -> None:
     with Served(tmp_path) as served:
         _, _, answers = fuzzed(served, 300, random.Random(1))  # noqa: S311 - no secret

@@ -28,8 +28,8 @@ from isiw.window import Window, WindowEstimate
 
 FEW: dict[str, Any] = {"particles": 100}
 NAMES = sorted(list_strategies())
-FITTED = ("parametric-", "gp-", "supra-")
-"""Strategies whose fits take seconds begin so."""
+FITTED = ("parametric-", "gp-", "supra-", "particles-")
+"""Strategies that take seconds begin so; the particle model itself is checked with the default."""
 SLOW_FITS = [pytest.param(name, marks=pytest.mark.slow) if name.startswith(FITTED) else name for name in NAMES]
 SCORING = sorted(name for name, make in ACQUISITIONS.items() if ProposesIsi not in make(0).needs)
 
