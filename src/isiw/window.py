@@ -17,6 +17,7 @@ from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
     "EDGE_LEVEL",
+    "LEAST_DEPRESSED_MV",
     "MIN_EXCESS_MV",
     "MIN_EXCESS_OF_BASELINE",
     "BestISI",
@@ -34,6 +35,9 @@ EDGE_LEVEL = 0.135
 
 MIN_EXCESS_MV = 0.002
 MIN_EXCESS_OF_BASELINE = 0.10
+
+LEAST_DEPRESSED_MV = 0.05
+"""Where the expected MEP without a tap is smaller there is none to depress: what counts as an MEP [Rossini2015]."""
 
 Interval: TypeAlias = tuple[float, float]
 

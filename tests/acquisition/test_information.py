@@ -22,8 +22,10 @@ from isiw.acquisition.information import (
     window_information,
 )
 from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
-from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesWindows, Tensor
+from isiw.models.particles import ParticleModel
+from isiw.models.protocol import Observation, Posterior, PredictsOutcomes, SamplesWindows, Tensor
 
 ROUNDING = 1e-5
 ALL = [mutual_information, window_gain, window_information]
@@ -140,6 +142,19 @@ def test_alternating_asks_for_the_window_first_and_for_all_unknowns_next(
 ) -> None:
     p = replace(some_posterior(4), trials=trials)
     torch.testing.assert_close(Alternating()(p, ISIS_MS), chosen(p, ISIS_MS))
+
+
+@pytest.mark.parametrize(("pairs", "chosen"), [(0, WindowGain()), (1, MutualInformation()), (2, WindowGain())])
+def test_alternating_takes_turns_by_pairs_also_where_each_is_followed_by_tms_alone(
+    pairs: int, chosen: AcquisitionFunction
+) -> None:
+    model = ParticleModel(particles=50)
+    posterior = model.begin(VALVE_SPACE, 1)
+    for _ in range(pairs):
+        posterior = model.update(posterior, Observation.of([100.0], [0.05]))
+        posterior = model.update(posterior, Observation.of([None], [0.02]))
+    isi_ms = torch.arange(0.0, 300.0, 50.0)
+    torch.testing.assert_close(Alternating()(posterior, isi_ms), chosen(posterior, isi_ms))
 
 
 def test_the_window_can_be_asked_for_only_where_windows_are_sampled() -> None:

@@ -73,3 +73,9 @@ def test_a_profile_is_reported_up_to_both_ends_of_the_range() -> None:
         grid = profile_grid(DesignSpace(0, high_ms))
         assert (float(grid[0]), float(grid[-1])) == (0, high_ms)
         assert (grid.diff() > 0).all()
+
+
+def test_a_profile_has_no_gaps_that_a_narrow_peak_fits_into_however_wide_the_range() -> None:
+    for space in (DesignSpace(0, 1000, 0.5), DesignSpace(0, 600), DesignSpace(0, 2100, 3)):
+        assert profile_grid(space).diff().max() <= 4.0
+    assert len(profile_grid(DesignSpace(0, 400, 10))) == 41

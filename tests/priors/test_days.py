@@ -14,6 +14,7 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.log.reader import read_session
 from isiw.models.particles.prior import Prior
+from isiw.priors.recall import recalled
 from isiw.session.resume import exclude
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.profiles import PeakProfile
@@ -119,6 +120,14 @@ def test_a_window_that_stayed_probably_did_not_move_and_one_elsewhere_did(first:
     gone = read_session(write_log(folder / "gone.mcap", person(LATE_MS), trials=18, seed=3))
     assert priors.moved(first, stayed) < 0.25
     assert priors.moved(first, gone) > 0.9
+
+
+def test_whether_a_window_moved_is_judged_with_the_hit_delay_of_the_second_day(first: Any, folder: Path) -> None:
+    path = write_log(folder / "stated.mcap", person(EARLY_MS + 60.0), trials=18, seed=3, hit_delay_ms=(180.0, 6.0))
+    later = recalled(read_session(path), priors.after(first))
+    weights = (later.swarm.log_weights.exp() * later.swarm.latents.present)[0].double()
+    elsewhere = later.model.prior.log_places(later.swarm.latents.values, later.space)[0].double().softmax(-1)[:, 0]
+    assert priors.moved(first, read_session(path)) == pytest.approx(float((weights * elsewhere).sum() / weights.sum()))
 
 
 def test_of_a_session_without_a_window_it_cannot_be_said_whether_it_moved(first: Any, folder: Path) -> None:

@@ -97,6 +97,23 @@ def test_windows_on_rigs_with_nearly_the_same_hit_delay_or_after_the_impact_are_
         assert differences(pair)[0].starts_later == 0.5
 
 
+def in_range(record: SessionRecord, low_ms: float, high_ms: float) -> SessionRecord:
+    space = replace(record.header.space, low_ms=low_ms, high_ms=high_ms)
+    return replace(record, header=record.header.model_copy(update={"space": space}))
+
+
+def test_edges_are_compared_in_the_range_that_both_sessions_have(
+    records: list[SessionRecord], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    edges_ms = {0.0: np.array([[64.0, 166.0]]), 80.0: np.array([[-np.inf, 170.0]])}
+    monkeypatch.setattr("isiw.priors.differing._edges", lambda record: edges_ms[record.header.space.low_ms])
+    pair = [in_range(records[0], 0.0, 320.0), in_range(records[1], 80.0, 320.0)]
+    assert (differences(pair)[0].starts_later, differences(pair)[0].ends_later) == (0.5, 1.0)
+    apart = differences([in_range(records[0], 0.0, 60.0), pair[1]])[0]
+    assert (apart.starts_later, apart.ends_later, apart.moved) == (None, None, None)
+    assert "0–60 and 80–320 ms, have nothing in common" in apart.obstacle
+
+
 def test_of_a_session_without_a_window_nothing_is_said_but_why(found: list[Difference]) -> None:
     assert (found[2].starts_later, found[2].ends_later, found[2].moved) == (None, None, None)
     assert "probably no window" in found[2].obstacle

@@ -257,6 +257,8 @@ def test_what_electrical_pulses_taught_is_for_electrical_pulses(logs: Any, tmp_p
     assert prior.profile.conditioning == "electrical"
     assert prior.profile.widths == ProfilePrior(conditioning="electrical").widths
     assert make_strategy(prior=prior, particles=50).estimate().probability is not None
+    width_ms = priors.compared(priors.read_lab_prior(tmp_path / "lab.toml")).loc["width [ms]"]
+    assert width_ms["built-in median"] < 40  # after an electrical pulse, not after a tap
     with pytest.raises(InvalidValueError, match="another conditioning stimulus"):
         make_strategy(prior=prior, conditioning="tap", particles=50)
     with pytest.raises(LogError, match="different conditioning stimuli"):

@@ -18,12 +18,19 @@ from isiw.errors import InvalidValueError, OutOfSpaceError, StrategyError
 from isiw.models.protocol import Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.settling import EdgeVariance
-from isiw.strategy.stopping import Budget
+from isiw.strategy.stopping import Budget, Progress, StopDecision
 from isiw.strategy.strategy import Recipe, Strategy
 from known import known
 from scripted import scripted_strategy
 
 MEPS_MV = [0.02, 0.0, 0.11, 0.05]
+
+
+class Least:
+    """A rule that says what it is told of progress."""
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        return StopDecision(stop=False, reason=f"{progress.delivered} of {progress.told}")
 
 
 def play(strategy: Strategy, meps_mv: list[float]) -> list[float]:
@@ -280,6 +287,24 @@ def test_tms_alone_does_not_settle_the_edges() -> None:
         strategy.learn(None, 0.02)
         assert not strategy.decision().stop
     assert settled_after(strategy, 1)
+
+
+def test_tms_alone_is_none_of_the_forty_pairs_from_which_on_a_small_gain_stops() -> None:
+    usual = scripted_strategy()
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, Least())
+    for _ in range(5):
+        strategy.learn(None, 0.02)
+    strategy.learn(100.0, 0.02)
+    assert strategy.decision().reason == "1 of 1"
+
+
+def test_a_design_goes_on_with_its_plan_however_often_a_trial_is_lost() -> None:
+    usual = scripted_strategy()
+    strategy = Strategy(usual.space, usual.model, IncrementalSweep(), usual.stopping)
+    planned_ms = strategy.ask()
+    for _ in range(5):
+        strategy.count_mistrial()
+    assert strategy.ask() == planned_ms
 
 
 def test_a_cost_is_taken_off_the_scores() -> None:

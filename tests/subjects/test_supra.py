@@ -12,6 +12,7 @@ from scipy import stats
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.subjects.cohorts import cohort
+from isiw.subjects.plasticity import Plasticity
 from isiw.subjects.profiles import OpposedProfile, PeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
@@ -81,6 +82,19 @@ def test_a_deficit_below_a_tenth_of_the_baseline_is_no_depression() -> None:
     shallow = replace(PEOPLE[1], profile=OpposedProfile(PeakProfile(70, 30), PeakProfile(10, 40), depth=0.02))
     assert shallow.depressed(SPACE) is None
     assert shallow.window(SPACE) is not None
+
+
+def test_where_there_is_no_mep_without_a_tap_there_is_none_to_depress() -> None:
+    person = PEOPLE[1]
+    assert person.depressed(SPACE) is not None
+    assert replace(person, scale=0.049 / person.baseline_mv).depressed(SPACE) is None
+
+
+def test_depressed_pairs_leave_excitability_as_it_is() -> None:
+    middle_ms = float(np.mean(known(PEOPLE[1].depressed(SPACE)).segments))
+    plastic, usual = (replace(PEOPLE[1], plasticity=p).begin(1) for p in (Plasticity(0.5, pairs=5), None))
+    for _ in range(50):
+        assert plastic.respond(middle_ms, "impact").mep_mv == usual.respond(middle_ms, "impact").mep_mv
 
 
 @pytest.mark.parametrize("name", ["recruitment", "gaussian", "nonresponder", "hand"])

@@ -14,7 +14,7 @@ import torch
 from isiw.acquisition.lookahead import expected_variance_reduction
 from isiw.acquisition.protocol import ForeseesWindows
 from isiw.checks import check_wholes
-from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesDepression, SamplesWindows, Tensor
+from isiw.models.protocol import CountsPairs, Posterior, PredictsOutcomes, SamplesDepression, SamplesWindows, Tensor
 
 __all__ = [
     "Alternating",
@@ -145,7 +145,7 @@ class WindowGain:
 
 @dataclass(frozen=True)
 class Alternating:
-    """The window on one trial, all unknowns on the next.
+    """The window on one pair of stimuli, all unknowns on the next.
 
     What is unknown about a person's responses costs certainty about the window later, but on no single trial enough for
     `WindowGain` to ask for it; `MutualInformation` asks for little else.
@@ -155,4 +155,5 @@ class Alternating:
 
     def __call__(self, posterior: _CountedWindows, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
-        return mutual_information(posterior, isi_ms) if posterior.trials % 2 else window_gain(posterior, isi_ms)
+        pairs = posterior.pairs if isinstance(posterior, CountsPairs) else posterior.trials
+        return mutual_information(posterior, isi_ms) if pairs % 2 else window_gain(posterior, isi_ms)

@@ -23,6 +23,7 @@ from isiw.window import Window, WindowEstimate
 
 __all__ = [
     "Conditions",
+    "CountsPairs",
     "ExpectsTheUsual",
     "HasBotorchModel",
     "HasEvidence",
@@ -101,6 +102,15 @@ class Posterior(Protocol):
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
+
+
+@runtime_checkable
+class CountsPairs(Protocol):
+    """Capability: says how many of the trials were pairs of stimuli, as acquisition functions that take turns ask."""
+
+    @property
+    def pairs(self) -> int:
+        """How many pairs of stimuli of each person; TMS alone comes to all of them together."""
 
 
 @runtime_checkable

@@ -33,7 +33,10 @@ __all__ = [
 ]
 
 PROFILE_POINTS = 101
-"""ISIs at which the expected MEP and its band are reported."""
+"""ISIs at which the expected MEP and its band are reported, at least."""
+
+PROFILE_STEP_MS = 4.0
+"""They are no further apart than this, where the space has ISIs between them: narrow peaks are 20 ms wide."""
 
 
 def least_excess_mv(peak_mv: Tensor, baseline_mv: Tensor) -> Tensor:
@@ -96,7 +99,7 @@ def edge_samples(first: Tensor, last: Tensor, space: DesignSpace) -> Tensor:
 
 def profile_grid(space: DesignSpace) -> Tensor:
     """The ISIs at which profiles are reported [ms], shape (t,)."""
-    every = max(1, len(space.grid_ms) // PROFILE_POINTS)
+    every = max(1, min(len(space.grid_ms) // PROFILE_POINTS, int(PROFILE_STEP_MS / space.step_ms)))
     return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=torch.float32)
 
 

@@ -11,6 +11,7 @@ import torch
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.models.particles.latents import LATENTS
 from isiw.models.particles.prior import Prior
+from isiw.models.particles.profile import ProfilePrior
 from isiw.priors.lab import LabPrior
 from isiw.types import FloatArray
 
@@ -73,8 +74,8 @@ def densities(lab: LabPrior) -> pd.DataFrame:
 def _drawn(lab: LabPrior) -> list[dict[str, FloatArray]]:
     """Latents of people in general and of the lab's, by name."""
     space = VALVE_SPACE if lab.place is None or lab.place.reference == "valve" else IMPACT_SPACE
-    drawn = []
-    for prior in (Prior(), lab.joined()):
+    drawn, own = [], lab.joined()
+    for prior in (Prior(ProfilePrior(conditioning=own.profile.conditioning)), own):
         latents = prior.sample(1, PEOPLE, torch.Generator().manual_seed(0), space)
         columns = latents.values[0].double().numpy().T  # noqa: PD011 - no DataFrame
         drawn.append(dict(zip(LATENTS, columns, strict=True)))

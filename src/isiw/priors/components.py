@@ -111,7 +111,7 @@ def beside(usual: tuple[Component, ...], learnt: Sequence[Component]) -> tuple[C
         usual: the components that there are.
         learnt: what stands beside them, with shares of less than 1 together.
     """
-    left = 1.0 - math.fsum(component.share for component in learnt)
+    left = max(0.0, 1.0 - math.fsum(component.share for component in learnt))  # shares of 1 may round to more
     kept: list[Component] = [replace(component, share=left * component.share) for component in usual]
     return tuple(itertools.chain(kept, learnt))
 

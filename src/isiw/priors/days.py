@@ -129,7 +129,7 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
     later = recalled(second, before)
     _require_window(second, later)
     weights = (later.swarm.log_weights.exp() * later.swarm.latents.present)[0].double()
-    anywhere = before.log_places(later.swarm.latents.values, later.space)[0].double().softmax(-1)[:, 0]
+    anywhere = later.model.prior.log_places(later.swarm.latents.values, later.space)[0].double().softmax(-1)[:, 0]
     return float((weights * anywhere).sum() / weights.sum())
 
 

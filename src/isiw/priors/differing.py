@@ -22,6 +22,8 @@ _OTHER_RIG = (
     "valve command, cannot be compared"
 )
 
+_APART = "The ranges of ISIs, {:g}–{:g} and {:g}–{:g} ms, have nothing in common, so windows cannot be compared"
+
 _Session: TypeAlias = tuple[SessionRecord, FloatArray | None]
 """A session, and samples of its window's edges [ms]."""
 
@@ -56,7 +58,8 @@ def differences(records: Sequence[SessionRecord]) -> list[Difference]:
 
     Each session's trials are told to the particle model with the built-in prior, whatever strategy had asked for them,
     so that all are judged alike. Whether one person's window moved is judged in the order of the sessions' dates.
-    Nothing is said of windows from the valve command on rigs that state hit delays further apart than one rig's.
+    Nothing is said of windows from the valve command on rigs that state hit delays further apart than one rig's, and
+    edges are compared within the range of ISIs that the sessions have in common.
 
     Args:
         records: the sessions, at least two.
@@ -93,8 +96,15 @@ def _difference(first: _Session, second: _Session) -> Difference:
         )
     if (apart_ms := too_far_apart_ms((one, other))) is not None:
         return Difference(one, other, same, obstacle=_OTHER_RIG.format(*apart_ms))
+    spaces = one.header.space, other.header.space
+    low_ms, high_ms = max(space.low_ms for space in spaces), min(space.high_ms for space in spaces)
+    if low_ms >= high_ms:
+        ranges_ms = [edge_ms for space in spaces for edge_ms in (space.low_ms, space.high_ms)]
+        return Difference(one, other, same, obstacle=_APART.format(*ranges_ms))
     probability, obstacle = _moved(one, other) if same else (None, "")
-    starts, ends = (_later(one_ms[:, edge], other_ms[:, edge]) for edge in (0, 1))
+    # An edge beyond one session's range may lie within the other's: they are compared where both looked.
+    seen_ms = one_ms.clip(low_ms, high_ms), other_ms.clip(low_ms, high_ms)
+    starts, ends = (_later(*(edges_ms[:, edge] for edges_ms in seen_ms)) for edge in (0, 1))
     return Difference(one, other, same, starts, ends, probability, obstacle)
 
 

@@ -146,8 +146,10 @@ class Course:
 
     @property
     def plans_ahead(self) -> bool:
-        """Whether the model itself proposes the ISIs, whatever an acquisition function would choose."""
-        return ProposesIsi in self.method.acquisitions[0].needs and isinstance(self.posterior, ProposesIsi)
+        """Whether the model or the design has a plan of ISIs, so that a lost one is asked again."""
+        first = self.method.acquisitions[0]
+        proposes = ProposesIsi in first.needs and isinstance(self.posterior, ProposesIsi)
+        return proposes or isinstance(first, FollowsPlan)
 
     @cached_property
     def planned(self) -> tuple[Choice, ...] | None:
@@ -198,5 +200,5 @@ class Course:
         """
         past = tuple(belief.estimate(person) for belief in self.past)
         estimate = replace(self.estimate(person), silent=silent)
-        progress = Progress(self.paired_trials + mistrials, self.told, estimate, past=past)
+        progress = Progress(self.paired_trials + mistrials, self.paired_trials, estimate, past=past)
         return self.method.stopping(progress)

@@ -42,8 +42,8 @@ class Progress:
     """How far a session has come.
 
     Args:
-        delivered: stimuli delivered so far; mistrials count.
-        told: trials told so far.
+        delivered: pairs of stimuli delivered so far; mistrials count.
+        told: pairs told so far.
         estimate: what is believed about the window now.
         past: the estimates after each of the last few pairs told, as many as `looks_back(rule)`; the first is the one
             after the last of the initial ISIs.

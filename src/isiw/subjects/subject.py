@@ -18,7 +18,7 @@ from isiw.subjects.plasticity import Plasticity
 from isiw.subjects.profiles import OpposedProfile, Profile
 from isiw.subjects.responses import RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.types import Conditioning, FloatArray, Reference
-from isiw.window import Window, window_from_excess
+from isiw.window import LEAST_DEPRESSED_MV, Window, window_from_excess
 
 __all__ = ["OUTLIERS_MV", "Drift", "Responder", "Response", "SimulatedSubject"]
 
@@ -129,6 +129,8 @@ class SimulatedSubject:
 
     def depressed(self, space: DesignSpace) -> Window | None:
         """The true ISIs that depress the MEP: the window's rule for the deficit; None where there are none."""
+        if self.baseline_mv < LEAST_DEPRESSED_MV:
+            return None
         return window_from_excess(space.grid_ms, self.baseline_mv - self.expected_mep_mv(space), self.baseline_mv)
 
     def begin(self, seed: int) -> Responder:
@@ -167,7 +169,7 @@ class Responder:
         choice("the reference", reference, get_args(Reference))
         noise = self._next_noise()
         told_ms, facilitation = (None, 0.0) if isi_ms is None else self._stimulate(isi_ms, reference)
-        self._dose += facilitation
+        self._dose += max(0.0, facilitation)
         subject, rng = self.subject, self._rng
         floor_mv = subject.response.floor.median_mv * np.exp(subject.response.floor.log_sd * rng.standard_normal())
         mep_mv = subject.response.sample_evoked_mv(facilitation, noise, rng) + floor_mv

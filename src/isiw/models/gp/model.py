@@ -156,6 +156,11 @@ class GaussianProcessPosterior:
         return self.told.trials
 
     @property
+    def pairs(self) -> int:
+        """How many of them were pairs of stimuli; see `CountsPairs`."""
+        return int((~np.isnan(self.told.isi_ms[0])).sum())
+
+    @property
     def people(self) -> int:
         """How many people there are."""
         return self.told.people

@@ -233,6 +233,11 @@ class ParametricPosterior:
         """How many trials of each person it has been told."""
         return self.history.isi_ms.shape[-1]
 
+    @property
+    def pairs(self) -> int:
+        """How many of them were pairs of stimuli; see `CountsPairs`."""
+        return int((~self.history.isi_ms[0].isnan()).sum())
+
     @cached_property
     def sample(self) -> WindowSample:
         """What the samples mean."""

@@ -85,6 +85,11 @@ class SwarmPosterior(ABC, Generic[M, L]):
         return self.swarm.trials
 
     @property
+    def pairs(self) -> int:
+        """How many of them were pairs of stimuli; see `CountsPairs`."""
+        return int((~self.swarm.history.isi_ms[0].isnan()).sum())
+
+    @property
     def trouble(self) -> str | None:
         """What is wrong with the particles; see `ReportsTrouble`."""
         return self.swarm.trouble

@@ -15,11 +15,9 @@ from isiw.models.particles.prior import Person
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, interpolated
 from isiw.models.windows import least_excess_mv
+from isiw.window import LEAST_DEPRESSED_MV
 
 __all__ = ["SupraSample"]
-
-LEAST_BASELINE_MV = 0.05
-"""Where the expected MEP without a tap is smaller there is none to depress: what counts as an MEP [Rossini2015]."""
 
 MOST_RANGE_POINTS = 241
 """ISIs at which the largest enhancement and the deepest depression in the range are looked for, at most."""
@@ -97,7 +95,7 @@ class SupraSample:
     def depressed_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled depressed segments as 0 or 1, by the window's rule for the deficit, shape (b, s, t)."""
         masks = self._masks(self._baseline_mv - self.expected_mep_mv(isi_ms), self._extremes_mv[1])
-        return masks * (self._baseline_mv >= LEAST_BASELINE_MV)
+        return masks * (self._baseline_mv >= LEAST_DEPRESSED_MV)
 
     def _masks(self, excess_mv: Tensor, largest_mv: Tensor) -> Tensor:
         return (excess_mv >= least_excess_mv(largest_mv, self._baseline_mv)).to(excess_mv.dtype)
