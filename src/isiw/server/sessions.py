@@ -114,9 +114,10 @@ class Sessions:
             Refusal: there is no such session.
             IsiwError: its log cannot be read or written, or its strategy not made again.
         """
-        with suppress(_NotOpenError), self._driving_if_open(name) as session:
-            session.give_up()
-            return session.stands()
+        if self._is_open(name):
+            with self.driving(name) as session:
+                session.give_up()
+                return session.stands()
         with self._opened_as(name):
             return self._resume(name, read_session(self._existing(name)), lost_pulses)
 
@@ -132,10 +133,11 @@ class Sessions:
             Refusal: there is no such session, or it is busy.
             IsiwError: its log cannot be closed, or, after a server was killed, not gone on with.
         """
-        if name not in self._open and part_of(self._existing(name)).exists():
+        if not self._is_open(name) and part_of(self._existing(name)).exists():
             self.resume(name)
-        with suppress(_NotOpenError), self._driving_if_open(name) as session:
-            return session.close()
+        if self._is_open(name):
+            with self.driving(name) as session:
+                return session.close()
         return self.stands(name)
 
     def close_all(self) -> None:
@@ -150,8 +152,9 @@ class Sessions:
         Args:
             name: its id.
         """
-        with suppress(_NotOpenError), self._driving_if_open(name) as session:
-            return session.stands()
+        if self._is_open(name):
+            with self.driving(name) as session:
+                return session.stands()
         record = self.record(name)
         decision, unknown = record.decision, record.unknown
         return SessionAnswer(
@@ -172,8 +175,9 @@ class Sessions:
         Args:
             name: its id.
         """
-        with suppress(_NotOpenError), self._driving_if_open(name) as session:
-            return session.trials()
+        if self._is_open(name):
+            with self.driving(name) as session:
+                return session.trials()
         return [TrialRow.of(trial) for trial in self.record(name).table]
 
     def estimate(self, name: str) -> EstimateAnswer:
@@ -185,8 +189,9 @@ class Sessions:
         Raises:
             Refusal: it is not open, and nothing was told.
         """
-        with suppress(_NotOpenError), self._driving_if_open(name) as session:
-            return session.estimate()
+        if self._is_open(name):
+            with self.driving(name) as session:
+                return session.estimate()
         record = self.record(name)
         if not record.estimates:
             raise not_open(name)
@@ -209,14 +214,9 @@ class Sessions:
         """
         return read_session(self._existing(name))
 
-    @contextmanager
-    def _driving_if_open(self, name: str) -> Iterator[DrivenSession]:
+    def _is_open(self, name: str) -> bool:
         with self._lock:
-            is_open = name in self._open
-        if not is_open:
-            raise _NotOpenError
-        with self.driving(name) as session:
-            yield session
+            return name in self._open
 
     @contextmanager
     def _opened_as(self, name: str) -> Iterator[None]:
@@ -303,10 +303,6 @@ class Sessions:
         if not (path.is_file() or part_of(path).is_file()):
             raise Refusal(404, "NoSuchSession", "there is no such session", got=name, remedy="Create it first.")
         return path
-
-
-class _NotOpenError(Exception):
-    """The session is not open."""
 
 
 def _kept(request: CreateRequest) -> str:
