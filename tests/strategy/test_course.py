@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 
-from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep, RandomIsi
+from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.models.dissertation.bootstrap import BootstrapPosterior
 from isiw.models.particles import ParticlePosterior
@@ -23,7 +23,7 @@ from known import instance
 def course(name: str, people: int = 3, **changes: Any) -> Course:
     settings: dict[str, Any] = {"particles": 4} if name == "pf" else {}
     strategy = make_strategy(name, **settings)
-    method = Method(strategy.space, strategy.model, (strategy.acquisition,), strategy.stopping)
+    method = Method(strategy.space, strategy.model, strategy.acquisition, strategy.stopping)
     return replace(method, **changes).begin(0, people)
 
 
@@ -37,13 +37,13 @@ def test_initial_isis_come_before_a_methods_own_plan_and_that_before_scores() ->
     planned = told(first)
     wanted_ms = instance(BootstrapPosterior, planned.posterior).proposed_isis_ms()[:, 0].tolist()
     assert [choice.isi_ms for choice in planned.choices] == wanted_ms
-    scored = course("pf", acquisitions=(EvenSpacing(),))
+    scored = course("pf", acquisition=EvenSpacing())
     assert scored.planned is None
     assert scored.choices == (Choice(evenly_spaced(VALVE_SPACE, 0)),) * 3
 
 
 def test_a_sweep_is_asked_on_the_grid_of_the_space_and_tms_alone_is_none_of_its_pairs() -> None:
-    going = course("nr", people=2, space=IMPACT_SPACE, acquisitions=(IncrementalSweep(trials_per_isi=2),))
+    going = course("nr", people=2, space=IMPACT_SPACE, acquisition=IncrementalSweep(trials_per_isi=2))
     asked_ms: list[float] = []
     for trial in range(12):
         if trial % 3 == 2:
@@ -62,13 +62,6 @@ def test_tms_alone_uses_up_no_initial_isi() -> None:
     assert told(told(first, None)).choices == (Choice(9.0),)
 
 
-def test_where_the_acquisition_function_draws_each_person_has_one_of_their_own() -> None:
-    several = course("even", acquisitions=tuple(RandomIsi(seed) for seed in range(3)))
-    alone = [course("even", 1, acquisitions=(RandomIsi(seed),)).choices[0] for seed in range(3)]
-    assert list(several.choices) == alone
-    assert len(set(alone)) > 1
-
-
 def test_isis_are_chosen_as_usual_and_windows_estimated_as_believed() -> None:
     scored = list[Posterior]()
 
@@ -77,7 +70,7 @@ def test_isis_are_chosen_as_usual_and_windows_estimated_as_believed() -> None:
             scored.append(posterior)
             return super().__call__(posterior, isi_ms)
 
-    going = told(course("default", people=1, acquisitions=(Recording(),)))
+    going = told(course("default", people=1, acquisition=Recording()))
     assert going.choices
     posterior = instance(ParticlePosterior, going.posterior)
     assert scored == [posterior.as_usual]

@@ -27,7 +27,7 @@ class Method:
     Args:
         space: the ISIs that may be asked.
         model: the model of a person's responses.
-        acquisitions: what scores candidate ISIs: one for all people, or one a person where they draw.
+        acquisition: what scores candidate ISIs.
         stopping: the rule that says when to stop.
         initial_ms: ISIs to ask for first [ms], on the grid, whatever the responses.
         cost: is taken off the scores.
@@ -35,7 +35,7 @@ class Method:
 
     space: DesignSpace
     model: ResponseModel
-    acquisitions: tuple[AcquisitionFunction, ...]
+    acquisition: AcquisitionFunction
     stopping: StoppingRule
     initial_ms: tuple[float, ...] = ()
     cost: Cost | None = None
@@ -138,26 +138,26 @@ class Course:
         Args:
             n: how many are wanted.
         """
-        first, space, left = self.method.acquisitions[0], self.method.space, self.initial_left
-        if isinstance(first, FollowsPlan):
+        acquisition, space, left = self.method.acquisition, self.method.space, self.initial_left
+        if isinstance(acquisition, FollowsPlan):
             pairs = range(self.paired_trials + len(left), self.paired_trials + n)
-            return [*left, *(first.planned_isi_ms(space, pair) for pair in pairs)]
-        return [*left, *map(space.snap, own_plan(self.posterior, first))]
+            return [*left, *(acquisition.planned_isi_ms(space, pair) for pair in pairs)]
+        return [*left, *map(space.snap, own_plan(self.posterior, acquisition))]
 
     @property
     def plans_ahead(self) -> bool:
         """Whether the model or the design has a plan of ISIs, so that a lost one is asked again."""
-        first = self.method.acquisitions[0]
-        proposes = ProposesIsi in first.needs and isinstance(self.posterior, ProposesIsi)
-        return proposes or isinstance(first, FollowsPlan)
+        acquisition = self.method.acquisition
+        proposes = ProposesIsi in acquisition.needs and isinstance(self.posterior, ProposesIsi)
+        return proposes or isinstance(acquisition, FollowsPlan)
 
     @cached_property
     def planned(self) -> tuple[Choice, ...] | None:
         """What is asked of each person where that stands already; None where the acquisition function chooses."""
         if self.initial_left:
             return (Choice(self.initial_left[0], by="initial"),) * self.people
-        if isinstance(first := self.method.acquisitions[0], FollowsPlan):
-            isi_ms = first.planned_isi_ms(self.method.space, self.paired_trials)
+        if isinstance(acquisition := self.method.acquisition, FollowsPlan):
+            isi_ms = acquisition.planned_isi_ms(self.method.space, self.paired_trials)
             return (Choice(isi_ms, by="plan"),) * self.people
         if self.plans_ahead and isinstance(self.posterior, ProposesIsi):
             wanted_ms = self.posterior.proposed_isis_ms()[:, 0].tolist()
@@ -177,13 +177,9 @@ class Course:
         """
         if isinstance(posterior, ExpectsTheUsual):
             posterior = posterior.as_usual
-        first, *others = self.method.acquisitions
-        best = self._best(posterior, first)
-        return best if not others else (best[0], *(self._best(posterior, a)[1 + i] for i, a in enumerate(others)))
-
-    def _best(self, posterior: Posterior, acquisition: AcquisitionFunction) -> tuple[Choice, ...]:
+        method = self.method
         return best_choices(
-            posterior, acquisition, self.method.space, told=self.told, people=self.people, cost=self.method.cost
+            posterior, method.acquisition, method.space, told=self.told, people=self.people, cost=method.cost
         )
 
     def estimate(self, person: int = 0) -> WindowEstimate:

@@ -94,7 +94,7 @@ class Strategy:
         self.initial_ms = tuple(space.snap(isi_ms) for isi_ms in initial_ms)
         self.recipe = recipe or Recipe(name="", seed=seed)
         self.cost, self.seed = cost, seed
-        self._course = Method(space, model, (acquisition,), stopping, self.initial_ms, cost).begin(seed)
+        self._course = Method(space, model, acquisition, stopping, self.initial_ms, cost).begin(seed)
         missing = [c.__name__ for c in acquisition.needs if not isinstance(self.posterior, c)]
         if missing:
             raise StrategyError(

@@ -7,14 +7,15 @@ Models hold b people at once, on a CPU or a GPU. Each person's session follows t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import is_dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from typing import Any
 
 import pandas as pd
 import torch
 
+from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.errors import StudyError
-from isiw.models.protocol import Observation, ReportsTrouble, ResponseModel
+from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel, Tensor
 from isiw.strategy.choosing import Choice
 from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision
@@ -47,10 +48,8 @@ class _Batch:
             )
         players = [session.player() for session in sessions]
         first = players[0]
-        drawing = any(player.acquisition != first.acquisition for player in players)
-        acquisitions = tuple(player.acquisition for player in players) if drawing else (first.acquisition,)
-        model = _on_device(first.model, device)
-        method = Method(first.space, model, acquisitions, first.stopping, first.initial_ms, first.cost)
+        acquisition, model = _together([player.acquisition for player in players]), _on_device(first.model, device)
+        method = Method(first.space, model, acquisition, first.stopping, first.initial_ms, first.cost)
         self.stopping = first.stopping
         self.course = method.begin(first.seed, len(players))
         self.mistrials = [0] * len(players)
@@ -77,6 +76,26 @@ class _Batch:
         posterior = self.course.posterior
         failed = isinstance(posterior, ReportsTrouble) and posterior.trouble is not None
         return None if failed and self.course.people > 1 else failed
+
+
+@dataclass(frozen=True)
+class _EachTheirOwn:
+    """Acquisition functions that draw: one a person, with a seed of their own."""
+
+    functions: Sequence[AcquisitionFunction]
+
+    @property
+    def needs(self) -> tuple[type, ...]:
+        return self.functions[0].needs
+
+    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+        scores = (score(posterior, isi_ms).expand(len(self.functions), -1) for score in self.functions)
+        return torch.stack([of_all[person] for person, of_all in enumerate(scores)])
+
+
+def _together(functions: Sequence[AcquisitionFunction]) -> AcquisitionFunction:
+    """The acquisition function of a batch."""
+    return functions[0] if all(function == functions[0] for function in functions) else _EachTheirOwn(functions)
 
 
 def _on_device(model: ResponseModel, device: str) -> Any:
