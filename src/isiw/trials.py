@@ -53,6 +53,11 @@ class MistrialReason(StrEnum):
     REJECTED = "rejected"
     OUTCOME_UNKNOWN = "outcome unknown"
 
+    @classmethod
+    def of(cls, text: str) -> MistrialReason:
+        """The reason of these words; `REJECTED` where the list has none."""
+        return next((reason for reason in cls if reason == text), cls.REJECTED)
+
 
 @dataclass(frozen=True)
 class Stimulus:

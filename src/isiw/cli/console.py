@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,6 +24,7 @@ __all__ = [
     "Overwrite",
     "counted",
     "errors_reported",
+    "exit_if_damaged",
     "refuse_ignored",
     "show",
     "show_entry",
@@ -58,6 +59,21 @@ def show_entry(heading: str, text: str) -> None:
     """
     show(heading, style="bold")
     Console(highlight=False).print(Padding(Text(text), (0, 0, 0, 4)))
+
+
+def exit_if_damaged(losses: Sequence[str]) -> None:
+    """Print what is lost of a log and end with the exit code of damaged ones; nothing where all is there.
+
+    Args:
+        losses: what is lost.
+
+    Raises:
+        Exit: something is.
+    """
+    for loss in losses:
+        show(loss, style="red")
+    if losses:
+        raise typer.Exit(DAMAGED)
 
 
 @contextmanager

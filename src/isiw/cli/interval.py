@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import isiw
-from isiw.cli.console import DAMAGED, NO_DEFAULT, errors_reported, refuse_ignored, show
+from isiw.cli.console import NO_DEFAULT, errors_reported, exit_if_damaged, refuse_ignored, show
 
 if TYPE_CHECKING:
     from isiw.interval import ProductionRecord
@@ -72,7 +72,4 @@ def _say(record: ProductionRecord) -> None:
     show(f"{header.subject or 'An unnamed subject'}, {header.created}", style="bold")
     show(record.table.to_string(index=False, float_format=lambda value: f"{value:.4g}") if len(record.table) else "")
     show(f"{len(record.productions)} trials, {len(record.left)} left. log: {record.path}")
-    for loss in record.losses:
-        show(loss, style="red")
-    if record.losses:
-        raise typer.Exit(DAMAGED)
+    exit_if_damaged(record.losses)

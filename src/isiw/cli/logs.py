@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 import isiw
-from isiw.cli.console import DAMAGED, NO_DEFAULT, Overwrite, counted, errors_reported, show
+from isiw.cli.console import NO_DEFAULT, Overwrite, counted, errors_reported, exit_if_damaged, show
 
 __all__ = ["app"]
 
@@ -35,10 +35,7 @@ def export(
             show("Who is who is kept nowhere else.")
         what = f"{counted(exported.sessions, 'session')} with {counted(exported.trials, 'trial')}"
         show(f"{what}: {exported.folder}", style="bold")
-        for loss in exported.lacking:
-            show(loss, style="red")
-        if exported.lacking:
-            raise typer.Exit(DAMAGED)
+        exit_if_damaged(exported.lacking)
 
 
 @app.command()
@@ -61,7 +58,4 @@ def compare(
         elif output is not None:
             show(f"picture: {isiw.plots.save_comparison_plot(records, output, overwrite=overwrite)}")
         losses = [f"{record.path.name}: {loss}" for record in records for loss in record.losses]
-        for loss in losses:
-            show(loss, style="red")
-        if losses:
-            raise typer.Exit(DAMAGED)
+        exit_if_damaged(losses)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +14,7 @@ import typer
 
 import isiw
 from isiw.cli import interval, logs, prior, serve, study, threshold
-from isiw.cli.console import DAMAGED, NO_DEFAULT, NOT_OVER, Overwrite, errors_reported, show, show_entry
+from isiw.cli.console import NO_DEFAULT, NOT_OVER, Overwrite, errors_reported, exit_if_damaged, show, show_entry
 
 if TYPE_CHECKING:
     from isiw.repeatability import TimingStudy
@@ -189,7 +189,7 @@ def show_log(log: Log) -> None:
         for event in record.events:
             show(f"{event.kind} (trial {event.trial}): {event.text}")
         show(isiw.report.final_statement(record), style="bold")
-        _exit_if_damaged(record.losses)
+        exit_if_damaged(record.losses)
 
 
 @app.command()
@@ -209,7 +209,7 @@ def plot(
         truth = isiw.config.true_window(record)
         target = output or _free_beside(record.path, ".png")
         show(f"picture: {isiw.plots.save_session_plot(record, target, truth=truth, overwrite=overwrite)}")
-        _exit_if_damaged(record.losses)
+        exit_if_damaged(record.losses)
 
 
 @app.command()
@@ -226,7 +226,7 @@ def report(
         truth = isiw.config.true_window(record)
         target = output or _free_beside(record.path, ".html")
         show(f"report: {isiw.report.save_report(record, target, truth=truth, overwrite=overwrite)}")
-        _exit_if_damaged(record.losses)
+        exit_if_damaged(record.losses)
 
 
 @app.command()
@@ -365,10 +365,3 @@ def _free_beside(log: Path, suffix: str) -> Path:
     stem = Path(log.name.removesuffix(".part")).stem
     names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
     return next(path for path in (log.with_name(f"{name}{suffix}") for name in names) if not path.exists())
-
-
-def _exit_if_damaged(losses: Sequence[str]) -> None:
-    for loss in losses:
-        show(loss, style="red")
-    if losses:
-        raise typer.Exit(DAMAGED)

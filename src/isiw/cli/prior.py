@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 import isiw
-from isiw.cli.console import DAMAGED, NO_DEFAULT, Overwrite, counted, errors_reported, show
+from isiw.cli.console import NO_DEFAULT, Overwrite, counted, errors_reported, exit_if_damaged, show
 from isiw.log.outputs import check_output
 
 if TYPE_CHECKING:
@@ -49,10 +49,7 @@ def learn(
         isiw.priors.write_lab_prior(lab, output, overwrite=overwrite)
         _print(lab)
         show(f"prior: {output}\nRun a session with it: isiw run --prior {shlex.quote(str(output))}")
-        for loss in losses:
-            show(loss, style="red")
-        if losses:
-            raise typer.Exit(DAMAGED)
+        exit_if_damaged(losses)
 
 
 @app.command("show")

@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 import isiw
-from isiw.cli.console import DAMAGED, NO_DEFAULT, counted, errors_reported, refuse_ignored, show
+from isiw.cli.console import NO_DEFAULT, counted, errors_reported, exit_if_damaged, refuse_ignored, show
 
 if TYPE_CHECKING:
     from isiw.session import ThresholdRecorder
@@ -130,7 +130,4 @@ def _say_what_is_there(log: Path) -> None:
     if person is not None:
         show(f"The simulated person's true threshold is {person.rmt_pct_mso:.1f} % MSO.")
     show(f"{counted(given, 'pulse')}, learnt from {len(search.pulses)}. Log: {record.path}")
-    for loss in record.losses:
-        show(loss, style="red")
-    if record.losses:
-        raise typer.Exit(DAMAGED)
+    exit_if_damaged(record.losses)

@@ -187,7 +187,7 @@ class DrivenSession:
             Refusal: the trial has another outcome, or was not asked for.
         """
         if request.trial in self._outcomes:
-            return self._known(request.trial, (_reason(request.reason),), f"mistrial, {request.reason}")
+            return self._known(request.trial, (MistrialReason.of(request.reason),), f"mistrial, {request.reason}")
         self._require_next(request.trial, asked=True)
         self.recorder.mistrial(request.reason)
         return self._concluded()
@@ -299,11 +299,6 @@ def _recorded(trial: Trial) -> tuple[object, ...]:
     if trial.status is Status.MISTRIAL:
         return (trial.reason,)
     return trial.isi_ms, trial.mep_mv, trial.isi_sd_ms, trial.background_rms_uv
-
-
-def _reason(text: str) -> MistrialReason:
-    """The reason under which a mistrial is recorded."""
-    return next((each for each in MistrialReason if each == text), MistrialReason.REJECTED)
 
 
 def _in_words(trial: Trial) -> str:

@@ -201,7 +201,7 @@ class Recorder(Judging):
         Warns:
             ImplausibleDataWarning: as many mistrials in a row as pause a session.
         """
-        known = next((each for each in MistrialReason if each == reason), MistrialReason.REJECTED)
+        known = MistrialReason.of(reason)
         with self._lock:
             self._catch_up()
             asked = self._require_asked()
