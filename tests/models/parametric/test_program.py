@@ -30,8 +30,8 @@ TRIALS = History(
 """Amplitudes, TMS alone, an uncertain ISI, an amplitude below the detection limit, and a response that was seen."""
 
 
-def program(likelihood: Likelihood) -> WindowProgram:
-    return WindowProgram(WindowPrior(), likelihood, VALVE_SPACE)
+def program(likelihood: Likelihood, *, present: bool = True) -> WindowProgram:
+    return WindowProgram(WindowPrior(), likelihood, VALVE_SPACE, present=present)
 
 
 def latents(of: WindowProgram, n: int = 4) -> torch.Tensor:
@@ -41,12 +41,12 @@ def latents(of: WindowProgram, n: int = 4) -> torch.Tensor:
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 @pytest.mark.parametrize("present", [True, False])
 def test_the_fast_density_is_what_the_trace_of_the_program_sums_to(likelihood: Likelihood, *, present: bool) -> None:
-    model = program(likelihood)
+    model = program(likelihood, present=present)
     some = latents(model)
-    fast = model.log_density(some, TRIALS, present=present)
+    fast = model.log_density(some, TRIALS)
     for one, expected in zip(some, fast, strict=True):
         conditioned = pyro.poutine.condition(model, data={"latents": one})
-        trace = pyro.poutine.trace(conditioned).get_trace(TRIALS, present=present)
+        trace = pyro.poutine.trace(conditioned).get_trace(TRIALS)
         torch.testing.assert_close(trace.log_prob_sum(), expected)
 
 
@@ -66,20 +66,20 @@ def test_an_uncertain_isi_is_integrated_out() -> None:
 
 
 def test_without_a_window_the_isi_does_not_matter() -> None:
-    model = program("gamma")
+    model = program("gamma").without_window()
     elsewhere = History(TRIALS.isi_ms + 100.0, *TRIALS.columns[1:])
     some = latents(model)
-    here, there = (model.log_density(some, trials, present=False) for trials in (TRIALS, elsewhere))
+    here, there = (model.log_density(some, trials) for trials in (TRIALS, elsewhere))
     assert torch.equal(here, there)
 
 
-def test_the_program_draws_meps_of_its_own_where_none_are_told() -> None:
+def test_the_program_draws_meps_of_its_own_where_those_told_are_set_aside() -> None:
     pyro.set_rng_seed(1)
     model = program("log-normal")
     latent = torch.zeros(model.latents, dtype=torch.double)
     trials = History(*(torch.full((1, 4000), value, dtype=torch.double) for value in (250.0, 0.0, 0.0, 0.0, 0.0)))
-    conditioned = pyro.poutine.condition(model, data={"latents": latent})
-    trace = pyro.poutine.trace(conditioned).get_trace(trials, told=False)
+    conditioned = pyro.poutine.condition(pyro.poutine.uncondition(model), data={"latents": latent})
+    trace = pyro.poutine.trace(conditioned).get_trace(trials)
     drawn = known(trace.nodes["log_mep"]["value"])
     assert drawn.shape == (4000, 2)
     assert torch.equal(drawn[:, 0], drawn[:, 1])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final
 
 import pyro
@@ -85,53 +85,55 @@ class WindowProgram:
         prior: the prior over people.
         likelihood: the likelihood.
         space: the design space.
+        present: whether there is a window at all.
     """
 
     prior: WindowPrior
     likelihood: Likelihood
     space: DesignSpace
+    present: bool = True
 
     @property
     def latents(self) -> int:
         """How many latents there are."""
         return len(latent_names(self.likelihood))
 
-    def __call__(self, trials: History, *, present: bool = True, told: bool = True) -> Unknowns:
+    def without_window(self) -> WindowProgram:
+        """The model of the same person, given that there is no window."""
+        return replace(self, present=False)
+
+    def __call__(self, trials: History) -> Unknowns:
         """Run the program.
 
         Args:
-            trials: of one person, columns of shape (1, n).
-            present: whether there is a window at all.
-            told: whether the MEPs are those of the trials, or are to be drawn.
+            trials: of one person, columns of shape (1, n); their MEPs are observed.
         """
         latents = pyro.sample("latents", self._latents())
         unknowns = self.unknowns(latents)
         for name in ("start_ms", "width_ms", "baseline_mv", "amplitude_mv"):
             pyro.deterministic(name, getattr(unknowns, name))
         with pyro.plate("trials", trials.isi_ms.shape[-1]):
-            pyro.sample("log_mep", self._meps(unknowns, trials, present=present), obs=_ends(trials) if told else None)
+            pyro.sample("log_mep", self._meps(unknowns, trials), obs=_ends(trials))
         return unknowns
 
-    def log_density(self, latents: Tensor, trials: History, *, present: bool = True) -> Tensor:
+    def log_density(self, latents: Tensor, trials: History) -> Tensor:
         """What the trace of the program sums to for each of many latents (m, d), shape (m,).
 
         Args:
             latents: the latents, shape (m, d).
             trials: of one person.
-            present: whether there is a window.
         """
         prior: Tensor = self._latents().log_prob(latents)
-        return prior + self.log_likelihood(latents, trials, present=present)
+        return prior + self.log_likelihood(latents, trials)
 
-    def log_likelihood(self, latents: Tensor, trials: History, *, present: bool = True) -> Tensor:
+    def log_likelihood(self, latents: Tensor, trials: History) -> Tensor:
         """Log likelihood of the trials under each of many latents (m, d), shape (m,).
 
         Args:
             latents: the latents, shape (m, d).
             trials: of one person.
-            present: whether there is a window.
         """
-        return self._meps(self.unknowns(latents), trials, present=present).log_prob(_ends(trials)).sum(-1)
+        return self._meps(self.unknowns(latents), trials).log_prob(_ends(trials)).sum(-1)
 
     def unknowns(self, latents: Tensor) -> Unknowns:
         """What latents (..., d) mean."""
@@ -140,8 +142,8 @@ class WindowProgram:
     def _latents(self) -> Independent:
         return Independent(Normal(torch.zeros(self.latents, dtype=torch.double), 1.0), 1)
 
-    def _meps(self, unknowns: Unknowns, trials: History, *, present: bool) -> MepLaw:
-        return MepLaw(unknowns, trials.isi_ms[0], trials.isi_sd_ms[0], self.likelihood, present=present)
+    def _meps(self, unknowns: Unknowns, trials: History) -> MepLaw:
+        return MepLaw(unknowns, trials.isi_ms[0], trials.isi_sd_ms[0], self.likelihood, present=self.present)
 
 
 def _ends(trials: History) -> Tensor:
@@ -151,7 +153,7 @@ def _ends(trials: History) -> Tensor:
 def nuts_sample(
     program: WindowProgram, trials: History, starts: Tensor, draws: int, warmup: int, generator: torch.Generator
 ) -> Tensor:
-    """Draw from the posterior, given that there is a window, by the no-U-turn sampler: slow, for reference.
+    """Draw from the posterior of a program by the no-U-turn sampler: slow, for reference.
 
     Args:
         program: the model.

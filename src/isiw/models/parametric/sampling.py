@@ -79,21 +79,19 @@ def sample_person(
     """Draw from the posterior of one person.
 
     Args:
-        program: the model.
+        program: the model, with a window.
         trials: columns of shape (1, n).
         samples: how many draws.
         effort: how much work the importance sample with a window is worth.
         generator: source of randomness.
         chains: where the draws with a window come from Pyro's no-U-turn sampler; None to keep those of the sample.
     """
-
-    def log_density(latents: Tensor, present: bool) -> Tensor:  # noqa: FBT001 - the one thing the two models differ in
-        return program.log_density(latents, trials, present=present)
-
     everywhere = Mixture.prior(program.latents)
-    without = importance_sample(partial(log_density, present=False), everywhere, generator, WITHOUT_WINDOW)
+    log_density = partial(program.log_density, trials=trials)
+    log_density_without = partial(program.without_window().log_density, trials=trials)
+    without = importance_sample(log_density_without, everywhere, generator, WITHOUT_WINDOW)
     # Without a window its place and size are as in the prior, and the floor is already known: good scouts.
-    with_ = importance_sample(partial(log_density, present=True), Mixture.at(without.modes), generator, effort)
+    with_ = importance_sample(log_density, Mixture.at(without.modes), generator, effort)
     models = (with_, without)
     prior = torch.tensor([program.prior.p_window, 1.0 - program.prior.p_window], dtype=torch.double)
     log_joint = torch.tensor([model.log_evidence for model in models], dtype=torch.double) + prior.log()
