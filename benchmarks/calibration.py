@@ -38,7 +38,7 @@ from rich.progress import track
 import isiw
 from isiw.metrics import covers, edge_ranks, f1
 from isiw.models.parametric import ParametricModel
-from isiw.models.protocol import Observation, Posterior, ResponseModel, SimulatedPerson
+from isiw.models.protocol import Observation, Posterior, PriorPerson, ResponseModel
 from isiw.studies import paired_sessions, run_study
 
 SPACE = isiw.VALVE_SPACE
@@ -82,7 +82,7 @@ def _after(model: ResponseModel, posterior: Posterior, told: Sequence[Observatio
 
 
 def _judged(
-    posterior: Posterior, people: Sequence[SimulatedPerson], seeds: Sequence[int]
+    posterior: Posterior, people: Sequence[PriorPerson], seeds: Sequence[int]
 ) -> Iterator[dict[str, float | None]]:
     """What was expected and what was; ranks and coverage of the edges, which people without a window do not have."""
     for number, (person, seed) in enumerate(zip(people, seeds, strict=True)):

@@ -31,13 +31,13 @@ __all__ = [
     "Posterior",
     "PredictsMeps",
     "PredictsOutcomes",
+    "PriorPerson",
     "ProposesIsi",
     "ReportsTrouble",
     "ResponseModel",
     "SamplesDepression",
     "SamplesProfiles",
     "SamplesWindows",
-    "SimulatedPerson",
     "SimulatesPeople",
     "Tensor",
 ]
@@ -257,7 +257,7 @@ class ResponseModel(Protocol):
         """
 
 
-class SimulatedPerson(NamedTuple):
+class PriorPerson(NamedTuple):
     """A person drawn from a model's prior.
 
     Args:
@@ -273,7 +273,7 @@ class SimulatedPerson(NamedTuple):
 class SimulatesPeople(Protocol):
     """Capability of a model: people of its own, for whom it must be calibrated."""
 
-    def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
+    def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> PriorPerson:
         """Draw one person from the prior, and an MEP at each ISI exactly as the likelihood says.
 
         Args:

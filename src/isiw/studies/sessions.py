@@ -27,7 +27,7 @@ from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import Response, SimulatedSubject
 from isiw.window import Window, WindowEstimate
 
-__all__ = ["TIMES", "Crowd", "Judgement", "Player", "SimulatedSession", "Stopping", "examine", "play", "simulate"]
+__all__ = ["TIMES", "Crowd", "Player", "Reported", "SimulatedSession", "Stopping", "examine", "play", "simulate"]
 
 TIMES = ("ask_ms", "tell_ms")
 """Columns that differ each time a session is run."""
@@ -37,7 +37,7 @@ _OF_THE_STOP = ("f1", "start_covered", "end_covered")
 _MOST_DELIVERIES = 1000
 
 Stopping: TypeAlias = Literal["ignored", "noted", "ends"]
-Judgement: TypeAlias = WindowEstimate | Window | None
+Reported: TypeAlias = WindowEstimate | Window | None
 
 
 class Player(Protocol):
@@ -55,7 +55,7 @@ class Player(Protocol):
             isi_sd_ms: SD of the realised ISI [ms].
         """
 
-    def estimate(self) -> Judgement:
+    def estimate(self) -> Reported:
         """What is believed about the window now."""
 
 
@@ -75,7 +75,7 @@ class Crowd(Protocol):
     def count_mistrial(self, person: int) -> None:
         """Count a pair of stimuli that was delivered in vain."""
 
-    def estimate(self, person: int) -> Judgement:
+    def estimate(self, person: int) -> Reported:
         """What is believed about the window of a person."""
 
     def decision(self, person: int) -> StopDecision:
@@ -159,7 +159,8 @@ def play(session: SimulatedSession, player: Player) -> pd.DataFrame:
         session: the session.
         player: what proposes ISIs in it.
     """
-    return examine([session], _Alone(player))
+    crowd: Crowd = _StrategyAlone(player) if isinstance(player, Strategy) else _PlayerAlone(player)
+    return examine([session], crowd)
 
 
 def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
@@ -269,44 +270,72 @@ class _Person:
 
 
 @dataclass(frozen=True)
-class _Alone:
-    """A player as a crowd of one."""
+class _StrategyAlone:
+    """A strategy as a crowd of one."""
+
+    strategy: Strategy
+
+    @property
+    def stopping(self) -> StoppingRule:
+        return self.strategy.stopping
+
+    def ask(self) -> list[Choice]:
+        isi_ms = self.strategy.ask()
+        return [Choice(isi_ms, self.strategy.fallback_reason)]
+
+    def tell(self, responses: Sequence[Response]) -> None:
+        (told,) = responses
+        self.strategy.learn(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
+
+    def count_mistrial(self, person: int) -> None:
+        del person
+        self.strategy.count_mistrial()
+
+    def estimate(self, person: int) -> Reported:
+        del person
+        return self.strategy.estimate()
+
+    def decision(self, person: int) -> StopDecision:
+        del person
+        return self.strategy.decision()
+
+    def trouble(self) -> bool:
+        return self.strategy.trouble is not None
+
+
+@dataclass(frozen=True)
+class _PlayerAlone:
+    """Any other player as a crowd of one: it has no stopping rule, and no fit that could fail."""
 
     player: Player
 
     @property
-    def stopping(self) -> StoppingRule | None:
-        return self.player.stopping if isinstance(self.player, Strategy) else None
+    def stopping(self) -> None:
+        return None
 
     def ask(self) -> list[Choice]:
-        isi_ms = self.player.ask()
-        return [Choice(isi_ms, self.player.fallback_reason if isinstance(self.player, Strategy) else None)]
+        return [Choice(self.player.ask())]
 
     def tell(self, responses: Sequence[Response]) -> None:
         (told,) = responses
-        learn = self.player.learn if isinstance(self.player, Strategy) else self.player.tell
-        learn(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
+        self.player.tell(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
 
     def count_mistrial(self, person: int) -> None:
         del person
-        if isinstance(self.player, Strategy):
-            self.player.count_mistrial()
 
-    def estimate(self, person: int) -> Judgement:
+    def estimate(self, person: int) -> Reported:
         del person
         return self.player.estimate()
 
     def decision(self, person: int) -> StopDecision:
         del person
-        if not isinstance(self.player, Strategy):
-            return StopDecision(stop=False, reason="The player has no stopping rule.")
-        return self.player.decision()
+        return StopDecision(stop=False, reason="The player has no stopping rule.")
 
     def trouble(self) -> bool:
-        return isinstance(self.player, Strategy) and self.player.trouble is not None
+        return False
 
 
-def _judged(estimate: Judgement, truth: Window | None, space: DesignSpace) -> dict[str, Any]:
+def _judged(estimate: Reported, truth: Window | None, space: DesignSpace) -> dict[str, Any]:
     posterior = estimate if isinstance(estimate, WindowEstimate) else None
     reported = posterior.window if posterior is not None else estimate
     covered = None if posterior is None or truth is None else covers(posterior, truth, space)

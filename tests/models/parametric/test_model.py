@@ -22,11 +22,11 @@ from isiw.models.protocol import (
     Observation,
     Posterior,
     PredictsOutcomes,
+    PriorPerson,
     ReportsTrouble,
     ResponseModel,
     SamplesProfiles,
     SamplesWindows,
-    SimulatedPerson,
     SimulatesPeople,
 )
 from isiw.models.shared.scales import Scale
@@ -55,7 +55,7 @@ def evenly(name: str, person: int, n: int) -> list[Observation]:
     return [observation(isi_ms, responder.respond(isi_ms, "valve").mep_mv) for isi_ms in isis_ms.tolist()]
 
 
-def simulated(model: ParametricModel, seed: int, isis_ms: np.ndarray) -> tuple[SimulatedPerson, list[Observation]]:
+def simulated(model: ParametricModel, seed: int, isis_ms: np.ndarray) -> tuple[PriorPerson, list[Observation]]:
     truth = model.simulate(VALVE_SPACE, seed, isis_ms)
     meps_mv = truth.mep_mv.tolist()
     return truth, [observation(isi_ms, mep_mv) for isi_ms, mep_mv in zip(isis_ms.tolist(), meps_mv, strict=True)]

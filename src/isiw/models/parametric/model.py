@@ -22,7 +22,7 @@ from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
 from isiw.models.parametric.program import WindowProgram
 from isiw.models.parametric.sampling import Chains, sample_person
-from isiw.models.protocol import Observation, SimulatedPerson, Tensor
+from isiw.models.protocol import Observation, PriorPerson, Tensor
 from isiw.models.randomness import SIMULATED, step_generator, systematic
 from isiw.models.shared.history import History, observed
 from isiw.models.shared.tables import OUTCOMES, interpolated, table_levels
@@ -101,7 +101,7 @@ class ParametricModel:
         known = self.detection_limit_mv, self.response_threshold_mv
         return observed(observation, *known, order=order).to("cpu", torch.double)
 
-    def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
+    def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> PriorPerson:
         """Draw one person from the prior, and an MEP at each ISI; see `SimulatesPeople`."""
         generator = step_generator("cpu", seed, SIMULATED)
         program = self.program(space)
@@ -112,7 +112,7 @@ class ParametricModel:
             person.unknowns, person.levels(torch.as_tensor(isi_ms, dtype=torch.double)), self.likelihood, generator
         )
         mask = person.window_masks(torch.tensor(space.grid_ms))[0, 0]
-        return SimulatedPerson(Window.from_mask(space.grid_ms, mask.numpy()), log_mep.exp()[0, 0].numpy())
+        return PriorPerson(Window.from_mask(space.grid_ms, mask.numpy()), log_mep.exp()[0, 0].numpy())
 
     def _after(self, space: DesignSpace, seed: int, history: History) -> ParametricPosterior:
         people, trials = history.isi_ms.shape

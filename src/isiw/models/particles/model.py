@@ -20,7 +20,7 @@ from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Person, Prior
 from isiw.models.particles.shapes import Shape
 from isiw.models.particles.swarm import Moving, Swarm, taken
-from isiw.models.protocol import Observation, SimulatedPerson, Tensor
+from isiw.models.protocol import Observation, PriorPerson, Tensor
 from isiw.models.randomness import SIMULATED, step_generator, systematic
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import ArrayLike, FloatArray
@@ -94,7 +94,7 @@ class ParticleModel:
         target = WindowTarget(self.prior, posterior.space)
         return replace(after, swarm=after.swarm.moved(target, self.moves, generator))
 
-    def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> SimulatedPerson:
+    def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> PriorPerson:
         """Draw one person from the prior, and an MEP at each ISI; see `SimulatesPeople`."""
         generator = step_generator(self.device, seed, SIMULATED)
         person = self.prior.person(self.prior.sample(1, 1, generator, space))
@@ -104,7 +104,7 @@ class ParticleModel:
         grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=torch.float32, device=self.device)
         mask = PersonSample(person, space).window_masks(grid_ms)[0, 0]
         window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
-        return SimulatedPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
+        return PriorPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
 
 
 @dataclass(frozen=True, eq=False)
