@@ -126,6 +126,13 @@ def test_microvolts_pause_a_session_once(log: Path) -> None:
     assert resume(log, device, scripted_strategy(9)).run().decision.stop
 
 
+def test_a_stimulator_that_stops_firing_pauses_the_session(log: Path) -> None:
+    device = ScriptedDevice(lambda s: Measurement(0.1 + 0.02 * s.trial if s.trial < 8 else 0.0, s.isi_ms))
+    result = Session(device, make_strategy("random", particles=50, max_trials=60), log=log).run()
+    assert len(result.trials) < 40
+    assert "Does the stimulator still fire" in result.decision.reason
+
+
 def early(isi_ms: float, commanded_ms: float) -> Trial:
     return Trial(0, Status.MISTRIAL, commanded_ms, MistrialReason.TMS_BEFORE_IMPACT, isi_ms=isi_ms)
 

@@ -53,7 +53,6 @@ def test_an_isi_far_from_the_one_asked_is_a_doubt(space: DesignSpace) -> None:
         ([8.0, 6.0, 12.0], DoubtKind.LARGE),
         ([0.008, 0.01, 0.1, 8.0, 11.0, 9.0], DoubtKind.JUMP),
         ([0.0] * 10, DoubtKind.SILENT),
-        ([0.1, 0.2] * 4 + [0.0] * 10, DoubtKind.STOPPED),
     ],
 )
 def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv: list[float], kind: DoubtKind) -> None:
@@ -61,6 +60,24 @@ def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv: list[float], kind
     assert doubt is not None
     assert doubt.kind is kind
     assert doubt_of(meps_mv[:-1]) is None
+
+
+FALLEN_SILENT_MV = [0.1, 0.2] * 4 + [0.0] * 10
+
+
+@pytest.mark.parametrize("isis_ms", [[100.0] * 18, [40.0, 160.0] * 4 + [100.0] * 10, [None] * 18])
+def test_pulses_that_give_no_mep_any_more_are_doubted(isis_ms: list[float | None]) -> None:
+    doubt = doubt_of(FALLEN_SILENT_MV, None, isis_ms)
+    assert doubt is not None
+    assert doubt.kind is DoubtKind.STOPPED
+    assert "None of the last 10 pulses gave an MEP" in doubt.text
+    assert doubt_of(FALLEN_SILENT_MV[:-1], None, isis_ms[:-1]) is None
+    assert doubt_of(FALLEN_SILENT_MV, 0.05, isis_ms) is None  # most pulses evoke less than this limit
+
+
+@pytest.mark.parametrize("isis_ms", [[100.0] * 8 + [200.0] * 10, [100.0] * 8 + [None] * 10])
+def test_pulses_where_nothing_was_ever_answered_are_not_doubted(isis_ms: list[float | None]) -> None:
+    assert doubt_of(FALLEN_SILENT_MV, None, isis_ms) is None
 
 
 @pytest.mark.parametrize(

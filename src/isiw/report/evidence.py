@@ -116,14 +116,14 @@ def nothing_stood_out(trials: Sequence[Trial]) -> str | None:
     Args:
         trials: the trials that count.
     """
-    known = [(t.index, t.mep_mv, t.background_rms_uv) for t in trials if t.mep_mv is not None and t.background_rms_uv]
+    known = [(t, t.mep_mv, t.background_rms_uv) for t in trials if t.mep_mv is not None and t.background_rms_uv]
     stood_out = [1e3 * mep_mv > OF_REST * rest_uv for _, mep_mv, rest_uv in known]
     if len(known) >= ENOUGH_TO_STAND_OUT and not any(stood_out):
         return f"In no trial was the EMG after the pulse larger than at rest. {_LOOK}"
-    first = stopped_after(stood_out)
+    first = stopped_after([trial.isi_ms for trial, *_ in known], stood_out)
     if first is None:
         return None
-    return f"From trial {known[first][0]} on, the EMG after the pulse was never larger than at rest. {_LOOK}"
+    return f"From trial {known[first][0].index} on, the EMG after the pulse was never larger than at rest. {_LOOK}"
 
 
 def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:

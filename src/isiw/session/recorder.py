@@ -63,11 +63,12 @@ class Recorder(Judging):
         self._made_s = now_s
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
         self._detection_limit_mv = header.detection_limit_mv
-        self._doubted = set(doubts_of(self._meps_mv, self._detection_limit_mv))
+        self._doubted = set(doubts_of(*self._amplitudes()))
 
-    @property
-    def _meps_mv(self) -> list[float]:
-        return [trial.mep_mv for trial in self.trials.told if trial.mep_mv is not None]
+    def _amplitudes(self) -> tuple[list[float], float | None, list[float | None]]:
+        """The amplitudes told [mV], what a 0 among them is below [mV], and their ISIs [ms]; see `doubt_of`."""
+        measured = [(trial.mep_mv, trial.isi_ms) for trial in self.trials.told if trial.mep_mv is not None]
+        return [mep_mv for mep_mv, _ in measured], self._detection_limit_mv, [isi_ms for _, isi_ms in measured]
 
     @property
     def asked(self) -> Stimulus | None:
@@ -183,7 +184,7 @@ class Recorder(Judging):
         trial = Trial(asked.trial, Status.ACCEPTED, asked.isi_ms, isi_ms=isi_ms, mep_mv=mep_mv,
                       isi_sd_ms=isi_sd_ms, background_rms_uv=background_rms_uv)  # fmt: skip
         self._conclude(trial)
-        doubt = doubt or doubt_of(self._meps_mv, self._detection_limit_mv)
+        doubt = doubt or doubt_of(*self._amplitudes())
         if doubt is not None and doubt.kind not in self._doubted:
             self._doubted.add(doubt.kind)
             self._warn(doubt.text)

@@ -32,6 +32,7 @@ class Watch:
         early_ms: the ISI at which pulses came before the impact by chance [ms].
         early: how many in a row there.
         meps_mv: the amplitudes told [mV].
+        isis_ms: the ISIs of the same trials [ms]; None for TMS alone.
         settled: doubts that a person has seen.
         seen_reasons: why it paused before, as a person has seen; of trials that count, the same fault is said once.
         reason: why to pause now, and what to do; None where there is no reason.
@@ -46,6 +47,7 @@ class Watch:
     early_ms: float | None = None
     early: int = 0
     meps_mv: tuple[float, ...] = ()
+    isis_ms: tuple[float | None, ...] = ()
     settled: frozenset[DoubtKind] = frozenset()
     seen_reasons: frozenset[str] = frozenset()
     reason: str | None = None
@@ -58,9 +60,10 @@ class Watch:
             trials: what was delivered before.
             reasons: why it paused.
         """
-        meps_mv = tuple(trial.mep_mv for trial in trials.told if trial.mep_mv is not None)
-        settled = doubts_of(meps_mv, self.detection_limit_mv)
-        return replace(self, meps_mv=meps_mv, settled=settled, seen_reasons=frozenset(reasons))
+        measured = [(trial.mep_mv, trial.isi_ms) for trial in trials.told if trial.mep_mv is not None]
+        meps_mv, isis_ms = (tuple(mep_mv for mep_mv, _ in measured), tuple(isi_ms for _, isi_ms in measured))
+        settled = doubts_of(meps_mv, self.detection_limit_mv, isis_ms)
+        return replace(self, meps_mv=meps_mv, isis_ms=isis_ms, settled=settled, seen_reasons=frozenset(reasons))
 
     def seen(self) -> Watch:
         """The same after a person has seen the reason and went on."""
@@ -87,7 +90,9 @@ class Watch:
             learned = replace(self, in_a_row=count, reason=said if count >= self.max_in_a_row else None)
         if trial.commanded_isi_ms is not None:  # a control trial says nothing about an ISI
             learned = replace(learned, early_ms=None, early=0)
-        return learned if trial.mep_mv is None or not trial.told else _with_amplitude(learned, trial.mep_mv)
+        if trial.mep_mv is None or not trial.told:
+            return learned
+        return _with_amplitude(learned, trial.mep_mv, trial.isi_ms)
 
     def _after_early(self, trial: Trial) -> Watch:
         """The same after a pulse that came before the impact by chance: at one ISI that does not happen for ever."""
@@ -101,10 +106,10 @@ class Watch:
         return replace(self, early_ms=trial.commanded_isi_ms, early=early, reason=reason)
 
 
-def _with_amplitude(watch: Watch, mep_mv: float) -> Watch:
-    meps_mv = (*watch.meps_mv, mep_mv)
-    doubt = doubt_of(meps_mv, watch.detection_limit_mv)
+def _with_amplitude(watch: Watch, mep_mv: float, isi_ms: float | None) -> Watch:
+    watch = replace(watch, meps_mv=(*watch.meps_mv, mep_mv), isis_ms=(*watch.isis_ms, isi_ms))
+    doubt = doubt_of(watch.meps_mv, watch.detection_limit_mv, watch.isis_ms)
     if doubt is None or doubt.kind in watch.settled:
-        return replace(watch, meps_mv=meps_mv)
+        return watch
     settled, reason = watch.settled | {doubt.kind}, watch.reason or doubt.text
-    return replace(watch, meps_mv=meps_mv, settled=settled, reason=reason, doubt=doubt.text)
+    return replace(watch, settled=settled, reason=reason, doubt=doubt.text)

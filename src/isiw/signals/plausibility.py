@@ -205,12 +205,15 @@ def _require_in_place(isi_ms: float, mep_mv: float | None, asked_ms: float, spac
         )
 
 
-def doubt_of(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> Doubt | None:
+def doubt_of(
+    meps_mv: Sequence[float], detection_limit_mv: float | None = None, isis_ms: Sequence[float | None] = ()
+) -> Doubt | None:
     """What is odd about the last amplitudes of a person; None where nothing is.
 
     Args:
         meps_mv: all amplitudes told so far [mV], in order; 0 is below the detection limit.
         detection_limit_mv: what an amplitude of 0 is known to be below [mV]; None where nobody has said.
+        isis_ms: the ISIs of the same trials [ms]; without them nobody can say whether answers have stopped.
     """
     alike = _doubt_of_equals(meps_mv)
     if alike is not None:
@@ -220,7 +223,8 @@ def doubt_of(meps_mv: Sequence[float], detection_limit_mv: float | None = None) 
         text = f"None of the first {len(meps_mv)} pulses gave an MEP: every amplitude is 0."
         ask = "Does the stimulator fire, is the EMG recorded, is the intensity enough?"
         return Doubt(DoubtKind.SILENT, f"{text} {ask}")
-    first = None if _zeros_are_usual(detection_limit_mv) else stopped_after([mep_mv > 0 for mep_mv in meps_mv])
+    knows = bool(isis_ms) and not _zeros_are_usual(detection_limit_mv)
+    first = stopped_after(isis_ms, [mep_mv > 0 for mep_mv in meps_mv]) if knows else None
     if first is not None:
         text = f"None of the last {len(meps_mv) - first} pulses gave an MEP, though earlier ones did."
         return Doubt(DoubtKind.STOPPED, f"{text} Does the stimulator still fire, is the coil in its place?")
@@ -241,14 +245,17 @@ def _doubt_of_equals(meps_mv: Sequence[float]) -> Doubt | None:
     return Doubt(DoubtKind.EQUAL, f"{text}artefact of the stimulator? Is the pulse's time right?")
 
 
-def doubts_of(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> frozenset[DoubtKind]:
+def doubts_of(
+    meps_mv: Sequence[float], detection_limit_mv: float | None = None, isis_ms: Sequence[float | None] = ()
+) -> frozenset[DoubtKind]:
     """What was odd about amplitudes on their way; whoever goes on with them has seen it.
 
     Args:
         meps_mv: as for `doubt_of`.
         detection_limit_mv: as for `doubt_of`.
+        isis_ms: as for `doubt_of`.
     """
-    doubts = (doubt_of(meps_mv[: n + 1], detection_limit_mv) for n in range(len(meps_mv)))
+    doubts = (doubt_of(meps_mv[:n], detection_limit_mv, isis_ms[:n]) for n in range(1, len(meps_mv) + 1))
     return frozenset(doubt.kind for doubt in doubts if doubt)
 
 
@@ -263,20 +270,27 @@ def is_silent(meps_mv: Sequence[float], detection_limit_mv: float | None = None)
     return enough and not any(meps_mv)
 
 
-def stopped_after(answered: Sequence[bool]) -> int | None:
+def stopped_after(isis_ms: Sequence[float | None], answered: Sequence[bool]) -> int | None:
     """After how many pulses there was no answer any more; None where chance may explain those without one.
 
+    Only pulses between ISIs that were answered count: what lies beyond may never have been answered.
+
     Args:
-        answered: whether each pulse so far was answered, in order.
+        isis_ms: the ISI of each pulse so far [ms], in order; None for TMS alone.
+        answered: whether each was answered.
     """
-    silent = next((k for k, yes in enumerate(reversed(answered)) if yes), 0)
-    if silent < STOPPED_IN_A_ROW:
+    first = max((index + 1 for index, yes in enumerate(answered) if yes), default=0)
+    with_answer = [isi_ms for isi_ms, yes in zip(isis_ms, answered, strict=True) if yes]
+    pairs_ms = [isi_ms for isi_ms in with_answer if isi_ms is not None]
+    low_ms, high_ms = min(pairs_ms, default=math.inf), max(pairs_ms, default=-math.inf)
+    comparable = [None in with_answer if isi_ms is None else low_ms <= isi_ms <= high_ms for isi_ms in isis_ms]
+    hits, silent = len(with_answer), sum(comparable[first:])
+    if not hits or silent < STOPPED_IN_A_ROW:
         return None
-    hits = sum(answered)
-    misses = len(answered) - silent - hits
+    misses = sum(comparable[:first]) - hits
     # How probable so many misses are after these, whatever the share of answers is.
     by_chance = math.exp(betaln(hits + 1, misses + silent + 1) - betaln(hits + 1, misses + 1))
-    return len(answered) - silent if by_chance < STOPPED_BY_CHANCE else None
+    return first if by_chance < STOPPED_BY_CHANCE else None
 
 
 def _zeros_are_usual(detection_limit_mv: float | None) -> bool:
