@@ -1,16 +1,32 @@
 from __future__ import annotations
 
+import ast
+import importlib
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
 import isiw
 
+ROOT = Path(__file__).parents[1]
+STUB = ast.parse(Path(isiw.__path__[0], "__init__.pyi").read_text(encoding="utf-8"))
+HOMES = {alias.name: node.module for node in STUB.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+"""The module that each public name is listed from; None for a module itself."""
 
-@pytest.mark.parametrize("name", ["__version__", *dir(isiw)])
-def test_every_public_name_is_there(name: str) -> None:
-    assert getattr(isiw, name) is not None
+
+@pytest.mark.parametrize("name", dir(isiw))
+def test_every_public_name_is_what_its_module_calls_so(name: str) -> None:
+    home = HOMES[name]
+    module = importlib.import_module(f"isiw.{home or name}")
+    assert getattr(isiw, name) is (getattr(module, name) if home else module)
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    package = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert isiw.__version__ == package["project"]["version"]
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

@@ -63,6 +63,11 @@ def some_posterior(seed: int, people: int = 2, samples: int = 5, isis: int = 4, 
     return HandMadePosterior(mass, masks, profiles, baselines)
 
 
+def summed_variance(weights: np.ndarray, values: np.ndarray) -> float:
+    """Of weights (s,) and values (s, g), over the g."""
+    return float(np.sum(weights @ values**2 - (weights @ values) ** 2))
+
+
 def expected_gain(mass: Tensor, values: Tensor, loss: Callable[[np.ndarray, np.ndarray], float]) -> np.ndarray:
     """Loss of the samples' weights now, less what is expected of it after the next MEP, shape (b, t).
 

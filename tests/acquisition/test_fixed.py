@@ -80,11 +80,6 @@ def test_one_isi_is_scored_1_and_the_others_0(acquisition: AcquisitionFunction) 
     assert sorted(scores[0].tolist()) == [0.0] * (CANDIDATES - 1) + [1.0]
 
 
-@pytest.mark.parametrize("acquisition", [EvenSpacing(), RandomIsi(7), SobolIsi(7)])
-def test_a_design_is_an_acquisition_function(acquisition: AcquisitionFunction) -> None:
-    assert isinstance(acquisition, AcquisitionFunction)
-
-
 @pytest.mark.parametrize("acquisition", [EvenSpacing(), RandomIsi(), SobolIsi(), IncrementalSweep()])
 def test_a_design_needs_nothing_of_the_posterior(acquisition: AcquisitionFunction) -> None:
     assert acquisition.needs == ()

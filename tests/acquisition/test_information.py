@@ -11,7 +11,14 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.hand_made import ISIS_MS, HandMadePosterior, Score, expected_gain, some_posterior
+from acquisition.hand_made import (
+    ISIS_MS,
+    HandMadePosterior,
+    Score,
+    expected_gain,
+    some_posterior,
+    summed_variance,
+)
 from isiw.acquisition.information import (
     Alternating,
     MutualInformation,
@@ -36,10 +43,6 @@ seeds = st.integers(0, 2**31)
 def entropy(weights: np.ndarray) -> float:
     positive = weights[weights > 0]
     return float(-np.sum(positive * np.log(positive)))
-
-
-def summed_variance(weights: np.ndarray, values: np.ndarray) -> float:
-    return float(np.sum(weights @ values**2 - (weights @ values) ** 2))
 
 
 @given(seeds)

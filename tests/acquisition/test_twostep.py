@@ -8,7 +8,7 @@ import torch
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from acquisition.hand_made import ISIS_MS, HandMadePosterior, some_posterior
+from acquisition.hand_made import ISIS_MS, HandMadePosterior, some_posterior, summed_variance
 from isiw.acquisition.information import window_gain
 from isiw.acquisition.twostep import TwoStep, two_step_gain
 from isiw.errors import InvalidValueError
@@ -16,10 +16,6 @@ from isiw.errors import InvalidValueError
 seeds = st.integers(0, 2**31)
 GROUPS = 50
 """So many that no two outcomes share one, unless one of them is as good as impossible."""
-
-
-def summed_variance(weights: np.ndarray, values: np.ndarray) -> float:
-    return float(np.sum(weights @ values**2 - (weights @ values) ** 2))
 
 
 def enumerated(posterior: HandMadePosterior) -> np.ndarray:

@@ -10,7 +10,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.hand_made import ISIS_MS, Score, expected_gain, some_posterior
+from acquisition.hand_made import ISIS_MS, Score, expected_gain, some_posterior, summed_variance
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.variance import (
     EdgeVariance,
@@ -23,10 +23,6 @@ from isiw.acquisition.variance import (
 
 ROUNDING = 1e-4
 seeds = st.integers(0, 2**31)
-
-
-def summed_variance(weights: np.ndarray, values: np.ndarray) -> float:
-    return float(np.sum(weights @ values**2 - (weights @ values) ** 2))
 
 
 def variance_of_edges(weights: np.ndarray, masks: np.ndarray) -> float:

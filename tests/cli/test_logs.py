@@ -1,26 +1,14 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TypeAlias
 
 import pandas as pd
 import pytest
-from typer.testing import CliRunner, Result
 
+from cli.conftest import Command
 from export.recorded import note, sweep, write_sweeps
-from isiw.cli import app
 from logs import cut_after
 from priors.logged import gaussian_person, write_log
-
-Command: TypeAlias = Callable[..., Result]
-
-
-@pytest.fixture
-def isiw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
-    """Runs isiw in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-    return lambda *arguments: CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture

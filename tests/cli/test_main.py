@@ -7,13 +7,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import pytest
-from typer.testing import CliRunner, Result
+from typer.testing import CliRunner
 
+from cli.conftest import Command
 from isiw import __version__
 from isiw.cli import app
 from isiw.config.run import true_window
@@ -25,20 +25,6 @@ from isiw.session.loop import Session
 from isiw.strategy.catalogue import list_strategies
 from known import known
 from scripted import ScriptedDevice, scripted_strategy
-
-Command: TypeAlias = Callable[..., Result]
-
-
-@pytest.fixture
-def isiw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
-    """Runs isiw in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> Result:
-        return CliRunner().invoke(app, [str(argument) for argument in arguments])
-
-    return run
-
 
 SHORT = "[strategy.settings]\nmax_trials = 3\nparticles = 100\n"
 

@@ -4,10 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
+from cli.conftest import Command
 from isiw import priors
-from isiw.cli import app
 from isiw.cli.console import DAMAGED
 from isiw.log.reader import read_session
 from logs import damage
@@ -20,17 +19,14 @@ def folder(tmp_path_factory: Any) -> Any:
 
 
 @pytest.fixture
-def isiw(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+def isiw(isiw: Command, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
+    """The same, in the folder of the logs."""
     monkeypatch.chdir(folder)
-
-    def run(*arguments: Any) -> Any:
-        return CliRunner().invoke(app, [str(argument) for argument in arguments])
-
-    return run
+    return isiw
 
 
 @pytest.fixture
-def logs(isiw: Any, folder: Path) -> Any:
+def logs(isiw: Command, folder: Path) -> Any:
     (folder / "short.toml").write_text("[strategy.settings]\nmax_trials = 3\nparticles = 200\n")
     paths = [folder / f"{seed}.mcap" for seed in (1, 2)]
     for seed, path in enumerate(paths, start=1):
@@ -40,7 +36,7 @@ def logs(isiw: Any, folder: Path) -> Any:
 
 
 @pytest.fixture
-def lab(isiw: Any, logs: Any, folder: Path) -> Any:
+def lab(isiw: Command, logs: Any, folder: Path) -> Any:
     if not (folder / "lab.toml").exists():
         result = isiw("prior", "learn", *logs, "-o", "lab.toml")
         assert result.exit_code == 0, result.output
@@ -49,7 +45,7 @@ def lab(isiw: Any, logs: Any, folder: Path) -> Any:
     return folder / "lab.toml"
 
 
-def test_a_lab_prior_is_shown_beside_the_built_in_one_and_drawn(isiw: Any, lab: Any, folder: Path) -> None:
+def test_a_lab_prior_is_shown_beside_the_built_in_one_and_drawn(isiw: Command, lab: Any, folder: Path) -> None:
     result = isiw("prior", "show", lab, "-o", "lab.png")
     assert result.exit_code == 0, result.output
     assert "EMG floor [mV]" in result.output
@@ -58,7 +54,7 @@ def test_a_lab_prior_is_shown_beside_the_built_in_one_and_drawn(isiw: Any, lab: 
 
 
 @pytest.mark.parametrize("flags", [(), ("--overwrite",)])
-def test_learning_replaces_no_log_and_asks_before_the_work_begins(isiw: Any, logs: Any, flags: Any) -> None:
+def test_learning_replaces_no_log_and_asks_before_the_work_begins(isiw: Command, logs: Any, flags: Any) -> None:
     before = logs[0].read_bytes()
     result = isiw("prior", "learn", *logs, "-o", logs[0], *flags)
     assert result.exit_code == 1
@@ -67,7 +63,9 @@ def test_learning_replaces_no_log_and_asks_before_the_work_begins(isiw: Any, log
     assert logs[0].read_bytes() == before
 
 
-def test_a_prior_and_its_picture_are_replaced_only_where_that_is_asked_for(isiw: Any, lab: Any, folder: Path) -> None:
+def test_a_prior_and_its_picture_are_replaced_only_where_that_is_asked_for(
+    isiw: Command, lab: Any, folder: Path
+) -> None:
     picture = folder / "kept.png"
     picture.write_bytes(b"kept")
     for command in (("learn", folder / "1.mcap", "-o", lab), ("show", lab, "-o", picture)):
@@ -80,14 +78,14 @@ def test_a_prior_and_its_picture_are_replaced_only_where_that_is_asked_for(isiw:
     assert picture.stat().st_size > 5000
 
 
-def test_a_session_is_run_with_a_lab_prior_and_its_log_holds_the_numbers(isiw: Any, lab: Any, folder: Path) -> None:
+def test_a_session_is_run_with_a_lab_prior_and_its_log_holds_the_numbers(isiw: Command, lab: Any, folder: Path) -> None:
     result = isiw("run", "short.toml", "--prior", lab, "--log", "with.mcap")
     assert result.exit_code == 0, result.output
     places = read_session(folder / "with.mcap").header.strategy.settings["prior"]["profile"]["places"]
     assert [place["share"] for place in places] == [p.share for p in priors.load(lab).profile.places]
 
 
-def test_a_session_starts_from_earlier_ones_of_the_person(isiw: Any, logs: Any, folder: Path) -> None:
+def test_a_session_starts_from_earlier_ones_of_the_person(isiw: Command, logs: Any, folder: Path) -> None:
     result = isiw("run", "short.toml", "--after", logs[0], "--log", "after.mcap")
     assert result.exit_code == 0, result.output
     header = read_session(folder / "after.mcap").header
@@ -99,7 +97,7 @@ def test_a_session_starts_from_earlier_ones_of_the_person(isiw: Any, logs: Any, 
 
 
 def test_a_session_with_a_prior_from_earlier_ones_is_resumed_without_their_files(
-    isiw: Any, logs: Any, folder: Path
+    isiw: Command, logs: Any, folder: Path
 ) -> None:
     gone = folder / "gone.mcap"
     gone.write_bytes(logs[0].read_bytes())
@@ -109,7 +107,7 @@ def test_a_session_with_a_prior_from_earlier_ones_is_resumed_without_their_files
     assert result.exit_code == 0, result.output
 
 
-def test_the_same_person_twice_is_refused_with_the_way_out(isiw: Any, logs: Any, folder: Path) -> None:
+def test_the_same_person_twice_is_refused_with_the_way_out(isiw: Command, logs: Any, folder: Path) -> None:
     (folder / "copy").mkdir()
     assert isiw("run", "short.toml", "--seed", 1, "--log", folder / "copy" / "second.mcap").exit_code == 0
     result = isiw("prior", "learn", logs[0], folder / "copy" / "second.mcap", "-o", "twice.toml")
@@ -118,7 +116,7 @@ def test_the_same_person_twice_is_refused_with_the_way_out(isiw: Any, logs: Any,
     assert not (folder / "twice.toml").exists()
 
 
-def test_a_damaged_log_is_refused_or_learnt_with_a_warning_as_told(isiw: Any, logs: Any, folder: Path) -> None:
+def test_a_damaged_log_is_refused_or_learnt_with_a_warning_as_told(isiw: Command, logs: Any, folder: Path) -> None:
     damaged = folder / "damaged.mcap"
     damaged.write_bytes(logs[0].read_bytes())
     damage(damaged)
@@ -135,13 +133,13 @@ def test_a_damaged_log_is_refused_or_learnt_with_a_warning_as_told(isiw: Any, lo
     assert (folder / "d.toml").exists()
 
 
-def test_a_prior_that_is_not_there_is_named(isiw: Any) -> None:
+def test_a_prior_that_is_not_there_is_named(isiw: Command) -> None:
     result = isiw("run", "--prior", "nowhere.toml", "--log", "n.mcap")
     assert result.exit_code == 1
     assert "nowhere.toml" in result.output
 
 
-def test_a_prior_among_the_settings_excludes_one_from_earlier_sessions(isiw: Any, lab: Any, folder: Path) -> None:
+def test_a_prior_among_the_settings_excludes_one_from_earlier_sessions(isiw: Command, lab: Any, folder: Path) -> None:
     (folder / "both.toml").write_text("[strategy.settings.prior.profile]\np_window = 0.5\n")
     result = isiw("run", "both.toml", "--prior", lab, "--log", "b.mcap")
     assert result.exit_code == 1

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
-from isiw.cli import app
+from cli.conftest import Command
 from isiw.config.run import load_config, session_for
 from isiw.log.reader import read_session
 
-Command = Callable[..., Result]
-
 
 @pytest.fixture
-def isiw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Command]:
-    """Runs isiw in an empty folder."""
-    monkeypatch.chdir(tmp_path)
+def isiw(isiw: Command) -> Iterator[Command]:
+    """The same, which imports the rig anew each time."""
 
     def run(*arguments: object, **given: Any) -> Result:
         sys.modules.pop("rig", None)  # each run is a process of its own, in truth
-        return CliRunner().invoke(app, [str(argument) for argument in arguments], **given)
+        return isiw(*arguments, **given)
 
     yield run
     sys.modules.pop("rig", None)

@@ -1,12 +1,12 @@
 from __future__ import annotations
 
-import errno
 import os
 from pathlib import Path
-from typing import Any, Never
+from typing import Any
 
 import pytest
 
+from disks import no_room
 from isiw.errors import InvalidValueError
 from isiw.log.outputs import made_folder, write_output
 
@@ -42,10 +42,6 @@ def test_a_folder_that_cannot_be_made_is_told_with_the_reason(tmp_path: Path) ->
         made_folder(file)
     with pytest.raises(InvalidValueError, match="the folder cannot be made: Not a directory"):
         write_output(file / "in it" / "s.pdf", b"a picture")
-
-
-def no_room(_: Any) -> Never:
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def test_what_cannot_be_written_as_a_whole_leaves_what_was_there(

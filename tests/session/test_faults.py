@@ -29,11 +29,6 @@ TESTS = Path(__file__).parents[1]
 
 
 @pytest.fixture
-def log(tmp_path: Path) -> Path:
-    return tmp_path / "s.mcap"
-
-
-@pytest.fixture
 def released() -> Iterator[threading.Event]:
     """What hangs, hangs until this is set, at the end of the test."""
     event = threading.Event()

@@ -30,11 +30,6 @@ from known import instance, known
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 
 
-@pytest.fixture
-def log(tmp_path: Path) -> Path:
-    return tmp_path / "s.mcap"
-
-
 def run_failing(session: Session, error: type[BaseException]) -> tuple[SessionRecord, str]:
     with pytest.raises(error) as caught:
         session.run()

@@ -27,11 +27,6 @@ from scripted import ALONE_MS, FakeRealClock, ScriptedDevice, scripted_strategy,
 MIXED = VisitProtocol(iti_s=(5.0, 8.0), tms_alone=0.2, tap_alone=0.1, block_trials=12, rest_s=120.0)
 
 
-@pytest.fixture
-def log(tmp_path: Path) -> Path:
-    return tmp_path / "s.mcap"
-
-
 class KilledHereError(Exception):
     pass
 

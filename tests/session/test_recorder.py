@@ -46,11 +46,6 @@ from logs import cut_after
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 
 
-@pytest.fixture
-def log(tmp_path: Path) -> Path:
-    return tmp_path / "s.mcap"
-
-
 class BusyClock(FakeRealClock):
     """In the middle of the first wait something else happens."""
 

@@ -37,11 +37,6 @@ from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 
 
 @pytest.fixture
-def log(tmp_path: Path) -> Path:
-    return tmp_path / "s.mcap"
-
-
-@pytest.fixture
 def uninterrupted(tmp_path: Path) -> list[float | None]:
     """The asks of a session of ten trials that nothing disturbed."""
     device = ScriptedDevice()

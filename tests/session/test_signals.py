@@ -29,11 +29,6 @@ TESTS = Path(__file__).parents[1]
 HANG_S = 20.0  # what hangs is interrupted at once; where it is not, the test fails after this time
 
 
-@pytest.fixture
-def log(tmp_path: Path) -> Path:
-    return tmp_path / "s.mcap"
-
-
 @pytest.fixture(autouse=True)
 def terminal() -> Iterator[None]:
     """A terminal whose closing is heard, also where the tests themselves run under nohup."""

@@ -34,11 +34,6 @@ Act: TypeAlias = Callable[[Session], None]
 TESTS = Path(__file__).parents[1]
 
 
-@pytest.fixture
-def log(tmp_path: Path) -> Path:
-    return tmp_path / "s.mcap"
-
-
 def loud_in(*trials: int) -> ScriptedDevice:
     """A rig whose EMG is too loud in some trials."""
 

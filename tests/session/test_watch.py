@@ -25,11 +25,6 @@ from scripted import ScriptedDevice, scripted_strategy
 from wrong_rigs import NAMED, SPACE, WRONG, rig
 
 
-@pytest.fixture
-def log(tmp_path: Path) -> Path:
-    return tmp_path / "s.mcap"
-
-
 def strategy_for_rigs(max_trials: int = 20) -> Strategy:
     return make_strategy("default", SPACE, max_trials=max_trials, particles=200)
 

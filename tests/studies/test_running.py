@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import signal
 import subprocess
@@ -10,13 +9,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, Never
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import psutil
 import pytest
 
+from disks import no_room
 from isiw.errors import ConfigError, StudyError
 from isiw.log import durable
 from isiw.studies import (
@@ -302,10 +302,6 @@ def test_who_begins_a_folder_at_the_same_moment_goes_on_with_the_same_study_only
     with pytest.raises(StudyError, match="people was 4, now 3"):
         begin_store(tiny(), tmp_path)
     assert open_store(tmp_path).study.people == 4
-
-
-def no_room(_: Any) -> Never:
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def test_a_full_disk_is_an_error_of_the_study_and_all_that_is_finished_is_kept(
