@@ -202,9 +202,9 @@ def test_it_says_what_is_open_and_how_long_the_next_ask_would_wait(log: Path, sp
 
 def test_nothing_can_be_told_that_was_not_asked(log: Path) -> None:
     with open_session(scripted_strategy(3), log) as session:
-        with pytest.raises(InvalidValueError, match="nothing was asked"):
+        with pytest.raises(InvalidValueError, match="no trial is waiting for an outcome"):
             session.tell(50.0, 0.02)
-        with pytest.raises(InvalidValueError, match="nothing was asked"):
+        with pytest.raises(InvalidValueError, match="no trial is waiting for an outcome"):
             session.mistrial("no impact")
 
 

@@ -33,7 +33,7 @@ def interval(  # noqa: PLR0913, PLR0917 - an option each
     ] = None,
     trials: Annotated[int | None, typer.Option(help="In each mode; by default 200.", **NO_DEFAULT)] = None,
     subject: Annotated[str | None, typer.Option(help="Who produces the intervals.", **NO_DEFAULT)] = None,
-    seed: Annotated[int | None, typer.Option(help="Of the lights; by default 0.", **NO_DEFAULT)] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the lights; default 0.", **NO_DEFAULT)] = None,
     rest_s: Annotated[float, typer.Option(help="Seconds of rest between two modes.")] = 120.0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with this log.")] = False,  # noqa: FBT002 - a flag
     look: Annotated[bool, typer.Option("--show", help="Print what is in this log.")] = False,  # noqa: FBT002 - a flag

@@ -112,7 +112,8 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
 def resume(
     log: Log,
     config: Annotated[
-        Path | None, typer.Argument(help="The configuration with your device; without it, somebody is simulated.")
+        Path | None,
+        typer.Argument(help="The configuration with your device; without it, the simulated person of the log is used."),
     ] = None,
     data: Data = None,
     lost_pulses: Annotated[

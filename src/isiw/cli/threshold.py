@@ -48,7 +48,7 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
         str | None,
         typer.Option(help="The cohort that a simulated person comes from; default recruitment.", **NO_DEFAULT),
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of a simulated person; default 0.", **NO_DEFAULT)] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the simulated person; default 0.", **NO_DEFAULT)] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the log, as it was begun.")] = False,  # noqa: FBT002 - a flag
     show_only: Annotated[bool, typer.Option("--show", help="Only say what the log holds.")] = False,  # noqa: FBT002 - a flag
 ) -> None:

@@ -82,4 +82,4 @@ class Followers:
             except Exception as error:  # noqa: BLE001 - who looks on must not stop a session
                 with suppress(ValueError):  # another thread, in which it failed as well, was first
                     self._followers.remove(follower)
-                    self._faults.append(f"Who looked on failed and is told nothing more: {told(error)}")
+                    self._faults.append(f"A viewer failed and gets no further updates: {told(error)}")

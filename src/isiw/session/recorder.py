@@ -251,7 +251,7 @@ class Recorder(Judging):
     def _require_asked(self) -> Stimulus:
         if self.asked is None:
             raise InvalidValueError(
-                "nothing was asked whose outcome this could be", remedy="Call ask() first, then deliver, then tell()."
+                "no trial is waiting for an outcome", remedy="Call ask() first, then deliver, then tell()."
             )
         return self.asked
 

@@ -297,7 +297,7 @@ class ThresholdRecorder:
     def _require_asked(self) -> float:
         if self._asked is None:
             raise InvalidValueError(
-                "nothing was asked whose outcome this could be", remedy="Call ask() first, then deliver, then tell()."
+                "no pulse is waiting for an outcome", remedy="Call ask() first, then deliver, then tell()."
             )
         return self._asked
 
