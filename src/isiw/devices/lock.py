@@ -54,7 +54,7 @@ def _object_claimed(device: Device, info: DeviceInfo) -> Iterator[None]:
 def _address_claimed(info: DeviceInfo) -> Iterator[None]:
     digest = hashlib.sha256(info.address.encode(errors="backslashreplace")).hexdigest()[:16]
     path = Path(tempfile.gettempdir()) / f"isiw-device-{digest}.lock"
-    lock = FileLock(path)
+    lock = FileLock(path, mode=0o666)  # so that another account of this computer can take it, once it is free
     try:
         lock.acquire(timeout=0)
     except Timeout as error:
@@ -63,7 +63,7 @@ def _address_claimed(info: DeviceInfo) -> Iterator[None]:
         raise DeviceError(
             f"the device's lock cannot be taken: {error.strerror}",
             got=str(path),
-            remedy="Another account of this computer may have made it. Delete it once no session runs there.",
+            remedy="If another account of this computer made it, let that account delete it once no session runs.",
         ) from error
     try:
         yield
