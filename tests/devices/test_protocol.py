@@ -14,6 +14,7 @@ from isiw.errors import InvalidValueError
         ({"name": None}, "DeviceInfo.name must be a text$"),
         ({"version": 2.1}, r'DeviceInfo.version must be a text; got 2.1. Write it in quotes: "2.1"'),
         ({"address": 3}, "DeviceInfo.address must be a text"),
+        ({"channels": ["emg"]}, "DeviceInfo.channels must be a table of units"),
         ({"channels": {"emg": None}}, "the unit of 'emg' in DeviceInfo.channels must be a text"),
     ],
 )

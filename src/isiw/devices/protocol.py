@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, get_args, runtime_checkable
 
 from isiw.checks import check_choice, check_flags, check_numbers, check_texts, mean_and_sd, text
-from isiw.errors import NotDelivered
+from isiw.errors import InvalidValueError, NotDelivered
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Conditioning, Reference
 
@@ -53,6 +53,10 @@ class DeviceInfo:
 
     def __post_init__(self) -> None:
         check_texts(self, "name", "version", "address")
+        if not isinstance(self.channels, Mapping):
+            raise InvalidValueError(
+                "DeviceInfo.channels must be a table of units", got=self.channels, expected='such as {"emg": "mV"}'
+            )
         for channel, unit in self.channels.items():
             text(f"the unit of {channel!r} in DeviceInfo.channels", unit)
         check_choice(self, "reference", get_args(Reference))
