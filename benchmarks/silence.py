@@ -3,8 +3,8 @@
     python -m benchmarks.silence
 
 Simulated people answer pulses at random ISIs of the whole range, or mostly about the edges of their window, as a
-strategy asks that has nearly found it. What lies below a detection limit is 0. Each person has a session in which nothing
-is wrong, and one in which no pulse comes any more after the 15th trial.
+strategy asks that has nearly found it. What lies below a detection limit is 0. Each person has a session in which
+nothing is wrong, and one in which no pulse comes any more after the 15th trial.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def main() -> None:
     intro = (
         f"# A stimulator that stops firing\n\n`python -m benchmarks.silence`, seed {SEED}, isiw {isiw.__version__}, "
         f"Python {sys.version.split()[0]}\n\n{PEOPLE} people of each kind, {TRIALS} trials; in the sessions that stop, "
-        f"no pulse comes after the first {FIRED}.\nWhere few pulses are answered before, silence cannot be told from chance.\n\n"
+        f"no pulse comes after the first {FIRED}.\nWhere few pulses are answered, silence may be chance.\n\n"
     )
     text = f"{intro}{table.to_markdown(index=False)}\n"
     RESULTS.write_text(text, encoding="utf-8")

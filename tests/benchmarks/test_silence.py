@@ -2,8 +2,9 @@ from __future__ import annotations
 
 import math
 
-import isiw
 from benchmarks.silence import FIRED, TRIALS, Kind, noticed_at
+
+import isiw
 
 
 def test_a_stop_is_noticed_where_pulses_had_been_answered_and_not_before() -> None:
