@@ -190,19 +190,8 @@ def main(  # noqa: PLR0913, PLR0917 - the options of the command line
 ) -> None:
     """Measure the eleventh person of a lab."""
     seeds = range(seed, seed + 100 * labs, 100)  # people have seeds of their own
-    units = [
-        Unit(
-            kind,
-            s,
-            people,
-            misfits,
-            trials,
-            tuple(choice("the prior", name, PRIORS) for name in priors.split(",")),
-            stated,
-        )
-        for kind in kinds.split(",")
-        for s in seeds
-    ]
+    names = tuple(choice("the prior", name, PRIORS) for name in priors.split(","))
+    units = [Unit(kind, s, people, misfits, trials, names, stated) for kind in kinds.split(",") for s in seeds]
     rows = measured(examine, units, workers, out)
     write(summary(rows), facts_of("benchmarks/lab.py", seed, people), out)
 

@@ -3,8 +3,8 @@
     python -m benchmarks.silence
 
 Simulated people answer pulses at random ISIs of the whole range, or mostly about the edges of their window, as a
-strategy asks that has nearly found it. What lies below a detection limit is 0. Each person has a session in which
-nothing is wrong, and one in which no pulse comes any more after the 15th trial.
+strategy asks that has nearly found it. What lies below a detection limit, which nobody states, is 0. Each person has a
+session in which nothing is wrong, and one in which no pulse comes any more after the 15th trial.
 """
 
 from __future__ import annotations

@@ -65,10 +65,10 @@ class Recorder(Judging):
         self._detection_limit_mv = header.detection_limit_mv
         self._doubted = set(doubts_of(*self._amplitudes()))
 
-    def _amplitudes(self) -> tuple[list[float], float | None, list[float | None]]:
-        """The amplitudes told [mV], what a 0 among them is below [mV], and their ISIs [ms]; see `doubt_of`."""
-        measured = [(trial.mep_mv, trial.isi_ms) for trial in self.trials.told if trial.mep_mv is not None]
-        return [mep_mv for mep_mv, _ in measured], self._detection_limit_mv, [isi_ms for _, isi_ms in measured]
+    def _amplitudes(self) -> tuple[tuple[float, ...], float | None, tuple[float | None, ...]]:
+        """What `doubt_of` takes of the trials so far."""
+        meps_mv, isis_ms = self.trials.amplitudes
+        return meps_mv, self._detection_limit_mv, isis_ms
 
     @property
     def asked(self) -> Stimulus | None:

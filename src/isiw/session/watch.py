@@ -60,8 +60,7 @@ class Watch:
             trials: what was delivered before.
             reasons: why it paused.
         """
-        measured = [(trial.mep_mv, trial.isi_ms) for trial in trials.told if trial.mep_mv is not None]
-        meps_mv, isis_ms = (tuple(mep_mv for mep_mv, _ in measured), tuple(isi_ms for _, isi_ms in measured))
+        meps_mv, isis_ms = trials.amplitudes
         settled = doubts_of(meps_mv, self.detection_limit_mv, isis_ms)
         return replace(self, meps_mv=meps_mv, isis_ms=isis_ms, settled=settled, seen_reasons=frozenset(reasons))
 
@@ -77,17 +76,16 @@ class Watch:
             trial: the trial.
             answer: what the device answered.
         """
-        if self.doubt is not None:
-            return replace(self, doubt=None).after(trial, answer)
         if too_early_by_chance(trial, self.space):
             return self._after_early(trial)
         fault = likely_fault(answer, trial, self.signals)
         if fault is None or (trial.reason is None and any(fault.remedy in seen for seen in self.seen_reasons)):
-            learned = replace(self, in_a_row=0, reason=None)
+            learned = replace(self, in_a_row=0, reason=None, doubt=None)
         else:
             count = self.in_a_row + 1
             said = f"{count} trials in a row were rejected: {fault}" if trial.reason else f"{fault}"
-            learned = replace(self, in_a_row=count, reason=said if count >= self.max_in_a_row else None)
+            reason = said if count >= self.max_in_a_row else None
+            learned = replace(self, in_a_row=count, reason=reason, doubt=None)
         if trial.commanded_isi_ms is not None:  # a control trial says nothing about an ISI
             learned = replace(learned, early_ms=None, early=0)
         if trial.mep_mv is None or not trial.told:
@@ -103,7 +101,7 @@ class Watch:
                 f"At {trial.commanded_isi_ms:g} ms the pulse came before the impact {early} times in a row. "
                 f"{remedy_for(MistrialReason.TMS_BEFORE_IMPACT)} Or begin the space at a larger ISI."
             )
-        return replace(self, early_ms=trial.commanded_isi_ms, early=early, reason=reason)
+        return replace(self, early_ms=trial.commanded_isi_ms, early=early, reason=reason, doubt=None)
 
 
 def _with_amplitude(watch: Watch, mep_mv: float, isi_ms: float | None) -> Watch:
