@@ -143,16 +143,17 @@ class Mover(Generic[L]):
 
     def _step(self, mine: _Weighed[L], theirs: L, counts: Tensor) -> _Weighed[L]:
         jumps = self._uniform(mine.log_prior) < JUMP_PROBABILITY
+        where = jumps.nonzero(as_tuple=True)
         shifted = self._shift(mine.latents, theirs)
-        jumped = self.target.jumped(mine.latents.remade(field[jumps] for field in mine.latents), self.generator)
-        proposal = shifted.remade(a.index_put((jumps,), b) for a, b in zip(shifted, jumped, strict=True))
+        jumped = self.target.jumped(mine.latents.remade(field[where] for field in mine.latents), self.generator)
+        proposal = shifted.remade(a.index_put(where, b) for a, b in zip(shifted, jumped, strict=True))
         log_likelihood = total_log_likelihood(self.target.person(proposal), self.history)
         log_prior = self.target.log_prior(proposal)
         # A jump draws from the prior, so that its density cancels, where what it leads to is possible at all.
         possible = torch.where(log_prior.isneginf(), -torch.inf, 0.0)
         prior_ratio = torch.where(jumps, possible, log_prior - mine.log_prior)
         accept = torch.log(self._uniform(log_prior)) < log_likelihood - mine.log_likelihood + prior_ratio
-        counts += torch.stack([who.sum(-1) for who in (~jumps, accept & ~jumps, jumps, accept & jumps)])
+        counts += torch.stack([~jumps, accept & ~jumps, jumps, accept & jumps]).sum(-1)
         return _Weighed(
             mine.latents.remade(_choose(accept, a, b) for a, b in zip(proposal, mine.latents, strict=True)),
             torch.where(accept, log_likelihood, mine.log_likelihood),

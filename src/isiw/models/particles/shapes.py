@@ -67,7 +67,7 @@ def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:
     offset = torch.maximum(offset_ms * (-1.0 / rise_ms).unsqueeze(-1), offset_ms * (1.0 / fall_ms).unsqueeze(-1))
     square = offset.square_().clamp_(1e-12, 1e6)
     # Powers and second peaks are dear, and few particles have them.
-    flat, double = shape.kind == ShapeKind.PLATEAU, shape.kind == ShapeKind.TWO_PEAK
+    flat, double = (_which(shape, kind) for kind in (ShapeKind.PLATEAU, ShapeKind.TWO_PEAK))
     square[flat] = square[flat].pow(_flatness(shape.form[flat]).unsqueeze(-1))
     level = square.mul_(-2.0 / math.log(2.0)).exp2_()  # much faster than powers of e
     level[double] = _two_peaks(_of(shape, double), isi_ms.expand_as(level)[double])
@@ -91,7 +91,7 @@ def reaches(shape: Shape, level: Tensor, isi_ms: Tensor) -> Tensor:
     away = torch.where(shape.kind == ShapeKind.PLATEAU, away.pow(1.0 / _flatness(shape.form)), away) * shape.width_ms
     first_ms, last_ms = peak_ms - peak_at * away, peak_ms + (1.0 - peak_at) * away
     reached = (isi_ms >= first_ms.unsqueeze(-1)) & (isi_ms <= last_ms.unsqueeze(-1))
-    double = shape.kind == ShapeKind.TWO_PEAK
+    double = _which(shape, ShapeKind.TWO_PEAK)
     reached[double] = _two_peaks(_of(shape, double), isi_ms) >= level[double].unsqueeze(-1)
     return reached
 
@@ -121,7 +121,12 @@ def _flatness(form: Tensor) -> Tensor:
     return torch.exp(0.75 * (form + 1.0))
 
 
-def _of(shape: Shape, which: Tensor) -> Shape:
+def _which(shape: Shape, kind: ShapeKind) -> tuple[Tensor, ...]:
+    """Indices of the profiles of a family."""
+    return (shape.kind == kind).nonzero(as_tuple=True)
+
+
+def _of(shape: Shape, which: tuple[Tensor, ...]) -> Shape:
     return Shape(*(field[which] for field in shape))
 
 

@@ -112,7 +112,7 @@ class StartPrior:
             space: the design space.
         """
         law = _law(space, self, quantile.dtype, quantile.device)
-        return _interpolate(quantile, law.below, law.knots_ms)
+        return law.start_ms.at(quantile)
 
     def log_density(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
         """Log density at some starts, same shape; -inf where no start can be.
@@ -122,9 +122,8 @@ class StartPrior:
             space: the design space.
         """
         law = _law(space, self, start_ms.dtype, start_ms.device)
-        inside = (start_ms >= law.knots_ms[0]) & (start_ms <= law.knots_ms[-1])
-        density = _interpolate(start_ms, law.knots_ms, law.density)
-        return torch.where(inside, density.clamp_min(1e-30).log(), -torch.inf)
+        inside = (start_ms >= law.density.x[0]) & (start_ms <= law.density.x[-1])
+        return torch.where(inside, law.density.at(start_ms).clamp_min(1e-30).log(), -torch.inf)
 
     def usual(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
         """Probability that some starts are of the usual span, whatever the rig, same shape.
@@ -166,12 +165,29 @@ def _with_any_hit_delay(span: Span, share: float) -> Span:
     return Span(share * span.share, low_ms + middle_ms, high_ms + middle_ms, math.hypot(span.sd_ms, sd_ms))
 
 
-class _Law(NamedTuple):
-    """Density and distribution function of the start at some knots [ms], each of shape (k,)."""
+class _Line(NamedTuple):
+    """A function that is straight between some knots, and level beyond them."""
 
-    knots_ms: Tensor
-    density: Tensor
-    below: Tensor
+    x: Tensor  # of the knots, ascending, (k,)
+    y: Tensor  # at the knots, (k,)
+    run: Tensor  # to the next knot, (k - 1,)
+    rise: Tensor  # likewise
+
+    @classmethod
+    def through(cls, x: Tensor, y: Tensor) -> _Line:
+        return cls(x, y, x.diff().clamp_min(1e-12), y.diff())
+
+    def at(self, x: Tensor) -> Tensor:
+        left = torch.searchsorted(self.x, x.contiguous()).sub_(1).clamp_(0, len(self.run) - 1)
+        share = (x - self.x[left]).div_(self.run[left]).clamp_(0.0, 1.0)
+        return self.y[left] + share.mul_(self.rise[left])
+
+
+class _Law(NamedTuple):
+    """Where windows start [ms]: the density by the start, and the start by its quantile."""
+
+    density: _Line
+    start_ms: _Line
 
 
 @lru_cache(maxsize=64)
@@ -187,12 +203,5 @@ def _law(space: DesignSpace, prior: StartPrior, dtype: torch.dtype, device: torc
     # Given that it lies in the range: the further that is from where starts usually are, the more "anywhere" counts.
     total = below[-1]
     exact = knots_ms, mixed / total, torch.nn.functional.pad(below / total, (1, 0))
-    return _Law(*(values.to(device, dtype) for values in exact))
-
-
-def _interpolate(x: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
-    right = torch.searchsorted(xs, x.contiguous()).clamp(1, len(xs) - 1)
-    left = right - 1
-    share = (x - xs[left]) / (xs[right] - xs[left]).clamp_min(1e-12)
-    between: Tensor = ys[left] + share.clamp(0.0, 1.0) * (ys[right] - ys[left])
-    return between
+    knots_ms, density, below = (values.to(device, dtype) for values in exact)
+    return _Law(_Line.through(knots_ms, density), _Line.through(below, knots_ms))
