@@ -15,7 +15,7 @@ import pytest
 from docs.draw_wiring import IMAGES, PICTURES
 
 import lsl_network
-from isiw.config.run import device_for, load_config, session_for
+from isiw.config import device_for, load_config, session_for
 from isiw.testing import check_device
 
 PAGES = Path(__file__).parents[1] / "docs" / "lab"

@@ -13,7 +13,7 @@ from typer.main import get_command
 
 import isiw
 from isiw.cli.main import app
-from isiw.config.run import load_config
+from isiw.config import load_config
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
@@ -12,7 +13,7 @@ import numpy as np
 from isiw.checks import check_numbers, check_texts, check_wholes, number
 from isiw.errors import InvalidValueError
 
-__all__ = ["Control", "Visit", "VisitProtocol"]
+__all__ = ["Control", "Visit", "VisitProtocol", "different_muscles"]
 
 _ITI_DRAWS, _CONTROL_DRAWS = 1, 2
 """What is drawn, so that the two never share their draws."""
@@ -67,13 +68,22 @@ class Visit:
         Args:
             other: the other visit of the same person.
         """
-        muscles = [visit.muscle.strip() for visit in (self, other)]
-        if all(muscles) and muscles[0].casefold() != muscles[1].casefold():
-            return f"different muscles, {muscles[0]} and {muscles[1]}"
+        if muscles := different_muscles((self.muscle, other.muscle)):
+            return f"different muscles, {' and '.join(muscles)}"
         own, others = self.intensity_pct_rmt, other.intensity_pct_rmt
         if own is not None and others is not None and abs(own - others) > MOST_APART_PCT_RMT:
             return f"different intensities, {own:g} and {others:g} % of RMT"
         return None
+
+
+def different_muscles(noted: Iterable[str]) -> list[str]:
+    """The muscles that visits note, where these are more than one; else none. Capitals make no difference.
+
+    Args:
+        noted: the muscle of each visit; empty where it is not noted.
+    """
+    muscles = {muscle.strip().casefold(): muscle.strip() for muscle in noted if muscle.strip()}
+    return list(muscles.values()) if len(muscles) > 1 else []
 
 
 @dataclass(frozen=True)

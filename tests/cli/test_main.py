@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from cli.conftest import Command
 from isiw import __version__
 from isiw.cli import app
-from isiw.config.run import true_window
+from isiw.config import true_window
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import Result
 
 from cli.conftest import Command
-from isiw.config.run import load_config, session_for
+from isiw.config import load_config, session_for
 from isiw.log.reader import read_session
 
 
@@ -191,7 +191,7 @@ def test_what_would_be_ignored_or_is_in_the_wrong_unit_is_refused(
 def test_a_log_that_was_made_before_slips_were_refused_is_read_and_goes_on(
     isiw: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("isiw.config.run._require_used", lambda _subject: None)
+    monkeypatch.setattr("isiw.config.session._require_used", lambda _subject: None)
     short = "[strategy.settings]\nmax_trials = 3\nparticles = 100\n"
     (tmp_path / "c.toml").write_text(short, encoding="utf-8")
     config = load_config(tmp_path / "c.toml")

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from isiw import priors
+from isiw.config import device_for, load_config, session_for
 from isiw.config.rig import TEMPLATE_FILES, device_from_factory, write_rig_template
-from isiw.config.run import device_for, load_config, session_for
 from isiw.design import IMPACT_SPACE
 from isiw.errors import ConfigError
 from isiw.log.reader import read_session
@@ -139,6 +139,9 @@ def test_a_session_does_not_start_from_one_of_another_muscle_or_intensity(templa
     for earlier, what in ((other, "different muscles, FCR and FDI"), (far, "different intensities, 120 and 90 %")):
         with pytest.raises(ConfigError, match=what):
             session_for(config.model_copy(update={"visit": noted}).with_overrides(after=[earlier]))
+    lab = priors.write_lab_prior(priors.learn([other]), tmp_path / "lab.toml")
+    with pytest.raises(ConfigError, match="different muscles, FCR and FDI"):
+        session_for(config.model_copy(update={"visit": noted}).with_overrides(prior=lab))
 
 
 def test_what_simulated_sessions_taught_is_not_used_on_a_person(template: Path, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import pytest
 import tomli_w
 
-from isiw.config.run import (
+from isiw.config import (
     RunConfig,
     config_of_log,
     device_for,

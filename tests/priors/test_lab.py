@@ -22,6 +22,7 @@ from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior
 from isiw.priors.recall import recalled
 from isiw.strategy.catalogue import make_strategy
+from isiw.visit import Visit
 from known import instance
 from logs import damage
 from priors.logged import gaussian_person, write_log
@@ -265,3 +266,15 @@ def test_what_electrical_pulses_taught_is_for_electrical_pulses(logs: Any, tmp_p
         priors.learn([*logs, *pulsed])
     day, *_ = map(isiw.read_session, pulsed)
     assert {place.conditioning for place in priors.after(day).profile.places} == {"electrical"}
+
+
+def test_a_lab_learns_from_one_muscle_and_notes_which(tmp_path: Path) -> None:
+    one, same, unsaid, other = (
+        write_log(tmp_path / f"{number}.mcap", subject=f"P{number}", trials=3, visit=Visit(muscle=muscle))
+        for number, muscle in enumerate(("FCR", "fcr ", "", "FDI"))
+    )
+    lab = priors.read_lab_prior(priors.write_lab_prior(priors.learn([unsaid, one, same]), tmp_path / "lab.toml"))
+    assert [session.muscle for session in lab.sessions] == ["", "FCR", "fcr"]
+    assert lab.noted_muscle == "FCR"
+    with pytest.raises(LogError, match=r"of different muscles.*FCR.*FDI"):
+        priors.learn([one, other])

@@ -2,19 +2,9 @@
 
 from isiw.config.going_on import changes_on_resume, differences_on_resume
 from isiw.config.rig import write_rig_template
-from isiw.config.run import (
-    RunConfig,
-    config_of_log,
-    device_for,
-    fresh_log_path,
-    has_truth,
-    limits_for,
-    load_config,
-    require_same_person,
-    session_for,
-    subject_for,
-    true_window,
-)
+from isiw.config.run import RunConfig, config_of_log, limits_for, load_config
+from isiw.config.session import device_for, fresh_log_path, has_truth, session_for, subject_for, true_window
+from isiw.config.taught import require_same_person
 
 __all__ = [
     "RunConfig",

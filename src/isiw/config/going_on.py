@@ -7,7 +7,8 @@ import shlex
 from collections.abc import Iterator
 from typing import Any
 
-from isiw.config.run import RunConfig, config_of_log, has_truth
+from isiw.config.run import RunConfig, config_of_log
+from isiw.config.session import has_truth
 from isiw.devices.limits import Limits
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord

@@ -29,6 +29,7 @@ from isiw.priors.recall import (
     too_far_apart_ms,
 )
 from isiw.types import Conditioning, Reference
+from isiw.visit import different_muscles
 
 __all__ = ["LabPrior", "LearntSession", "learn", "share_of"]
 
@@ -52,12 +53,14 @@ class LearntSession:
         subject: the person's identifier in it.
         trials: how many accepted trials it has.
         simulated: whether its device was a simulated one.
+        muscle: whose EMG was recorded, as the session notes it.
     """
 
     sha256: str
     subject: str
     trials: int
     simulated: bool = False
+    muscle: str = ""
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,11 @@ class LabPrior:
     def simulated(self) -> bool:
         """Whether it was learnt from simulated people."""
         return any(session.simulated for session in self.sessions)
+
+    @property
+    def noted_muscle(self) -> str:
+        """Whose EMG was recorded, as the sessions note it; empty where none does."""
+        return next((session.muscle for session in self.sessions if session.muscle), "")
 
     def joined(self, usual: Prior | None = None) -> Prior:
         """A prior in which the lab's laws stand beside those of people in general.
@@ -151,7 +159,7 @@ def learn(
     Raises:
         LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person
             twice, or sessions that count ISIs from different events, or are of rigs with different hit delays or of
-            different conditioning stimuli, or of which some are simulated and others are not.
+            different conditioning stimuli or muscles, or of which some are simulated and others are not.
         DamagedLogError: a log is damaged.
         InvalidValueError: a seed that is no whole number from 0 on.
     """
@@ -178,8 +186,9 @@ def learn(
 
 
 def _learnt_session(record: SessionRecord) -> LearntSession:
-    digest = hashlib.sha256(record.path.read_bytes()).hexdigest()
-    return LearntSession(digest, record.header.subject, len(record.table.told), record.header.device.simulated)
+    header, digest = record.header, hashlib.sha256(record.path.read_bytes()).hexdigest()
+    simulated, muscle = header.device.simulated, header.visit.muscle.strip()
+    return LearntSession(digest, header.subject, len(record.table.told), simulated, muscle)
 
 
 def _require_different(records: Sequence[SessionRecord], sessions: Sequence[LearntSession], *, again: bool) -> None:
@@ -195,14 +204,15 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
     if len({session.simulated for session in sessions}) > 1:
         simulated = [str(record.path) for record in records if record.header.device.simulated]
         raise LogError("some of the sessions are simulated, others are not", got=simulated, remedy="Leave these out.")
-    references = {record.header.space.reference for record in records}
-    if len(references) > 1:
-        remedy = "Learn a prior from each kind of session."
-        raise LogError("the sessions count ISIs from different events", got=sorted(references), remedy=remedy)
-    stimuli = {record.header.conditioning for record in records}
-    if len(stimuli) > 1:
-        remedy = "Learn a prior from each kind of session."
-        raise LogError("the sessions have different conditioning stimuli", got=sorted(stimuli), remedy=remedy)
+    kinds = {
+        "count ISIs from different events": {record.header.space.reference for record in records},
+        "have different conditioning stimuli": {record.header.conditioning for record in records},
+        "are of different muscles": different_muscles(session.muscle for session in sessions),
+    }
+    for differ, kind in kinds.items():
+        if len(kind) > 1:
+            remedy = "Learn a prior from each kind of session."
+            raise LogError(f"the sessions {differ}", got=sorted(kind), remedy=remedy)
     if (apart_ms := too_far_apart_ms(records)) is not None:
         raise LogError(
             "the sessions were run on rigs with different hit delays, so their windows cannot be compared",

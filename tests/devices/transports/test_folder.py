@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 import isiw
-from isiw.config.run import load_config, session_for
+from isiw.config import load_config, session_for
 from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
 from isiw.session.updates import SessionResult
 from isiw.testing import check_device

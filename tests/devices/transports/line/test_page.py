@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import isiw
-from isiw.config.run import RunConfig, load_config, session_for
+from isiw.config import RunConfig, load_config, session_for
 from isiw.devices.transports.line_table import LineCommands
 from isiw.testing import PulsePeer, check_ledger
 

@@ -1,0 +1,142 @@
+"""The session that a configuration describes: its device, its simulated person, and its log."""
+
+from __future__ import annotations
+
+import datetime as dt
+import itertools
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from isiw.config.rig import device_from_factory
+from isiw.config.run import RunConfig, config_of_log, limits_for
+from isiw.config.sections import SubjectConfig
+from isiw.config.taught import settings_with_taught
+from isiw.devices.protocol import Device
+from isiw.devices.recorded import RecordedPerson, load_recordings
+from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
+from isiw.errors import ConfigError
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import RUN_KEY
+from isiw.session.loop import Session
+from isiw.session.updates import SessionUpdate
+from isiw.strategy.catalogue import known_settings, make_strategy
+from isiw.subjects.cohorts import person_of
+from isiw.subjects.subject import SimulatedSubject
+from isiw.window import Window
+
+__all__ = ["device_for", "fresh_log_path", "has_truth", "session_for", "subject_for", "true_window"]
+
+SESSIONS: Final = Path("isiw-sessions")
+"""The folder for logs of sessions without a path."""
+
+
+def fresh_log_path(config: RunConfig) -> Path:
+    """A path in the default folder at which there is no log yet."""
+    stem = f"{dt.datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}_seed{config.seed}"
+    names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
+    paths = (SESSIONS / f"{name}.mcap" for name in names)
+    return next(path for path in paths if not path.exists() and not path.with_name(f"{path.name}.part").exists())
+
+
+def subject_for(config: RunConfig) -> SimulatedSubject:
+    """The simulated person."""
+    return person_of(config.subject.cohort, config.subject.number, config.seed)
+
+
+def true_window(record: SessionRecord) -> Window | None:
+    """The true window of the person whom `isiw run` simulated; None where it, or such a person, does not exist."""
+    return subject_for(config_of_log(record)).window(record.header.space) if has_truth(record) else None
+
+
+def has_truth(record: SessionRecord) -> bool:
+    """Whether the session is of a person whom `isiw run` simulated."""
+    return RUN_KEY in record.header.config
+
+
+def device_for(config: RunConfig) -> Device:
+    """The device: the user's own, or a simulated person, in recorded EMG where asked for.
+
+    Raises:
+        ConfigError: recorded EMG without its folder, or a factory that makes no device.
+        DeviceError: no recordings in the folder.
+    """
+    if config.device is not None:
+        return device_from_factory(config.device.factory, config.device.settings, config.device.folder)
+    reference = config.space.reference
+    subject = subject_for(config)
+    respond = partial(subject.begin(config.seed).respond, reference=reference)
+    hit_delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
+    if config.subject.kind == "simulated":
+        person = SimulatedPerson(respond, reference, hit_delay_ms=hit_delay_ms, conditioning=subject.conditioning)
+        return SimulatedDevice(person)
+    if config.subject.data is None:
+        raise ConfigError(
+            "subject.data is missing: recorded EMG is not part of the package",
+            expected="the folder with the recordings",
+            remedy="Give it with --data DIR.",
+        )
+    recordings = load_recordings(config.subject.data)
+    recorded = RecordedPerson(respond, reference, recordings, config.seed, hit_delay_ms, subject.conditioning)
+    return SimulatedDevice(recorded)
+
+
+def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:
+    """The session that a configuration describes, ready to run.
+
+    Args:
+        config: the configuration.
+        on_trial: called after each trial.
+
+    Raises:
+        ConfigError: no recordings, or no prior, where the configuration says, or recordings that would be ignored;
+            earlier sessions of another person, or sessions or a prior of another muscle or intensity, or simulated ones
+            where the device is real.
+        LogError: an earlier session of the person that cannot be read, or has no accepted trial.
+        StrategyError: a prior for a strategy that has none of this kind.
+    """
+    _require_used(config.subject)
+    space = config.space.design()
+    log = config.log or fresh_log_path(config)
+    device = device_for(config)
+    info = device.describe()
+    known = {"hit_delay_ms": info.hit_delay_ms, "conditioning": info.conditioning}
+    settings = known_settings(config.strategy.name, known) | settings_with_taught(config, info)
+    return Session(
+        device,
+        make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),
+        log=log,
+        limits=limits_for(config),
+        on_trial=on_trial,
+        subject=config.visit.subject or ("" if config.device else _code(config)),
+        signals=config.signals,
+        config={} if config.device else {RUN_KEY: _kept(config)},
+        timeout_s=config.timeout_s,
+        visit=config.visit.noted(),
+        protocol=config.protocol,
+    )
+
+
+def _require_used(subject: SubjectConfig) -> None:
+    if subject.data is not None and subject.kind != "recorded":
+        raise ConfigError(
+            "recordings are for a subject of the kind recorded, and would be ignored",
+            got=str(subject.data),
+            remedy='Add --subject recorded, or kind = "recorded" under [subject]; or leave the data out.',
+        )
+
+
+def _code(config: RunConfig) -> str:
+    return f"{config.subject.cohort}-{config.seed}-{config.subject.number}"
+
+
+def _kept(config: RunConfig) -> dict[str, Any]:
+    """What a log keeps to simulate the same person again; never what names code to import.
+
+    What a prior came to is in the strategy's recipe; where it came from is kept for whoever reads the log.
+    """
+    kept = config.model_dump(mode="json", exclude_none=True, exclude={"log", "device", "signals"})
+    if config.subject.data is not None:
+        kept["subject"]["data"] = str(config.subject.data.resolve())
+    return kept
