@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, TypeVar
@@ -204,7 +204,7 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
     if len({session.simulated for session in sessions}) > 1:
         simulated = [str(record.path) for record in records if record.header.device.simulated]
         raise LogError("some of the sessions are simulated, others are not", got=simulated, remedy="Leave these out.")
-    kinds = {
+    kinds: dict[str, Collection[str]] = {
         "count ISIs from different events": {record.header.space.reference for record in records},
         "have different conditioning stimuli": {record.header.conditioning for record in records},
         "are of different muscles": different_muscles(session.muscle for session in sessions),
