@@ -20,7 +20,7 @@ import pandas as pd
 
 import isiw
 from isiw.design import VALVE_SPACE
-from isiw.signals.plausibility import stopped_after
+from isiw.signals.doubts import stopped_after
 from isiw.types import FloatArray
 
 RESULTS = Path(__file__).parent / "results" / "silence.md"

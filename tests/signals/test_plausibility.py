@@ -1,17 +1,16 @@
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from isiw.design import IMPACT_SPACE, DesignSpace
+from isiw.design import IMPACT_SPACE
 from isiw.errors import InvalidValueError
-from isiw.signals.plausibility import DoubtKind, doubt_of, implausible_amplitude, implausible_scale, require_plausible
+from isiw.signals.plausibility import implausible_amplitude, implausible_scale, require_plausible
 
 
 @pytest.mark.parametrize("mep_mv", [0.0, 0.0005, 0.008, 0.3, 12.0, 25.0])
 def test_what_muscles_give_is_plausible(mep_mv: float) -> None:
     assert implausible_amplitude(mep_mv) is None
-    assert require_plausible(100.0, mep_mv, 104.0, IMPACT_SPACE) is None
+    require_plausible(100.0, mep_mv, 104.0, IMPACT_SPACE)
 
 
 @pytest.mark.parametrize(
@@ -30,75 +29,6 @@ def test_a_slip_is_refused_and_named(isi_ms: float | None, mep_mv: float, slip: 
         require_plausible(isi_ms, mep_mv, 100.0, IMPACT_SPACE)
 
 
-@pytest.mark.parametrize(("isi_ms", "mep_mv"), [(30.0, 0.02), (300.0, 0.02), (11.0, 1.5)])
-def test_after_an_isi_near_0_was_asked_no_amplitude_is_taken_for_it(isi_ms: float, mep_mv: float) -> None:
-    doubt = require_plausible(isi_ms, mep_mv, 0.0, IMPACT_SPACE)
-    assert doubt is not None
-    assert doubt.kind is DoubtKind.ISI_OFF
-
-
-def test_an_isi_far_from_the_one_asked_is_a_doubt(space: DesignSpace) -> None:
-    doubt = require_plausible(180.0, 0.02, 100.0, space)
-    assert doubt is not None
-    assert doubt.kind is DoubtKind.ISI_OFF
-    assert "180 ms is far from the 100 ms" in doubt.text
-
-
-@pytest.mark.parametrize(
-    ("meps_mv", "kind"),
-    [
-        ([0.02, 0.05, 0.05, 0.05, 0.05], DoubtKind.EQUAL),
-        ([0.02, 0.3, 0.302, 0.299, 0.301, 0.304, 0.3], DoubtKind.EQUAL),
-        ([0.0005, 0.0004, 0.0003], DoubtKind.SMALL),
-        ([8.0, 6.0, 12.0], DoubtKind.LARGE),
-        ([0.008, 0.01, 0.1, 8.0, 11.0, 9.0], DoubtKind.JUMP),
-        ([0.0] * 10, DoubtKind.SILENT),
-    ],
-)
-def test_amplitudes_that_look_like_a_slip_are_doubted(meps_mv: list[float], kind: DoubtKind) -> None:
-    doubt = doubt_of(meps_mv)
-    assert doubt is not None
-    assert doubt.kind is kind
-    assert doubt_of(meps_mv[:-1]) is None
-
-
-FALLEN_SILENT_MV = [0.1, 0.2] * 4 + [0.0] * 10
-
-
-@pytest.mark.parametrize("isis_ms", [[100.0] * 18, [40.0, 160.0] * 4 + [100.0] * 10, [None] * 18])
-def test_pulses_that_give_no_mep_any_more_are_doubted(isis_ms: list[float | None]) -> None:
-    doubt = doubt_of(FALLEN_SILENT_MV, None, isis_ms)
-    assert doubt is not None
-    assert doubt.kind is DoubtKind.STOPPED
-    assert "None of the last 10 pulses gave an MEP" in doubt.text
-    assert doubt_of(FALLEN_SILENT_MV[:-1], None, isis_ms[:-1]) is None
-    assert doubt_of(FALLEN_SILENT_MV, 0.05, isis_ms) is None  # most pulses evoke less than this limit
-
-
-@pytest.mark.parametrize("isis_ms", [[100.0] * 8 + [200.0] * 10, [100.0] * 8 + [None] * 10])
-def test_pulses_where_nothing_was_ever_answered_are_not_doubted(isis_ms: list[float | None]) -> None:
-    assert doubt_of(FALLEN_SILENT_MV, None, isis_ms) is None
-
-
-@pytest.mark.parametrize(
-    "meps_mv",
-    [
-        [],
-        [0.0, 0.0, 0.0, 0.0, 0.0],
-        [0.006] + [0.0] * 20,
-        [0.05, 0.05, 0.05],
-        [0.0400, 0.0401, 0.0402, 0.0399, 0.0400, 0.0401, 0.0402],  # EMG at rest, in hum
-        [0.30, 0.33, 0.28, 0.31, 0.27, 0.30, 0.32],  # alike, for a muscle
-        [0.008, 0.01, 0.009, 1.5, 0.9, 1.2],
-        [0.0027, 0.0008, 0.002],
-        [0.08, 5.0, 2.0, 0.1],
-        [2.4, 3.6, 2.9],
-    ],
-)
-def test_usual_amplitudes_are_not_doubted(meps_mv: list[float]) -> None:
-    assert doubt_of(meps_mv) is None
-
-
 @pytest.mark.parametrize("meps_mv", [[0.0011], [0.0, 0.0015, 0.0012]])
 def test_pulses_whose_amplitudes_are_all_below_the_emg_at_rest_may_be_in_volts(meps_mv: list[float]) -> None:
     slip = implausible_scale(meps_mv)
@@ -109,14 +39,3 @@ def test_pulses_whose_amplitudes_are_all_below_the_emg_at_rest_may_be_in_volts(m
 @pytest.mark.parametrize("meps_mv", [[], [0.0], [0.002], [0.008, 0.0005], [0.0005, 0.008]])
 def test_amplitudes_with_one_as_large_as_the_emg_at_rest_are_believed(meps_mv: list[float]) -> None:
     assert implausible_scale(meps_mv) is None
-
-
-def test_amplitudes_that_an_artefact_has_are_told_as_one() -> None:
-    doubt = doubt_of([0.3, 0.302, 0.299, 0.301, 0.304, 0.3])
-    assert doubt is not None
-    assert "almost equal (0.301 mV), and MEPs vary more. Is it an artefact of the stimulator?" in doubt.text
-
-
-def test_a_muscle_is_not_doubted_for_being_steady() -> None:
-    meps_mv = [float(mep_mv) for mep_mv in 0.3 * np.random.default_rng(0).lognormal(0.0, 0.3, 5000)]
-    assert not any(doubt_of(meps_mv[n : n + 6]) for n in range(5000))

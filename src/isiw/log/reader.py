@@ -32,7 +32,7 @@ from isiw.log.schema import (
 from isiw.log.topics import decode
 from isiw.log.verdicts import VERDICTS, under_all
 from isiw.log.writer import CONFIGURATION
-from isiw.signals.plausibility import is_silent
+from isiw.signals.doubts import is_silent
 from isiw.strategy.stopping import StopDecision
 from isiw.text.found import lacking
 from isiw.text.toml_files import parsed

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from scipy.stats import mannwhitneyu
 
 from isiw.log.reader import SessionRecord
-from isiw.signals.plausibility import stopped_after
+from isiw.signals.doubts import stopped_after
 from isiw.text.found import NO_MEP
 from isiw.trials import Trial
 from isiw.window import Window

@@ -19,8 +19,9 @@ from isiw.log.writer import LogWriter
 from isiw.session.believed import believed
 from isiw.session.journal import Journal, learn, relearned
 from isiw.session.judging import Judging
+from isiw.signals.doubts import doubt_of, doubt_of_isi, doubts_of
 from isiw.signals.faults import remedy_for
-from isiw.signals.plausibility import doubt_of, doubts_of, require_plausible
+from isiw.signals.plausibility import require_plausible
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
@@ -63,7 +64,7 @@ class Recorder(Judging):
         self._made_s = now_s
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
         self._detection_limit_mv = header.detection_limit_mv
-        self._doubted = set(doubts_of(*self._amplitudes()))
+        self._doubts = doubts_of(*self._amplitudes())
 
     def _amplitudes(self) -> tuple[tuple[float, ...], float | None, tuple[float | None, ...]]:
         """What `doubt_of` takes of the trials so far."""
@@ -172,7 +173,7 @@ class Recorder(Judging):
         mep_mv = number("mep_mv", mep_mv, least=0)
         isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         asked = self._require_asked()
-        doubt = require_plausible(isi_ms, mep_mv, asked.isi_ms, self.strategy.space)
+        require_plausible(isi_ms, mep_mv, asked.isi_ms, self.strategy.space)
         isi_ms = None if isi_ms is None else self.strategy.space.check_realised(isi_ms)
         if (isi_ms is None) != (asked.isi_ms is None):
             raise InvalidValueError(
@@ -184,10 +185,10 @@ class Recorder(Judging):
         trial = Trial(asked.trial, Status.ACCEPTED, asked.isi_ms, isi_ms=isi_ms, mep_mv=mep_mv,
                       isi_sd_ms=isi_sd_ms, background_rms_uv=background_rms_uv)  # fmt: skip
         self._conclude(trial)
-        doubt = doubt or doubt_of(*self._amplitudes())
-        if doubt is not None and doubt.kind not in self._doubted:
-            self._doubted.add(doubt.kind)
-            self._warn(doubt.text)
+        off = doubt_of_isi(isi_ms, asked.isi_ms, self.strategy.space)
+        self._doubts = self._doubts.after(off or doubt_of(*self._amplitudes()))
+        if self._doubts.new is not None:
+            self._warn(self._doubts.new.text)
 
     def mistrial(self, reason: MistrialReason | str) -> None:
         """That the trial of the ISI that was asked is lost: it counts as a stimulus, and is not told.

@@ -146,8 +146,8 @@ class Steps:
             self._freely(learn, self.strategy, trial)
         if trial.told and self.strategy.trouble is not None:
             self._journal.log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
-        if self.delivery.watch.doubt is not None:
-            self._journal.event("doubt", self.delivery.watch.doubt)
+        if (doubt := self.delivery.watch.doubts.new) is not None:
+            self._journal.event("doubt", doubt.text)
         estimate, decision, next_isi_ms = self.log_estimate(trial.index)
         self._journal.unconcluded = None
         if not decision.stop and self.delivery.watch.reason is not None:

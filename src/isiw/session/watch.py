@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer
+from isiw.signals.doubts import Doubts, doubt_of, doubts_of
 from isiw.signals.faults import likely_fault, remedy_for, too_early_by_chance
 from isiw.signals.judgement import SignalLimits
-from isiw.signals.plausibility import DoubtKind, doubt_of, doubts_of
 from isiw.trials import MistrialReason, Trial, TrialTable
 
 __all__ = ["Watch"]
@@ -33,10 +33,9 @@ class Watch:
         early: how many in a row there.
         meps_mv: the amplitudes told [mV].
         isis_ms: the ISIs of the same trials [ms]; None for TMS alone.
-        settled: doubts that a person has seen.
+        doubts: which doubts about the amplitudes were raised, and which the last trial raised.
         seen_reasons: why it paused before, as a person has seen; of trials that count, the same fault is said once.
         reason: why to pause now, and what to do; None where there is no reason.
-        doubt: what the last trial made odd about the amplitudes so far; None where it made nothing.
     """
 
     space: DesignSpace
@@ -48,10 +47,9 @@ class Watch:
     early: int = 0
     meps_mv: tuple[float, ...] = ()
     isis_ms: tuple[float | None, ...] = ()
-    settled: frozenset[DoubtKind] = frozenset()
+    doubts: Doubts = field(default_factory=Doubts)
     seen_reasons: frozenset[str] = frozenset()
     reason: str | None = None
-    doubt: str | None = None
 
     def resumed(self, trials: TrialTable, reasons: Iterable[str]) -> Watch:
         """The same after earlier trials; whoever resumes the session has seen their doubts and its pauses.
@@ -61,8 +59,8 @@ class Watch:
             reasons: why it paused.
         """
         meps_mv, isis_ms = trials.amplitudes
-        settled = doubts_of(meps_mv, self.detection_limit_mv, isis_ms)
-        return replace(self, meps_mv=meps_mv, isis_ms=isis_ms, settled=settled, seen_reasons=frozenset(reasons))
+        doubts = doubts_of(meps_mv, self.detection_limit_mv, isis_ms)
+        return replace(self, meps_mv=meps_mv, isis_ms=isis_ms, doubts=doubts, seen_reasons=frozenset(reasons))
 
     def seen(self) -> Watch:
         """The same after a person has seen the reason and went on."""
@@ -76,38 +74,38 @@ class Watch:
             trial: the trial.
             answer: what the device answered.
         """
+        before = replace(self, doubts=self.doubts.after(None))
         if too_early_by_chance(trial, self.space):
-            return self._after_early(trial)
+            return _after_early(before, trial)
         fault = likely_fault(answer, trial, self.signals)
         if fault is None or (trial.reason is None and any(fault.remedy in seen for seen in self.seen_reasons)):
-            learned = replace(self, in_a_row=0, reason=None, doubt=None)
+            learned = replace(before, in_a_row=0, reason=None)
         else:
             count = self.in_a_row + 1
             said = f"{count} trials in a row were rejected: {fault}" if trial.reason else f"{fault}"
             reason = said if count >= self.max_in_a_row else None
-            learned = replace(self, in_a_row=count, reason=reason, doubt=None)
+            learned = replace(before, in_a_row=count, reason=reason)
         if trial.commanded_isi_ms is not None:  # a control trial says nothing about an ISI
             learned = replace(learned, early_ms=None, early=0)
         if trial.mep_mv is None or not trial.told:
             return learned
         return _with_amplitude(learned, trial.mep_mv, trial.isi_ms)
 
-    def _after_early(self, trial: Trial) -> Watch:
-        """The same after a pulse that came before the impact by chance: at one ISI that does not happen for ever."""
-        early = self.early + 1 if trial.commanded_isi_ms == self.early_ms else 1
-        reason = None
-        if early >= EARLY_IN_A_ROW:
-            reason = (
-                f"At {trial.commanded_isi_ms:g} ms the pulse came before the impact {early} times in a row. "
-                f"{remedy_for(MistrialReason.TMS_BEFORE_IMPACT)} Or begin the space at a larger ISI."
-            )
-        return replace(self, early_ms=trial.commanded_isi_ms, early=early, reason=reason, doubt=None)
-
 
 def _with_amplitude(watch: Watch, mep_mv: float, isi_ms: float | None) -> Watch:
     watch = replace(watch, meps_mv=(*watch.meps_mv, mep_mv), isis_ms=(*watch.isis_ms, isi_ms))
-    doubt = doubt_of(watch.meps_mv, watch.detection_limit_mv, watch.isis_ms)
-    if doubt is None or doubt.kind in watch.settled:
-        return watch
-    settled, reason = watch.settled | {doubt.kind}, watch.reason or doubt.text
-    return replace(watch, settled=settled, reason=reason, doubt=doubt.text)
+    doubts = watch.doubts.after(doubt_of(watch.meps_mv, watch.detection_limit_mv, watch.isis_ms))
+    reason = watch.reason or (None if doubts.new is None else doubts.new.text)
+    return replace(watch, doubts=doubts, reason=reason)
+
+
+def _after_early(watch: Watch, trial: Trial) -> Watch:
+    """After a pulse that came before the impact by chance: at one ISI that does not happen for ever."""
+    early = watch.early + 1 if trial.commanded_isi_ms == watch.early_ms else 1
+    reason = None
+    if early >= EARLY_IN_A_ROW:
+        reason = (
+            f"At {trial.commanded_isi_ms:g} ms the pulse came before the impact {early} times in a row. "
+            f"{remedy_for(MistrialReason.TMS_BEFORE_IMPACT)} Or begin the space at a larger ISI."
+        )
+    return replace(watch, early_ms=trial.commanded_isi_ms, early=early, reason=reason)

@@ -18,7 +18,8 @@ from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
-from isiw.signals.plausibility import DoubtKind, doubt_of, is_silent, require_plausible
+from isiw.signals.doubts import Doubts, doubt_of, doubt_of_isi, is_silent
+from isiw.signals.plausibility import require_plausible
 from isiw.strategy.choosing import Choice, Cost, evenly_spaced
 from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision, StoppingRule
@@ -104,7 +105,7 @@ class Strategy:
             )
         self._mistrials = self._controls = self._lost = 0
         self._meps_mv: list[float] = []
-        self._doubted: set[DoubtKind] = set()
+        self._doubts = Doubts()
         self._choice: Choice | None = None
         self._fallback_reason: str | None = None
 
@@ -248,12 +249,12 @@ class Strategy:
         plain_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
         asked_ms = None if self._choice is None else self._choice.isi_ms
-        doubt = require_plausible(plain_ms, plain_mv, asked_ms, self.space)
+        require_plausible(plain_ms, plain_mv, asked_ms, self.space)
         self.learn(isi_ms, mep_mv, response=response, isi_sd_ms=isi_sd_ms)
-        doubt = doubt or doubt_of(self._meps_mv, self.detection_limit_mv)
-        if doubt is not None and doubt.kind not in self._doubted:
-            self._doubted.add(doubt.kind)
-            warnings.warn(doubt.text, ImplausibleDataWarning, stacklevel=2)
+        doubt = doubt_of_isi(plain_ms, asked_ms, self.space) or doubt_of(self._meps_mv, self.detection_limit_mv)
+        self._doubts = self._doubts.after(doubt)
+        if self._doubts.new is not None:
+            warnings.warn(self._doubts.new.text, ImplausibleDataWarning, stacklevel=2)
 
     def learn(
         self,

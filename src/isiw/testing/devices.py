@@ -14,8 +14,8 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
 from isiw.errors import IsiwError
 from isiw.log.topics import waveform_topic
 from isiw.signals import SignalLimits, judge, judge_measurement
+from isiw.signals.doubts import DoubtKind, doubt_of
 from isiw.signals.faults import likely_fault, too_early_by_chance
-from isiw.signals.plausibility import DoubtKind, doubt_of
 from isiw.testing.device_table import Delivery, DeviceTable, device_table
 from isiw.testing.guarded import Guarded, Pace
 from isiw.testing.phantom import artefact_in_window
