@@ -99,7 +99,7 @@ def test_an_isi_as_asked_or_that_nobody_asked_is_not_doubted(
 def test_each_kind_of_doubt_is_new_once() -> None:
     equal, large = Doubt(DoubtKind.EQUAL, "equal"), Doubt(DoubtKind.LARGE, "large")
     doubts, new = Doubts(), []
-    for doubt in (None, equal, equal, large, None, equal):
-        doubts = doubts.after(doubt)
+    for odd in ([None, None], [equal, None], [equal], [equal, large], [], [large, equal]):
+        doubts = doubts.after(*odd)
         new.append(doubts.new)
     assert new == [None, equal, None, large, None, None]

@@ -185,8 +185,8 @@ class Recorder(Judging):
         trial = Trial(asked.trial, Status.ACCEPTED, asked.isi_ms, isi_ms=isi_ms, mep_mv=mep_mv,
                       isi_sd_ms=isi_sd_ms, background_rms_uv=background_rms_uv)  # fmt: skip
         self._conclude(trial)
-        off = doubt_of_isi(isi_ms, asked.isi_ms, self.strategy.space)
-        self._doubts = self._doubts.after(off or doubt_of(*self._amplitudes()))
+        off, odd = doubt_of_isi(isi_ms, asked.isi_ms, self.strategy.space), doubt_of(*self._amplitudes())
+        self._doubts = self._doubts.after(off, odd)
         if self._doubts.new is not None:
             self._warn(self._doubts.new.text)
 

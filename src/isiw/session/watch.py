@@ -74,7 +74,7 @@ class Watch:
             trial: the trial.
             answer: what the device answered.
         """
-        before = replace(self, doubts=self.doubts.after(None))
+        before = replace(self, doubts=self.doubts.after())
         if too_early_by_chance(trial, self.space):
             return _after_early(before, trial)
         fault = likely_fault(answer, trial, self.signals)

@@ -80,15 +80,14 @@ class Doubts:
     raised: frozenset[DoubtKind] = frozenset()
     new: Doubt | None = None
 
-    def after(self, doubt: Doubt | None) -> Doubts:
+    def after(self, *odd: Doubt | None) -> Doubts:
         """The same after one more trial.
 
         Args:
-            doubt: what is odd since then; None where nothing is.
+            *odd: what is odd since then, of which the first that is new is raised; None where nothing is.
         """
-        if doubt is None or doubt.kind in self.raised:
-            return Doubts(self.raised)
-        return Doubts(self.raised | {doubt.kind}, doubt)
+        new = next((doubt for doubt in odd if doubt is not None and doubt.kind not in self.raised), None)
+        return Doubts(self.raised if new is None else self.raised | {new.kind}, new)
 
 
 def doubt_of_isi(isi_ms: float | None, asked_ms: float | None, space: DesignSpace) -> Doubt | None:

@@ -105,6 +105,7 @@ class Strategy:
             )
         self._mistrials = self._controls = self._lost = 0
         self._meps_mv: list[float] = []
+        self._isis_ms: list[float | None] = []
         self._doubts = Doubts()
         self._choice: Choice | None = None
         self._fallback_reason: str | None = None
@@ -243,16 +244,18 @@ class Strategy:
             StrategyError: a kind of outcome that the model cannot learn from.
 
         Warns:
-            ImplausibleDataWarning: an ISI far from the one that was asked, or amplitudes that look like a slip of unit;
-                once of each kind.
+            ImplausibleDataWarning: an ISI far from the one that was asked, or amplitudes that look like a slip of unit
+                or a rig in trouble; once of each kind.
         """
         plain_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
         asked_ms = None if self._choice is None else self._choice.isi_ms
         require_plausible(plain_ms, plain_mv, asked_ms, self.space)
         self.learn(isi_ms, mep_mv, response=response, isi_sd_ms=isi_sd_ms)
-        doubt = doubt_of_isi(plain_ms, asked_ms, self.space) or doubt_of(self._meps_mv, self.detection_limit_mv)
-        self._doubts = self._doubts.after(doubt)
+        self._doubts = self._doubts.after(
+            doubt_of_isi(plain_ms, asked_ms, self.space),
+            doubt_of(self._meps_mv, self.detection_limit_mv, self._isis_ms),
+        )
         if self._doubts.new is not None:
             warnings.warn(self._doubts.new.text, ImplausibleDataWarning, stacklevel=2)
 
@@ -286,7 +289,9 @@ class Strategy:
         isi_sd_ms = number("isi_sd_ms", isi_sd_ms, least=0)
         isi_ms = None if isi_ms is None else self.space.check_realised(isi_ms)
         self._course = self._course.after(Observation.of([isi_ms], [mep_mv], [isi_sd_ms], [response]))
-        self._meps_mv += [] if mep_mv is None else [mep_mv]
+        if mep_mv is not None:
+            self._meps_mv.append(mep_mv)
+            self._isis_ms.append(isi_ms)
         self._choice = self._fallback_reason = None
         self._lost = 0 if isi_ms is not None else self._lost
 
