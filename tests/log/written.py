@@ -12,7 +12,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.log.schema import Header, Intent, StrategyRecipe, Waveform
 from isiw.log.writer import LogWriter
-from isiw.signals.judgement import SignalLimits
+from isiw.signals.limits import SignalLimits
 from isiw.trials import Channel, Status, Trial
 
 SPACE = DesignSpace(0, 200)

@@ -11,7 +11,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.log.schema import Header, StrategyRecipe
 from isiw.log.writer import LogWriter
-from isiw.signals.judgement import SignalLimits
+from isiw.signals.limits import SignalLimits
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
 from isiw.trials import Status, Trial

@@ -35,7 +35,7 @@ from isiw.devices.limits import Limits
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import RUN_KEY
-from isiw.signals.judgement import SignalLimits
+from isiw.signals.limits import SignalLimits
 from isiw.text.toml_files import checked, read_toml
 from isiw.visit import VisitProtocol
 

@@ -28,7 +28,7 @@ from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.log.production import Production, ProductionHeader
-from isiw.signals.judgement import SignalLimits
+from isiw.signals.limits import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import IntensityRange, ThresholdEstimate
 from isiw.text.found import finding

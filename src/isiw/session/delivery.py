@@ -12,7 +12,8 @@ from isiw.session.journal import Journal
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig
 from isiw.session.watch import Watch
-from isiw.signals.judgement import SignalLimits, judge, judge_measurement
+from isiw.signals.judgement import judge, judge_measurement
+from isiw.signals.limits import SignalLimits
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
 __all__ = ["Delivery"]

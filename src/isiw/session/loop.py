@@ -34,7 +34,7 @@ from isiw.session.steps import Steps, paused
 from isiw.session.terminal import is_terminal, somebody_there
 from isiw.session.updates import SessionResult, SessionUpdate
 from isiw.session.watch import Watch
-from isiw.signals.judgement import SignalLimits
+from isiw.signals.limits import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable

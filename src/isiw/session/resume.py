@@ -23,7 +23,7 @@ from isiw.session.loop import Session
 from isiw.session.replay import Replayed, replay, resumption_text, strategy_of, warn_where_differing
 from isiw.session.safeguards import Safeguards
 from isiw.session.updates import SessionUpdate
-from isiw.signals.judgement import SignalLimits
+from isiw.signals.limits import SignalLimits
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus, TrialTable
 

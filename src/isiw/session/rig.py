@@ -19,7 +19,7 @@ from isiw.log.writer import LogWriter
 from isiw.session.interrupts import Interrupts
 from isiw.session.lastresort import INTERRUPTED, STILL_ARMED, end_process
 from isiw.session.safeguards import Safeguards
-from isiw.signals.judgement import EMG_UNITS_MV, require_unit
+from isiw.signals.units import EMG_UNITS_MV, require_unit
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus
 from isiw.visit import VisitProtocol

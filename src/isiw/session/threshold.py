@@ -21,7 +21,7 @@ from isiw.log.schema import Event, Header, Intent, PulseOutcome, StrategyRecipe,
 from isiw.log.threshold import outcomes, read_threshold_salvaged
 from isiw.log.writer import LogWriter
 from isiw.session.header import header_with, require_parts
-from isiw.signals.judgement import SignalLimits
+from isiw.signals.limits import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search

@@ -10,7 +10,7 @@ from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer
 from isiw.signals.doubts import Doubts, doubt_of, doubts_of
 from isiw.signals.faults import likely_fault, remedy_for, too_early_by_chance
-from isiw.signals.judgement import SignalLimits
+from isiw.signals.limits import SignalLimits
 from isiw.trials import MistrialReason, Trial, TrialTable
 
 __all__ = ["Watch"]

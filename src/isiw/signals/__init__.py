@@ -3,7 +3,8 @@
 from isiw.signals.amplifier import is_saturated
 from isiw.signals.events import TapEvents, detect_events, load_cell_times, sweep_events
 from isiw.signals.impact import impact_time, impact_times
-from isiw.signals.judgement import SignalLimits, judge, judge_measurement, wrong_isi
+from isiw.signals.judgement import judge, judge_measurement, wrong_isi
+from isiw.signals.limits import SignalLimits
 from isiw.signals.mep import (
     MEP_WINDOWS_MS,
     background_rms,

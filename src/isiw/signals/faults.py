@@ -15,7 +15,8 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.signals.impact import impact_time
-from isiw.signals.judgement import SignalLimits, of_one_length
+from isiw.signals.judgement import of_one_length
+from isiw.signals.limits import SignalLimits
 from isiw.signals.plausibility import implausible_amplitude, off_by
 from isiw.signals.waveforms import is_recording
 from isiw.trials import Channel, Measurement, MistrialReason, Sweep, Trial

@@ -7,21 +7,19 @@ every trial, an unknown unit or a rate that measures nothing, is an error: repea
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from types import MappingProxyType
+from dataclasses import asdict, replace
 
 import numpy as np
 
-from isiw.checks import MOST_MEP_MV, ascending, check_numbers
+from isiw.checks import MOST_MEP_MV
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals.agreement import pulse_with_tap_alone, require_agreement, tap_with_tms_alone
 from isiw.signals.amplifier import is_blanked, is_saturated
 from isiw.signals.events import tap_artefact_times
 from isiw.signals.impact import impact_time
+from isiw.signals.limits import SignalLimits
 from isiw.signals.mep import (
-    MEP_WINDOW_MS,
     MIN_BACKGROUND_MS,
     PULSE_GUARD_MS,
     TAP_SPAN_MS,
@@ -29,103 +27,17 @@ from isiw.signals.mep import (
     mep_amplitudes,
 )
 from isiw.signals.plausibility import implausible_amplitude
+from isiw.signals.units import ACCELERATION_UNITS, EMG_UNITS_MV, require_unit
 from isiw.signals.waveforms import MIN_REST_MS, is_recording
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
 from isiw.types import FloatArray
 
 __all__ = [
-    "ACCELERATION_UNITS",
-    "EMG_UNITS_MV",
-    "SignalLimits",
     "judge",
     "judge_measurement",
     "of_one_length",
-    "require_unit",
     "wrong_isi",
 ]
-
-EMG_UNITS_MV: Mapping[str, float] = MappingProxyType({"V": 1e3, "mV": 1.0, "uV": 1e-3, "µV": 1e-3, "μV": 1e-3})
-"""One of each unit in mV; both of Unicode's micro signs are known."""
-
-ACCELERATION_UNITS = frozenset({"m/s^2", "m/s²", "g", "V", "mV"})
-"""Units of the acceleration; the impact is found in any of them."""
-
-LEAST_WINDOW_MS = 1.0
-LEAST_BACKGROUND_UV = 0.2
-"""No amplifier is so quiet, and no MEP so early: such limits are in mV, or in s."""
-
-
-def require_unit(name: str, unit: str, known: Collection[str]) -> None:
-    """Raise where a waveform is in a unit that nobody can judge.
-
-    Args:
-        name: of the channel.
-        unit: its unit.
-        known: `EMG_UNITS_MV` or `ACCELERATION_UNITS`.
-
-    Raises:
-        InvalidValueError: an unknown unit.
-    """
-    if unit not in known:
-        raise InvalidValueError(
-            f"the unit of the channel {name} is unknown", got=unit, expected=", ".join(sorted(known))
-        )
-
-
-@dataclass(frozen=True)
-class SignalLimits:
-    """What a sweep must satisfy to be accepted.
-
-    Args:
-        mep_window_ms: where the MEP is sought [ms after the pulse]; `MEP_WINDOWS_MS` has one for each muscle group.
-        background_uv: the most EMG at rest before the pulse [µV RMS]; above it the muscle was not relaxed.
-        full_scale_mv: the largest EMG that the amplifier can show [mV]; None to look for flat tops only, which are
-            looked for in any case.
-        isi_tolerance_ms: how far the realised ISI may be from the commanded one [ms], where that is less than the
-            space's tolerance.
-        tap_artefact_ms: how long the artefact of the tap lasts in the EMG [ms]; what it covers of the MEP window does
-            not count.
-
-    Raises:
-        InvalidValueError: a limit that is not positive, a window without first and last ms, or a slip of unit.
-    """
-
-    mep_window_ms: tuple[float, float] = MEP_WINDOW_MS
-    background_uv: float = 10.0
-    full_scale_mv: float | None = None
-    isi_tolerance_ms: float | None = None
-    tap_artefact_ms: float = 8.0
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "background_uv", "tap_artefact_ms", above=0)
-        check_numbers(self, "full_scale_mv", "isi_tolerance_ms", above=0, optional=True)
-        _check_window(self.mep_window_ms)
-        if self.background_uv < LEAST_BACKGROUND_UV:
-            raise InvalidValueError(
-                "SignalLimits.background_uv is less than any amplifier's noise",
-                got=self.background_uv,
-                expected="µV RMS, such as 10",
-                remedy="Is it in mV? Multiply by 1000.",
-            )
-
-    def tolerance_ms(self, space: DesignSpace) -> float:
-        """How far a realised ISI may be from the commanded one [ms]."""
-        return min(space.tolerance_ms, self.isi_tolerance_ms or math.inf)
-
-
-def _check_window(window_ms: tuple[float, float]) -> None:
-    """Raise where this is no span of time after the pulse in which an MEP may be."""
-    name, such_as = "SignalLimits.mep_window_ms", f"such as {MEP_WINDOW_MS}"
-    if not isinstance(window_ms, Sequence) or len(window_ms) != 2:
-        raise InvalidValueError(f"{name} must be its first and its last ms", got=window_ms, expected=such_as)
-    _, last_ms = ascending(name, window_ms, least=0)
-    if last_ms < LEAST_WINDOW_MS:
-        raise InvalidValueError(
-            f"{name} ends before any MEP begins",
-            got=window_ms,
-            expected=f"ms after the pulse, {such_as}",
-            remedy="Is it in seconds? Multiply by 1000.",
-        )
 
 
 def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Trial:

@@ -10,7 +10,7 @@ import numpy as np
 
 from isiw.devices.protocol import Answer, DeviceInfo
 from isiw.signals.faults import steepest_edge
-from isiw.signals.judgement import SignalLimits
+from isiw.signals.limits import SignalLimits
 from isiw.trials import Stimulus, Sweep, Trial
 
 __all__ = ["Delivery", "DeviceTable", "device_table"]

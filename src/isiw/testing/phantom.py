@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from isiw.signals import SignalLimits
-from isiw.signals.judgement import EMG_UNITS_MV
+from isiw.signals.units import EMG_UNITS_MV
 from isiw.testing.device_table import Delivery
 from isiw.trials import RESPONSE_MV, Sweep
 
