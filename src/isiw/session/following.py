@@ -40,7 +40,7 @@ class Follower(Protocol):
 
 
 class Followers:
-    """All who look on. Who fails is told nothing more, and the session goes on.
+    """All who look on. One whose call fails is not called again, and the session goes on.
 
     Args:
         faults: where a failure is put, for the log.
