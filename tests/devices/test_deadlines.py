@@ -182,32 +182,102 @@ def test_a_device_that_is_armed_too_late_is_disarmed_once_more(
     assert stopped_after.wait(30)
 
 
-def test_a_stop_that_ends_after_the_next_staging_does_not_count_for_it(
+def test_a_staging_begins_only_after_a_stop_that_is_under_way_and_needs_one_of_its_own(
     punctual: MakePunctual, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    device, stopping, armed = ScriptedDevice(), threading.Event(), threading.Event()
-    states = []
-
-    def stage() -> None:
-        stopping.wait(30)
-        states.append("armed")
-        armed.set()
+    device, stopping, states = ScriptedDevice(), threading.Event(), []
 
     def stop() -> None:
-        states.append("disarmed")
         stopping.set()
-        armed.wait(30)
+        time.sleep(SHORT_S)
+        states.append("disarmed")
 
-    monkeypatch.setattr(device, "stage", stage)
+    monkeypatch.setattr(device, "stage", lambda: states.append("armed"))
     monkeypatch.setattr(device, "stop", stop)
     wrapped = punctual(device)
-    late = threading.Thread(target=wrapped.stop)
-    late.start()
+    earlier = threading.Thread(target=wrapped.stop)
+    earlier.start()
     stopping.wait(30)
     wrapped.stage()
-    late.join()
+    earlier.join()
     wrapped.stop()
     assert states == ["disarmed", "armed", "disarmed"]
+
+
+def test_nobody_arms_a_device_while_a_delivery_that_was_given_up_may_yet_fire(released: threading.Event) -> None:
+    staged = []
+
+    class Hanging(ScriptedDevice):
+        def stage(self) -> None:
+            staged.append(released.is_set())
+
+        def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:
+            del timeout_s
+            released.wait(60)
+            return Measurement(0.2, stimulus.isi_ms)
+
+    device, deadlines = Hanging(), Deadlines(stop_s=SHORT_S)
+    wrapped = PunctualDevice(device, deadlines)
+    wrapped.stage()
+    with pytest.raises(DeviceTimeoutError):
+        wrapped.deliver(STIMULUS, SHORT_S)
+    for again in (wrapped, PunctualDevice(device, deadlines)):  # after a pause, and in another session
+        with pytest.raises(DeviceError, match="still busy, and could yet fire"):
+            again.stage()
+    released.set()
+    PunctualDevice(device, Deadlines()).stage()
+    assert staged == [False, True]
+
+
+def test_a_device_that_stays_armed_after_a_verb_that_was_given_up_is_told(
+    reports: list[str], released: threading.Event
+) -> None:
+    told, said = [], threading.Event()
+
+    class ArmedLate(ScriptedDevice):
+        late = False
+
+        def stage(self) -> None:
+            released.wait(60)
+            self.late = True
+
+        def stop(self) -> None:
+            if self.late:
+                raise OSError("port busy")
+
+    def still_armed(error: StillArmedError) -> None:
+        told.append(str(error))
+        said.set()
+
+    deadlines = Deadlines(stage_s=SHORT_S, stop_s=5.0)
+    wrapped = PunctualDevice(ArmedLate(), deadlines, report=reports.append, still_armed=still_armed)
+    with pytest.raises(DeviceTimeoutError):
+        wrapped.stage()
+    released.set()
+    assert said.wait(30)
+    assert "port busy" in told[0]
+    assert len(reports) == 3
+
+
+def test_a_device_that_is_stopped_while_it_is_being_staged_is_stopped_again(punctual: MakePunctual) -> None:
+    class Armable(ScriptedDevice):
+        armed = False
+
+        def stage(self) -> None:
+            self.armed = True
+
+        def stop(self) -> None:
+            self.armed = False
+
+    for _ in range(200):
+        device = Armable()
+        wrapped = punctual(device)
+        meanwhile = threading.Thread(target=wrapped.stop)
+        meanwhile.start()
+        wrapped.stage()
+        meanwhile.join()
+        wrapped.stop()
+        assert not device.armed
 
 
 def test_what_was_stopped_delivers_nothing_before_it_is_staged_anew(punctual: MakePunctual) -> None:

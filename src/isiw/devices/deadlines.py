@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 from isiw.checks import check_numbers, check_wholes
 from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness, require_staged
-from isiw.errors import DeviceTimeoutError, StillArmedError, told
+from isiw.errors import DeviceError, DeviceTimeoutError, StillArmedError, told
 from isiw.trials import Stimulus
 
 __all__ = ["Deadlines", "PunctualDevice"]
@@ -118,18 +118,42 @@ class _Worker:
             call.run()
 
 
+class _GivenUp:
+    """The verbs of all devices that were given up and may still be busy: each may yet arm its device, or fire.
+
+    They are kept beyond the session that gave them up, as the next one may drive the same device.
+    """
+
+    def __init__(self) -> None:
+        self._calls: list[tuple[Device, _Call[Any]]] = []  # few, if any; a device need not be hashable
+        self._lock = threading.Lock()
+
+    def add(self, device: Device, call: _Call[Any]) -> None:
+        with self._lock:
+            self._calls.append((device, call))
+
+    def busy(self, device: Device) -> list[_Call[Any]]:
+        with self._lock:
+            self._calls = [(whose, call) for whose, call in self._calls if not call.ended]
+            return [call for whose, call in self._calls if whose is device]
+
+
+_given_up = _GivenUp()
+
+
 class PunctualDevice:
     """A device whose verbs end in time, or are given up and followed by `stop` from outside.
 
     All verbs run in one thread of their own, one after the other. A verb that is given up may still be busy; when it
-    ends, the device is stopped once more, in case it armed it. `stop` is tried several times, from another thread where
-    the device's own is busy.
+    ends, the device is disarmed once more, in case it armed it, and until then nobody arms the device. `stop` is tried
+    several times, from another thread where the device's own is busy.
 
     Args:
         device: the device.
         deadlines: how long each verb may take.
         given_up: whether nobody waits any more for a delivery; asked while it lasts.
         report: is told what went wrong and was overcome, in words; called from any thread.
+        still_armed: is called where the device cannot be disarmed after a verb that was given up, in the verb's thread.
 
     Raises:
         DeviceTimeoutError: the device does not say what it is.
@@ -142,9 +166,11 @@ class PunctualDevice:
         *,
         given_up: Callable[[], bool] = lambda: False,
         report: Callable[[str], None] = lambda _: None,
+        still_armed: Callable[[StillArmedError], object] = lambda _: None,
     ) -> None:
         self._device, self._deadlines = device, deadlines or Deadlines()
-        self._given_up, self._report = given_up, report
+        self._given_up, self._report, self._still_armed = given_up, report, still_armed
+        self._name = type(device).__name__
         self._stopping = threading.RLock()
         # How often it was staged; how often when it was last stopped, and when it was disarmed with no verb busy. So a
         # `stop` that ends after the next `stage` has begun is not taken for one that disarmed it.
@@ -153,6 +179,7 @@ class PunctualDevice:
         self._worker: _Worker | None = None
         self._owner = threading.get_ident()
         self._info = self._within("describe", device.describe, self._deadlines.describe_s)
+        self._name = self._info.name
 
     def describe(self) -> DeviceInfo:
         """What the device is, as it said at first."""
@@ -162,10 +189,21 @@ class PunctualDevice:
         """Get ready and arm.
 
         Raises:
+            DeviceError: a verb that was given up is still busy; the device was not armed.
             DeviceTimeoutError: not within its deadline.
         """
-        self._stages += 1
-        self._within("stage", self._device.stage, self._deadlines.stage_s)
+        for call in _given_up.busy(self._device):
+            call.wait(call.age_s + self._deadlines.stop_s)
+        with self._stopping:  # else a `stop` that comes meanwhile would take the device for disarmed
+            if _given_up.busy(self._device):
+                raise DeviceError(
+                    "the device is not armed: what was given up is still busy, and could yet fire",
+                    got=self._name,
+                    remedy="See to the device and try again; or end this process, and go on with the session's log.",
+                )
+            self._stages += 1
+            call = self._begun(self._device.stage)
+        self._awaited("stage", call, self._deadlines.stage_s)
 
     def readiness(self) -> Readiness:
         """What the device says about its state; ready, where it cannot say.
@@ -189,7 +227,7 @@ class PunctualDevice:
             DeviceTimeoutError: no answer in time; `late_answer` may have it.
         """
         with self._stopping:
-            require_staged(self._info.name, staged=self._stopped_at != self._stages)
+            require_staged(self._name, staged=self._stopped_at != self._stages)
             call = self._begun(partial(self._device.deliver, stimulus, timeout_s))
         self._late = call
         return self._awaited("deliver", call, timeout_s, self._given_up)
@@ -232,13 +270,13 @@ class PunctualDevice:
             self._report(f"Attempt {attempt} to disarm failed: {failure}")
         raise StillArmedError(
             "the device cannot be disarmed",
-            got=f"{self._info.name}: {failure}",
+            got=f"{self._name}: {failure}",
             remedy="Cut its power or open the interlock now.",
         )
 
     @property
     def _idle(self) -> bool:
-        return self._worker is None or self._worker.idle
+        return not _given_up.busy(self._device) and (self._worker is None or self._worker.idle)
 
     def unstage(self) -> None:
         """Let go of what `stage` took.
@@ -274,7 +312,7 @@ class PunctualDevice:
             return call.result()
         error = DeviceTimeoutError(
             f"the device was given up: {name} took too long",
-            got=self._info.name if name != "describe" else None,
+            got=self._name if name != "describe" else None,
             expected=f"an answer within {deadline_s:g} s",
             remedy="It is disarmed. See to it, then go on with the session's log.",
         )
@@ -289,10 +327,17 @@ class PunctualDevice:
             raise armed from error
 
     def _give_up(self) -> None:
-        """Leave the thread to the verb it is busy with; when that ends it stops the device once more, and ends."""
+        """Leave the thread to the verb it is busy with; when that ends it disarms the device once more, and ends."""
         if self._worker is not None:
-            self._worker.begin(self._device.stop)
+            _given_up.add(self._device, self._worker.begin(self._stop_late))
         self.release_thread()
+
+    def _stop_late(self) -> None:
+        try:
+            with self._stopping:
+                self._stop()
+        except StillArmedError as error:
+            self._still_armed(error)
 
     def _failure_to_stop(self) -> str | None:
         """Why an attempt to disarm failed; None where it did not."""

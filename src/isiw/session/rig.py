@@ -6,6 +6,7 @@ import math
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Never
 
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.deadlines import PunctualDevice
@@ -47,7 +48,11 @@ class Rig:
         self.staged_once = False
         self._raw, self._limits, self._safeguards = device, limits, safeguards
         self._punctual = PunctualDevice(
-            device, safeguards.deadlines, given_up=lambda: self.interrupts.insisted, report=self.faults.append
+            device,
+            safeguards.deadlines,
+            given_up=lambda: self.interrupts.insisted,
+            report=self.faults.append,
+            still_armed=self._end_armed,
         )
         self.clock = clock or (VirtualClock() if self.info.simulated else MonotonicClock())
         self._limited = self._anew()
@@ -121,7 +126,7 @@ class Rig:
         try:
             self._limited.stop()
         except StillArmedError as error:
-            end_process(told(error), self.log, STILL_ARMED)
+            self._end_armed(error)
 
     def wait_s(self) -> float:
         """How long until the limits allow the next delivery [s]."""
@@ -157,6 +162,9 @@ class Rig:
             error.add_note(self.faults[-1])
         finally:
             self._punctual.release_thread()
+
+    def _end_armed(self, error: StillArmedError) -> Never:
+        end_process(told(error), self.log, STILL_ARMED)
 
     def _end_stuck(self) -> None:
         end_process("The session does not react. The device is disarmed.", self.log, INTERRUPTED)
