@@ -27,7 +27,7 @@ def batches(
     """Sessions of each strategy with each kind of people, so many side by side; the rig states its hit delay."""
     numbers = [range(first, min(first + size, people)) for first in range(0, people, size)]
     return [
-        [RecordedSession(strategy, kind, person, *plan).as_the_rig_states() for person in some]
+        [RecordedSession(strategy, kind, person, *plan, stopping="noted").as_the_rig_states() for person in some]
         for strategy in strategies
         for kind in PEOPLE
         for some in numbers

@@ -259,6 +259,32 @@ def test_a_device_that_stays_armed_after_a_verb_that_was_given_up_is_told(
     assert len(reports) == 3
 
 
+def test_a_device_that_was_never_armed_ends_no_process_where_it_cannot_be_stopped(
+    reports: list[str], released: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    device, still_armed = ScriptedDevice(), list[StillArmedError]()
+
+    def describe() -> Never:
+        released.wait(60)
+        raise OSError("no port")
+
+    def stop() -> Never:
+        raise OSError("no port")
+
+    monkeypatch.setattr(device, "describe", describe)
+    monkeypatch.setattr(device, "stop", stop)
+    with pytest.raises(DeviceTimeoutError):
+        PunctualDevice(device, Deadlines(describe_s=SHORT_S), report=reports.append, still_armed=still_armed.append)
+    released.set()
+    end_s = time.monotonic() + 30
+    while len(reports) < 3 and time.monotonic() < end_s:
+        time.sleep(SHORT_S)
+    monkeypatch.undo()
+    PunctualDevice(device).stage()  # waits until the verb that was given up has been dealt with
+    assert len(reports) == 3
+    assert not still_armed
+
+
 def test_a_device_that_is_stopped_while_it_is_being_staged_is_stopped_again(punctual: MakePunctual) -> None:
     class Armable(ScriptedDevice):
         armed = False

@@ -63,10 +63,10 @@ def _taught(config: RunConfig, device: DeviceInfo) -> Prior:
             remedy="Leave it out, or learn from sessions with people.",
         )
     require_same_person(config, earlier)
-    visits = [(record.path, record.header.visit) for record in earlier]
-    if config.prior is not None and lab is not None:
-        visits.append((config.prior, Visit(muscle=lab.noted_muscle)))
-    _require_like(config, visits)
+    for record in earlier:
+        _require_like(config, record.header.visit, record.path)
+    if lab is not None:
+        _require_like(config, Visit(muscle=lab.noted_muscle), config.prior)
     return after(*earlier, prior=None if lab is None else lab.joined())
 
 
@@ -91,12 +91,11 @@ def require_same_person(config: RunConfig, records: Sequence[SessionRecord]) -> 
         )
 
 
-def _require_like(config: RunConfig, visits: Sequence[tuple[Path, Visit]]) -> None:
+def _require_like(config: RunConfig, visit: Visit, path: Path | None) -> None:
     """Raise where what taught something is of another muscle, or another intensity, than the configuration says."""
-    for path, visit in visits:
-        if unlike := config.visit.noted().unlike(visit):
-            raise ConfigError(
-                f"[visit] and what was learnt from are of {unlike}",
-                got=str(path),
-                remedy="What one taught says little about the other. Leave this file out, or correct [visit].",
-            )
+    if unlike := config.visit.noted().unlike(visit):
+        raise ConfigError(
+            f"[visit] and the sessions that were learnt from are of {unlike}",
+            got=str(path),
+            remedy="What one taught says little about the other. Leave this file out, or correct [visit].",
+        )

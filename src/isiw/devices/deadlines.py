@@ -138,7 +138,7 @@ class _GivenUp:
             return [call for whose, call in self._calls if whose is device]
 
 
-_given_up = _GivenUp()
+_abandoned = _GivenUp()
 
 
 class PunctualDevice:
@@ -172,9 +172,8 @@ class PunctualDevice:
         self._given_up, self._report, self._still_armed = given_up, report, still_armed
         self._name = type(device).__name__
         self._stopping = threading.RLock()
-        # How often it was staged; how often when it was last stopped, and when it was disarmed with no verb busy. So a
-        # `stop` that ends after the next `stage` has begun is not taken for one that disarmed it.
-        self._stages, self._stopped_at, self._disarmed_at = 0, -1, -1
+        # Whether it was ever staged; and since the last time, whether it was stopped, and that with no other verb busy.
+        self._staged = self._stopped = self._disarmed = False
         self._late: _Call[Answer] | None = None
         self._worker: _Worker | None = None
         self._owner = threading.get_ident()
@@ -192,16 +191,16 @@ class PunctualDevice:
             DeviceError: a verb that was given up is still busy; the device was not armed.
             DeviceTimeoutError: not within its deadline.
         """
-        for call in _given_up.busy(self._device):
+        for call in _abandoned.busy(self._device):
             call.wait(call.age_s + self._deadlines.stop_s)
         with self._stopping:  # else a `stop` that comes meanwhile would take the device for disarmed
-            if _given_up.busy(self._device):
+            if _abandoned.busy(self._device):
                 raise DeviceError(
                     "the device is not armed: what was given up is still busy, and could yet fire",
                     got=self._name,
                     remedy="See to the device and try again; or end this process, and go on with the session's log.",
                 )
-            self._stages += 1
+            self._staged, self._stopped, self._disarmed = True, False, False
             call = self._begun(self._device.stage)
         self._awaited("stage", call, self._deadlines.stage_s)
 
@@ -227,7 +226,7 @@ class PunctualDevice:
             DeviceTimeoutError: no answer in time; `late_answer` may have it.
         """
         with self._stopping:
-            require_staged(self._name, staged=self._stopped_at != self._stages)
+            require_staged(self._name, staged=not self._stopped)
             call = self._begun(partial(self._device.deliver, stimulus, timeout_s))
         self._late = call
         return self._awaited("deliver", call, timeout_s, self._given_up)
@@ -255,11 +254,10 @@ class PunctualDevice:
             StillArmedError: the device could not be disarmed, however often it was tried.
         """
         with self._stopping:
-            stages, idle = self._stages, self._idle
-            if self._disarmed_at != stages:
-                self._stopped_at = stages
+            if not self._disarmed:
+                self._stopped, idle = True, self._idle
                 self._stop()
-                self._disarmed_at = stages if idle else -1
+                self._disarmed = idle
 
     def _stop(self) -> None:
         failure = None
@@ -276,7 +274,7 @@ class PunctualDevice:
 
     @property
     def _idle(self) -> bool:
-        return not _given_up.busy(self._device) and (self._worker is None or self._worker.idle)
+        return not _abandoned.busy(self._device) and (self._worker is None or self._worker.idle)
 
     def unstage(self) -> None:
         """Let go of what `stage` took.
@@ -329,7 +327,7 @@ class PunctualDevice:
     def _give_up(self) -> None:
         """Leave the thread to the verb it is busy with; when that ends it disarms the device once more, and ends."""
         if self._worker is not None:
-            _given_up.add(self._device, self._worker.begin(self._stop_late))
+            _abandoned.add(self._device, self._worker.begin(self._stop_late))
         self.release_thread()
 
     def _stop_late(self) -> None:
@@ -337,7 +335,8 @@ class PunctualDevice:
             with self._stopping:
                 self._stop()
         except StillArmedError as error:
-            self._still_armed(error)
+            if self._staged:  # else nobody has armed it, and `stop` may fail because it was never reached
+                self._still_armed(error)
 
     def _failure_to_stop(self) -> str | None:
         """Why an attempt to disarm failed; None where it did not."""
