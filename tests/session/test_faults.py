@@ -239,6 +239,7 @@ from isiw.session.safeguards import Safeguards
 
 device = ScriptedDevice()
 def stop():
+    {screen}
     if {how!r} == "hangs":
         threading.Event().wait()
     raise OSError("port gone")
@@ -253,7 +254,7 @@ print("went on")
 def test_where_a_device_cannot_be_disarmed_the_process_ends_with_the_reason_on_screen_and_in_the_log(
     log: Path, how: str
 ) -> None:
-    script = LOST.format(tests=str(TESTS), how=how, log=str(log))
+    script = LOST.format(tests=str(TESTS), how=how, screen="", log=str(log))
     with Forked(script) as child:
         printed, said = child.stdout.read(), child.stderr.read()
     assert child.returncode == STILL_ARMED
@@ -265,6 +266,29 @@ def test_where_a_device_cannot_be_disarmed_the_process_ends_with_the_reason_on_s
     assert len(record.table) == 3
     assert "cannot be disarmed" in record.events[-1].text
     assert resume(log, ScriptedDevice(), scripted_strategy(3)).run().decision.stop
+
+
+FULL = """import os
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    try:
+        while True:
+            os.write(writing, bytes(4096))
+    except BlockingIOError:
+        os.set_blocking(writing, True)
+    os.dup2(writing, 2)"""
+GONE = """import os
+    reading, writing = os.pipe()
+    os.close(reading)
+    os.dup2(writing, 2)"""
+
+
+@pytest.mark.parametrize("screen", [FULL, GONE], ids=["takes nothing", "is gone"])
+def test_a_process_that_must_end_does_so_where_the_screen_takes_nothing_or_is_gone(log: Path, screen: str) -> None:
+    with Forked(LOST.format(tests=str(TESTS), how="fails", screen=screen, log=str(log))) as child:
+        assert "went on" not in child.stdout.read()
+    assert child.returncode == STILL_ARMED
+    assert "cannot be disarmed" in read_session(log).events[-1].text
 
 
 def test_only_what_can_be_resumed_is_suggested_to_be_resumed(log: Path) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import threading
+from collections.abc import Callable
 from typing import Final, Never
 
 from isiw.log.schema import Event
@@ -22,7 +23,7 @@ STILL_ARMED: Final = 4
 INTERRUPTED: Final = 130
 """The exit code where a session did not react to Ctrl-C: what shells report for it."""
 
-_LOGGING_S = 2.0
+_PATIENCE_S = 2.0
 
 
 def end_process(reason: str, log: LogWriter | None, code: int) -> Never:
@@ -33,16 +34,28 @@ def end_process(reason: str, log: LogWriter | None, code: int) -> Never:
         log: the session's log, which stays as it is and can be resumed; None where there is none.
         code: the exit code.
     """
+    ends = f"{reason} The process ends."
+    try:
+        _try(lambda: _show(ends, log))
+        if log is not None:
+            _try(lambda: _write(ends, log))
+    finally:
+        os._exit(code)
+
+
+def _try(step: Callable[[], object]) -> None:
+    """Take a step in a thread of its own: a terminal or a disk that holds it up, or is gone, holds up nothing else."""
+    trying = threading.Thread(target=step, daemon=True)
+    trying.start()
+    trying.join(_PATIENCE_S)
+
+
+def _show(text: str, log: LogWriter | None) -> None:
     restore()
-    alarm(f"\n{reason} The process ends.")
-    if log is not None:
-        alarm(f"The log is safe; go on with {log.path}.")
-        writing = threading.Thread(target=_write, args=(log, reason), daemon=True)
-        writing.start()
-        writing.join(_LOGGING_S)  # whatever holds the log up must not hold this up
-    os._exit(code)
+    safe = "" if log is None else f"\nThe log is safe; go on with {log.path}."
+    alarm(f"\n{text}{safe}")
 
 
-def _write(log: LogWriter, reason: str) -> None:
-    log.append(Event(kind="fault", text=f"{reason} The process ends."))
+def _write(text: str, log: LogWriter) -> None:
+    log.append(Event(kind="fault", text=text))
     log.sync()
