@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from isiw.errors import InvalidValueError
+from isiw.errors import InvalidValueError, LogError
 from isiw.session.asking import Asking
 from isiw.session.desk import Desk
 from isiw.trials import Status, Trial, TrialTable
@@ -130,6 +130,20 @@ def test_a_note_can_be_dropped(keys: str) -> None:
     press(desk, keys)
     assert session.done == []
     press(desk, "p")
+    assert session.done == [("pause", "Paused by the operator.")]
+
+
+class FullDisk(Operated):
+    def note(self, text: str) -> None:
+        raise LogError("the log cannot be written", got=text)
+
+
+def test_a_note_that_cannot_be_logged_is_told_and_the_next_key_is_heard(capsys: pytest.CaptureFixture[str]) -> None:
+    session = FullDisk(trial(0))
+    desk = Desk(session)
+    with shown(desk, capsys) as lines:
+        press(desk, "ncoil moved\np")
+    assert "the log cannot be written; got 'coil moved'" in lines[-1]
     assert session.done == [("pause", "Paused by the operator.")]
 
 

@@ -213,6 +213,23 @@ def test_q_ends_a_paused_session_which_can_be_resumed(operator: Operator) -> Non
     assert len(resume(operator.log, ScriptedDevice(simulated=False), scripted_strategy(TRIALS)).trials) == 1
 
 
+UP, F2, F3, ALT_R = "\x1b[A", "\x1bOQ", "\x1bOR", "\x1br"
+
+
+def test_arrows_and_function_keys_decide_nothing(operator: Operator) -> None:
+    operator.let(0, 1)
+    operator.press("p")
+    operator.sees("q ends the session")
+    for key in (F3, F2, UP, ALT_R):
+        operator.press(key)
+    operator.press("?")
+    operator.sees("Keys: p pause")
+    assert not operator.armed
+    assert events(operator) == [("pause", 1)]
+    operator.press("r")
+    operator.waits(lambda: operator.armed, "arming")
+
+
 def test_ctrl_c_disarms_pauses_and_asks_and_twice_ends(operator: Operator) -> None:
     operator.let(0)
     operator.press(CTRL_C)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
+import threading
 
 import pytest
 
-from isiw.session.terminal import ERASED, Screen
+from isiw.session.terminal import ERASED, Keys, Screen, typed
 
 
 def seen(written: str) -> list[str]:
@@ -49,6 +51,31 @@ def test_what_is_being_typed_is_not_torn_apart(capsys: pytest.CaptureFixture[str
         screen.say("The note is in the log.")
     written = capsys.readouterr().err
     assert seen(written) == ["trial 0", "trial 1", "Note: acd", "The note is in the log.", "16 left", ""]
+
+
+@pytest.mark.parametrize("key", ["[A", "OR", "O5R", "[15~", "[1;5A", "[[A", "r", "\x1b[A"])
+def test_a_longer_key_is_no_letter_also_where_it_comes_in_parts(key: str) -> None:
+    assert typed(f"a\x1b{key}b") == ("ab", "")
+    for length in range(len(key)):
+        characters, begun = typed(f"a\x1b{key[:length]}")
+        assert characters == "a"
+        assert typed(f"{begun}{key[length:]}b") == ("b", "")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a POSIX terminal")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_where_a_key_fails_in_an_unforeseen_way_nobody_is_there_any_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(key: str) -> None:
+        raise KeyError(key)
+
+    operator, terminal = os.openpty()
+    gone = threading.Event()
+    with os.fdopen(terminal) as keyboard:
+        monkeypatch.setattr("sys.stdin", keyboard)
+        with Keys(fails, gone.set):
+            os.write(operator, b"z")
+            assert gone.wait(10.0)
+    os.close(operator)
 
 
 def test_terminals_obey_nothing_that_is_said(capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,7 @@ from typing import Final, Protocol
 
 from isiw.errors import InvalidValueError, LogError
 from isiw.session.asking import Asking
-from isiw.session.terminal import ERASED, Keys, Screen
+from isiw.session.terminal import ERASED, ESCAPE, Keys, Screen
 from isiw.trials import TrialTable
 
 __all__ = ["KEYS", "Desk", "Operated"]
@@ -136,15 +136,15 @@ class Desk:
         Args:
             key: a character.
         """
-        if self._note is not None:
-            self._type(self._note, key)
-        elif key.lower() in "rq":
-            self._decide(key.lower())
-        elif (act := self._acts.get(key.lower())) is not None:
-            try:
+        try:
+            if self._note is not None:
+                self._type(self._note, key)
+            elif key.lower() in "rq":
+                self._decide(key.lower())
+            elif (act := self._acts.get(key.lower())) is not None:
                 act()
-            except (InvalidValueError, LogError) as error:
-                self.screen.say(f"{error}")
+        except (InvalidValueError, LogError) as error:
+            self.screen.say(f"{error}")
 
     @property
     def _acts(self) -> dict[str, Callable[[], None]]:
@@ -196,7 +196,7 @@ class Desk:
             if note.strip():
                 self._session.note(note.strip())
                 self.screen.say("The note is in the log.")
-        elif key == "\x1b":
+        elif key == ESCAPE:
             self._note = None
             self.screen.type("\n")
         elif key in "\x7f\b":

@@ -8,6 +8,7 @@ from __future__ import annotations
 import codecs
 import os
 import queue
+import re
 import select
 import sys
 import threading
@@ -24,12 +25,18 @@ else:
     import termios
     import tty
 
-__all__ = ["ERASED", "Keys", "Screen", "is_terminal", "restore", "somebody_there"]
+__all__ = ["ERASED", "ESCAPE", "Keys", "Screen", "is_terminal", "restore", "somebody_there", "typed"]
 
 _GLANCE_S = 0.1
 _LAST_WORDS_S = 1.0
 ERASED: Final = "\b \b"
 """What takes back the last sign that was typed."""
+
+ESCAPE: Final = "\x1b"
+
+# What a terminal sends for an arrow, a function key, or a letter with Alt: Escape and more, all at once.
+_SEQUENCE = re.compile(r"\x1b+(\[\[.|\[[ -?]*[^ -?\[]|O[ -?]*[^ -?]|[^\x1b\[O])", re.DOTALL)
+_BEGUN = re.compile(r"\x1b+(\[\[|\[[ -?]*|O[ -?]*)?$")
 
 _as_they_were: dict[int, Any] = {}
 """The settings of terminals that are read key by key, for `restore`: a process that ends itself runs nothing else."""
@@ -128,14 +135,29 @@ def _writable(text: str) -> str:
     return text.encode(encoding, "replace").decode(encoding)
 
 
+def typed(text: str) -> tuple[str, str]:
+    """The characters that were typed, without arrows and function keys, whose letters mean nothing of their own.
+
+    Args:
+        text: what a terminal sent.
+
+    Returns:
+        The characters, and an end that may be the beginning of a longer key.
+    """
+    text = _SEQUENCE.sub("", text)
+    begun = _BEGUN.search(text)
+    return (text, "") if begun is None else (text[: begun.start()], begun.group())
+
+
 class Keys:
     """Reads single keys of standard input while it is entered; Ctrl-C and its like stay signals.
 
-    Nothing is read while the process is in the background, where reading would stop it.
+    Nothing is read while the process is in the background, where reading would stop it. Arrows and function keys are
+    passed over.
 
     Args:
         press: is called with each character, in a thread of its own.
-        gone: is called there where the terminal is closed.
+        gone: is called there where keys are heard no longer, as the terminal is closed or `press` has failed.
     """
 
     def __init__(self, press: Callable[[str], None], gone: Callable[[], None]) -> None:
@@ -166,13 +188,20 @@ class Keys:
             self._take()
 
     def _read(self) -> None:
-        decoder = codecs.getincrementaldecoder("utf-8")(errors="ignore")
-        while not self._over.is_set():
-            data = self._next()
-            if data == b"":
+        try:
+            self._listen()
+        finally:
+            if not self._over.is_set():
                 self._gone()
-                return
-            for character in decoder.decode(data or b""):
+
+    def _listen(self) -> None:
+        decoder, begun = codecs.getincrementaldecoder("utf-8")(errors="ignore"), ""
+        while not self._over.is_set() and (data := self._next()) != b"":
+            if data is not None:
+                characters, begun = typed(begun + decoder.decode(data))
+            else:  # nothing more has come: Escape alone is a key, and the rest of a sequence is none
+                characters, begun = ESCAPE if set(begun) == {ESCAPE} else "", ""
+            for character in characters:
                 self._press(character)
 
     if sys.platform == "win32":
@@ -181,10 +210,14 @@ class Keys:
             """Nothing has to be set."""
 
         def _next(self) -> bytes | None:
-            if msvcrt.kbhit():
-                return msvcrt.getwch().encode()
-            self._over.wait(_GLANCE_S)
-            return None
+            if not msvcrt.kbhit():
+                self._over.wait(_GLANCE_S)
+                return None
+            character = msvcrt.getwch()
+            if character in "\x00\xe0" and msvcrt.kbhit():  # an arrow or a function key, which is two characters
+                msvcrt.getwch()
+                return None
+            return character.encode()
 
     else:
 
