@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 import os
 import signal
 import threading
@@ -150,6 +151,22 @@ def test_what_is_acknowledged_has_disarmed_already() -> None:
         interrupts.settle()
         done.append("armed again")
     assert done == ["disarmed", "armed again"]
+
+
+def test_signals_that_come_at_once_do_not_pass_for_a_session_that_does_not_react(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("isiw.session.interrupts._REACTION_S", 0.5)
+    disarmed, stuck = list[str](), list[str]()
+    with Interrupts(lambda: disarmed.append("now"), lambda: stuck.append("now")) as interrupts:
+        for delay_s in (0.05, 0.1):
+            threading.Timer(delay_s, os.kill, (os.getpid(), signal.SIGINT)).start()
+        hashlib.pbkdf2_hmac("sha256", b"", b"", 1_000_000)  # no handler runs meanwhile
+        interrupts.acknowledge()
+        assert not interrupts.insisted, "the handler ran more than once: they did not come at once"
+        time.sleep(1.0)
+    assert disarmed == ["now", "now"]
+    assert stuck == []
 
 
 def test_every_signal_disarms_also_where_it_is_not_allowed_to_interrupt() -> None:

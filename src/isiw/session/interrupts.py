@@ -23,6 +23,7 @@ _SUSPENDING = getattr(signal, "SIGTSTP", None)
 _PAUSING_SIGNALS = tuple(getattr(signal, name) for name in _PAUSING if hasattr(signal, name))
 _SIGNALS = (*_PAUSING_SIGNALS, *(getattr(signal, name) for name in _ENDING if hasattr(signal, name)))
 
+_PROBE = getattr(signal, "SIGURG", None)  # means nothing to those who do not wait for it; Windows has none
 _REACTION_S = 5.0  # a main thread that runs no handler for so long is stuck
 _DISARMING_S = 30.0
 _GLANCE_S = 0.01
@@ -48,9 +49,10 @@ class Interrupts:
         self._pending = self._allowed = False
         self._heard = self._disarmed = self._handled = 0
         self._settled = 0
-        self._ending = False
+        self._ending = self._answered = False
         self._before: dict[signal.Signals, Any] = {}
         self.away: Callable[[], AbstractContextManager[None]] = nullcontext
+        self._main = threading.get_ident()
         self._watcher: threading.Thread | None = None
         self._over = False
 
@@ -63,6 +65,8 @@ class Interrupts:
             self._watcher.start()
             heard = [number for number in _SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
             self._before = {number: signal.signal(number, self._receive) for number in heard}
+            if _PROBE is not None:
+                self._before[_PROBE] = signal.signal(_PROBE, self._answer)
         return self
 
     def __exit__(
@@ -151,7 +155,7 @@ class Interrupts:
         """Disarm at every signal, however busy the main thread is."""
         with suppress(OSError):  # closed at the end
             while numbers := self._ears.recv(1):
-                if numbers[0] in self._before:
+                if numbers[0] in _SIGNALS:
                     self._heard += 1
                     self._disarm()
                     self._disarmed += 1
@@ -162,7 +166,16 @@ class Interrupts:
         return self._disarmed >= self._handled
 
     def _reacts(self) -> bool:
-        return self._wait_until(lambda: self._over or self._handled >= self._heard, _REACTION_S)
+        """Whether the main thread runs handlers: a probe tells, as two signals at once are handled as one."""
+        if _PROBE is None:
+            return self._wait_until(lambda: self._over or self._handled >= self._heard, _REACTION_S)
+        self._answered = False
+        signal.pthread_kill(self._main, _PROBE)
+        return self._wait_until(lambda: self._over or self._answered, _REACTION_S)
+
+    def _answer(self, number: int, frame: FrameType | None) -> None:
+        del number, frame
+        self._answered = True
 
     @staticmethod
     def _wait_until(holds: Callable[[], bool], at_most_s: float) -> bool:
