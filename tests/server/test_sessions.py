@@ -271,7 +271,7 @@ def test_a_trial_that_was_logged_and_could_not_be_learnt_closes_its_session(
     isi_ms = done(client.post(f"{session}/ask"))["isi_ms"]
     outcome = {"trial": 0, "isi_ms": isi_ms, "mep_mv": 0.1}
     monkeypatch.setattr("isiw.session.recorder.learn", refusing)
-    refused(client.post(f"{session}/tell", json=outcome), 422, "InvalidValueError")
+    assert "not to be learnt" in refused(client.post(f"{session}/tell", json=outcome), 500, "InternalError")["message"]
     monkeypatch.undo()
     refused(client.post(f"{session}/tell", json=outcome), 409, "NotOpen")
     done(client.post(f"{session}/resume"))

@@ -356,6 +356,12 @@ def test_a_resumed_session_logs_what_is_believed_after_trials_were_judged_anew(l
     assert record.estimates[-1].trial == 3
 
 
+def test_an_error_after_the_log_was_closed_stays_the_error_it_is(log: Path) -> None:
+    with pytest.raises(ZeroDivisionError), open_session(scripted_strategy(9), log) as session:
+        session.close()
+        raise ZeroDivisionError
+
+
 def test_an_error_without_words_of_its_own_is_logged_and_the_log_closed(log: Path) -> None:
     class SpeechlessError(Exception):
         def __str__(self) -> str:

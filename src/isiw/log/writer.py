@@ -153,6 +153,11 @@ class LogWriter:
         self._writer.add_metadata("session", facts)
         self._writer.add_attachment(now_ns, now_ns, CONFIGURATION, "application/toml", configuration)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether anything can still be added."""
+        return not self._file.closed
+
     def append(self, record: Record, channel_name: str | None = None) -> None:
         """Append a record; it is durable after the next `sync`.
 
@@ -174,7 +179,7 @@ class LogWriter:
             LogError: the log is closed.
         """
         with self._lock:
-            if self._file.closed:
+            if not self.is_open:
                 raise LogError(
                     "the log is closed, so nothing can be added to it", got=str(self.path), remedy="Resume it to go on."
                 )
@@ -214,7 +219,7 @@ class LogWriter:
                 at its path, and the message says where a copy is.
         """
         with self._lock:
-            if not self._file.closed:
+            if self.is_open:
                 self._close()
 
     def _close(self) -> None:

@@ -11,7 +11,7 @@ from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.server.answers import AskAnswer, EstimateAnswer, SessionAnswer, TrialAnswer, TrialRow
-from isiw.server.refusals import Refusal
+from isiw.server.refusals import Refusal, failed
 from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, NoteRequest, TellRequest
 from isiw.session.recorder import Recorder
 from isiw.strategy.stopping import StopDecision
@@ -56,7 +56,7 @@ class DrivenSession:
         """Within, no other call drives the session. What fails otherwise than by a wrong value or a limit closes it.
 
         Raises:
-            Refusal: it is busy, or was closed.
+            Refusal: it is busy, or was closed, or a trial is on disk and could not be learnt.
         """
         if not self._lock.acquire(timeout=BUSY_S):
             raise Refusal(409, "Busy", "the session is busy with another call", got=self.name, retry_s=1.0)
@@ -67,6 +67,8 @@ class DrivenSession:
             if not (isinstance(error, _HARMLESS) and len(self.recorder.trials) == len(self._outcomes)):
                 self.closed = True
                 self.recorder.__exit__(type(error), error, error.__traceback__)
+                if isinstance(error, InvalidValueError):  # not a value that the client sent
+                    raise failed(error) from error
             raise
         finally:
             self._lock.release()

@@ -12,7 +12,7 @@ from isiw.errors import IsiwError, LimitExceededError, LogError, RequestError, t
 from isiw.server.answers import Error, ErrorAnswer
 from isiw.text import plain
 
-__all__ = ["Refusal", "answered", "as_refusal"]
+__all__ = ["Refusal", "answered", "as_refusal", "failed"]
 
 _LONGEST_VALUE: Final = 200
 
@@ -59,6 +59,15 @@ def as_refusal(error: BaseException) -> Refusal:
         status = 409 if isinstance(error, LimitExceededError | LogError) else 422
         details = {"got": error.got, "expected": error.expected, "remedy": error.remedy}
         return Refusal(status, type(error).__name__, error.what, **details)  # type: ignore[arg-type] # as they are
+    return failed(error)
+
+
+def failed(error: BaseException) -> Refusal:
+    """That not the request was wrong: the server has failed.
+
+    Args:
+        error: at what.
+    """
     return Refusal(
         500,
         "InternalError",

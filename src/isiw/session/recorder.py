@@ -243,7 +243,7 @@ class Recorder(Judging):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            if error is not None:
+            if error is not None and self._journal.is_open:
                 self._journal.failure(error)
                 self._log.sync()
         finally:

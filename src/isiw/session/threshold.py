@@ -289,7 +289,7 @@ class ThresholdRecorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            if error is not None:
+            if error is not None and self._log.is_open:
                 self._log.append(Event(kind="fault", text=told(error)))
         finally:
             self.close()
