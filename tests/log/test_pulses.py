@@ -71,11 +71,26 @@ def test_a_stimulus_is_never_in_the_future(tmp_path: Path, header: Header) -> No
     assert pulses_s(salvage(make_log(tmp_path / "a.mcap", header, intents=1)), now_ns=0) == [0.0]
 
 
-def test_an_earlier_log_without_its_end_is_an_error_with_the_way_out(tmp_path: Path, header: Header) -> None:
-    log = make_log(tmp_path / "a.mcap", header)
+def without_its_end(log: Path) -> Path:
     whole = log.read_bytes()
     log.write_bytes(whole[: whole.rindex(b"\x04\x00\x00\x00zstd", 0, whole.rindex(b"/trial")) - 37])
+    return log
+
+
+def test_an_earlier_log_without_its_end_is_an_error_with_the_way_out(tmp_path: Path, header: Header) -> None:
+    without_its_end(make_log(tmp_path / "a.mcap", header))
     with pytest.raises(DamagedLogError, match=r"end of an earlier log.*Resume that session"):
+        earlier(tmp_path)
+
+
+def test_a_damaged_file_is_no_error_where_its_log_went_on_with_what_was_left(tmp_path: Path, header: Header) -> None:
+    log = without_its_end(make_log(tmp_path / "a.mcap", header, intents=3))
+    with LogWriter.continuing(log, salvage(log), header) as going_on:
+        going_on.append(Intent(trial=3, isi_ms=50.0))
+    left = len(pulses_s(salvage(tmp_path / "a.mcap.damaged")))
+    assert len(earlier(tmp_path)) == left + 1
+    log.rename(tmp_path / "renamed.mcap")
+    with pytest.raises(DamagedLogError):
         earlier(tmp_path)
 
 

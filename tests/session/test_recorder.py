@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Never
 
 import pytest
 
@@ -357,9 +357,13 @@ def test_a_resumed_session_logs_what_is_believed_after_trials_were_judged_anew(l
 
 
 def test_an_error_after_the_log_was_closed_stays_the_error_it_is(log: Path) -> None:
-    with pytest.raises(ZeroDivisionError), open_session(scripted_strategy(9), log) as session:
-        session.close()
-        raise ZeroDivisionError
+    def loop() -> None:
+        with open_session(scripted_strategy(9), log) as session:
+            session.close()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        loop()
 
 
 def test_an_error_without_words_of_its_own_is_logged_and_the_log_closed(log: Path) -> None:
@@ -372,6 +376,24 @@ def test_an_error_without_words_of_its_own_is_logged_and_the_log_closed(log: Pat
     record = read_session(log)
     assert record.finished
     assert "Speechless" in record.events[-1].text
+
+
+def test_what_is_asked_again_as_the_first_ask_failed_is_one_stimulus(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        monkeypatch.setattr("isiw.log.writer.LogWriter.require_in_place", failing)
+        with pytest.raises(LogError):
+            session.ask()
+        monkeypatch.undo()
+        run(session, 1)
+    record = read_session(log)
+    assert len(record.intents) == 2
+    assert record.given == len(record.table) == 1
+
+
+def failing(_: object) -> Never:
+    raise LogError("the log is no longer at its path")
 
 
 def test_an_excluded_trial_is_unlearnt_and_stays_so(log: Path) -> None:

@@ -164,9 +164,13 @@ def test_after_it_is_closed_nothing_is_asked(log: Path) -> None:
 
 
 def test_an_error_after_it_was_closed_stays_the_error_it_is(log: Path) -> None:
-    with pytest.raises(ZeroDivisionError), opened(log) as recorder:
-        recorder.close()
-        raise ZeroDivisionError
+    def loop() -> None:
+        with opened(log) as recorder:
+            recorder.close()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        loop()
 
 
 def test_nothing_is_told_that_was_not_asked(log: Path) -> None:

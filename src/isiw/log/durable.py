@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import IO, NamedTuple, Self
+from typing import IO, Final, NamedTuple, Self
 
 from isiw.errors import LogError
 from isiw.log.locks import lock
@@ -25,13 +25,18 @@ __all__ = [
     "DurableFile",
     "Fingerprint",
     "begun",
+    "damaged_of",
     "disk_errors",
+    "kept_for",
     "log_of",
     "part_of",
     "put",
     "sync_folder",
     "take_free_place",
 ]
+
+
+_DAMAGED: Final = ".damaged"
 
 
 class Fingerprint(NamedTuple):
@@ -63,6 +68,22 @@ def part_of(path: Path) -> Path:
 def log_of(path: Path) -> Path:
     """Where a log is once it is finished, from either of its names."""
     return path.with_suffix("") if path.suffix == ".part" else path
+
+
+def damaged_of(path: Path, number: int) -> Path:
+    """Where the damaged file of a log is kept when the log goes on.
+
+    Args:
+        path: the log.
+        number: how many are kept already.
+    """
+    return path.with_name(f"{path.name}{_DAMAGED}{number or ''}")
+
+
+def kept_for(path: Path) -> Path | None:
+    """The log whose damaged file is kept at a path; None where the path's name does not say so."""
+    name, damaged, number = path.name.rpartition(_DAMAGED)
+    return path.with_name(name) if damaged and name and (number.isdecimal() or not number) else None
 
 
 def sync_folder(folder: Path) -> None:

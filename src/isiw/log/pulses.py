@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from isiw.errors import DamagedLogError, LogError
-from isiw.log.durable import log_of, part_of
+from isiw.log.durable import kept_for, log_of, part_of
 from isiw.log.outputs import is_log
 from isiw.log.reader import of_production, read_any
-from isiw.log.salvage import Message, Salvage, salvage
+from isiw.log.salvage import Message, Salvage, holds, salvage
 from isiw.log.schema import Event, Intent, Record
 from isiw.log.topics import decode
 from isiw.trials import Trial
@@ -117,6 +117,12 @@ def _raise(error: OSError) -> None:
     raise error
 
 
+def _went_on(damaged: Salvage) -> bool:
+    """Whether a damaged file is only kept, and its log went on with all that was left: its pulses count there."""
+    log = kept_for(damaged.path)
+    return log is not None and (log.exists() or part_of(log).exists()) and holds(salvage(log), damaged)
+
+
 def _of_subject(log: Path, subject: str) -> list[tuple[int, int]]:
     salvaged = salvage(log)
     if of_production(salvaged) and not _given(salvaged):  # nobody is stimulated in such a task
@@ -124,7 +130,7 @@ def _of_subject(log: Path, subject: str) -> list[tuple[int, int]]:
     header = read_any(salvaged).header
     if header.subject != subject or header.device.simulated:
         return []
-    if salvaged.end_lost:
+    if salvaged.end_lost and not _went_on(salvaged):
         raise DamagedLogError(
             "the end of an earlier log of this subject is missing, so nobody knows how many stimuli were given",
             got=str(log),

@@ -152,12 +152,7 @@ class SessionRecord:
     def unknown(self) -> tuple[Intent, ...]:
         """Stimuli that were delivered, or may have been, and whose outcome is not in the log."""
         known = {trial.index for trial in self.table}
-        intents: dict[int, Intent] = {}
-        for entry in self.history:
-            if isinstance(entry, Intent):
-                intents[entry.trial] = entry
-            elif isinstance(entry, Event) and entry.kind == "refused" and entry.trial is not None:
-                intents.pop(entry.trial, None)
+        intents = _standing(self.history)
         last = max(itertools.chain(known, intents, [min(self.delivered, MOST_TRIALS) - 1]))
         return tuple(
             intents.get(number, Intent(trial=number, isi_ms=None)) for number in range(last + 1) if number not in known
@@ -251,9 +246,20 @@ def of_production(salvaged: Salvage) -> bool:
 
 
 def _delivered(salvaged: Salvage, history: Sequence[Record]) -> int:
-    """How many stimuli the index counts without those that were refused."""
-    refused = sum(isinstance(record, Event) and record.kind == "refused" for record in history)
-    return max(salvaged.counted.get("/intent", 0) - refused, salvaged.counted.get("/trial", 0))
+    """How many stimuli the index counts, those of lost records among them; refused ones do not count."""
+    lost = salvaged.counted.get("/intent", 0) - sum(isinstance(record, Intent) for record in history)
+    return max(lost + len(_standing(history)), salvaged.counted.get("/trial", 0))
+
+
+def _standing(history: Sequence[Record]) -> dict[int, Intent]:
+    """What was about to be delivered and was not refused, by trial; what was asked for again is one stimulus."""
+    intents: dict[int, Intent] = {}
+    for entry in history:
+        if isinstance(entry, Intent):
+            intents[entry.trial] = entry
+        elif isinstance(entry, Event) and entry.kind == "refused" and entry.trial is not None:
+            intents.pop(entry.trial, None)
+    return intents
 
 
 @dataclass

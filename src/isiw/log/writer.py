@@ -21,6 +21,7 @@ from isiw.log.durable import (
     DurableFile,
     Fingerprint,
     begun,
+    damaged_of,
     disk_errors,
     log_of,
     part_of,
@@ -373,7 +374,7 @@ def _as_toml(header: AnyHeader) -> bytes:
 
 def _keep(damaged: Path, target: Path) -> None:
     """Keep a damaged file's bytes under a name of their own."""
-    names = (target.with_name(f"{target.name}.damaged{number or ''}") for number in itertools.count())
+    names = (damaged_of(target, number) for number in itertools.count())
     kept = next(name for name in names if not name.exists())
     try:
         kept.hardlink_to(damaged)
