@@ -4,11 +4,14 @@
     PYTHONPATH=../before/src python benchmarks/before_and_now.py run --out before
     python benchmarks/before_and_now.py run --out now
     python benchmarks/before_and_now.py compare before now --out benchmarks/results/before_and_now
+    PYTHONPATH=../before/src python benchmarks/before_and_now.py run --cohorts nonresponder --to-stopping --out before
+    python benchmarks/before_and_now.py run --cohorts nonresponder --to-stopping --out now
+    python benchmarks/before_and_now.py stops before now --out benchmarks/results/before_and_now_stops
     python benchmarks/before_and_now.py speed ../before/src src > benchmarks/results/before_and_now_speed.md
 
-`run` keeps one table a cohort, and goes on where it was interrupted; `compare` pairs the people of both; `speed` has
-both run the same sessions in turn. The hit delay is stated where a version can be told it. Reported people come from
-seed 100,000 on; seeds below 1,000 are for work.
+`run` keeps one table a cohort, and goes on where it was interrupted; `compare` pairs the people of both, `stops` where
+the stopping rule of each ends; `speed` has both run the same sessions in turn. The hit delay is stated where a version
+can be told it. Reported people come from seed 100,000 on; seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ import typer
 from isiw.studies import Processes, Study, StudyStrategy, conduct, run_unit
 
 MARKS = (5, 10, 15, 20, 25, 30, 40)
+TO_STOPPING = (*MARKS, 50, 60)
 COHORTS = "recruitment,gaussian,nonresponder"
 
 app = typer.Typer(help=__doc__)
@@ -41,12 +45,14 @@ def run(
     people: Annotated[int, typer.Option(help="People a cohort.")] = 1000,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 100_000,
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
+    to_stopping: Annotated[bool, typer.Option("--to-stopping", help="60 trials, and where the rule ends.")] = False,  # noqa: FBT002 - a flag
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("now"),
 ) -> None:
     """Run the default of the isiw that is imported."""
     torch.set_num_threads(1)
     for name in cohorts.split(","):
-        study = study_of(name, people, seed, MARKS)
+        marks, stopping = (TO_STOPPING, "noted") if to_stopping else (MARKS, "ignored")
+        study = study_of(name, people, seed, marks, stopping)
         results = conduct(study, out / f"{name}.study", executor=Processes(workers))
         results.rows().to_parquet(out / f"{name}.parquet")
 
@@ -59,12 +65,29 @@ def compare(
 ) -> None:
     """Pair the people that both versions measured."""
     table = pd.concat([paired(before / path.name, path) for path in sorted(now.glob("*.parquet"))])
+    _write(table, now, out, "the stopping rule is ignored")
+
+
+@app.command()
+def stops(
+    before: Annotated[Path, typer.Argument(help="Folder of the tables of the other version.")],
+    now: Annotated[Path, typer.Argument(help="Folder of the tables of this version.")],
+    out: Annotated[Path, typer.Option(help="Path of the result, without suffix.")] = Path("before_and_now_stops"),
+) -> None:
+    """Compare where the stopping rules of both versions end, on the people that both measured."""
+    table = pd.concat([ends(before / path.name, path) for path in sorted(now.glob("*.parquet"))])
+    _write(
+        table, now, out, "who has not stopped by trial 60 counts as he stands there; a rule stops on a window or none"
+    )
+
+
+def _write(table: pd.DataFrame, now: Path, out: Path, how: str) -> None:
     command = shlex.join(["python", "benchmarks/before_and_now.py", *sys.argv[1:]])
     seeds = ", ".join(f"{seed:,}" for seed in pd.read_parquet(next(now.glob("*.parquet")))["seed"].unique())
     lines = [
         f"- command: `{command}`, after `run` with both versions; seed of the people {seeds}",
         f"- python {platform.python_version()}, torch {torch.__version__}",
-        "- the hit delay is stated where it can be; the stopping rule is ignored",
+        f"- the hit delay is stated where it can be; {how}",
     ]
     text = table.to_markdown(index=False, floatfmt=".3f")
     out.with_suffix(".md").write_text("\n".join([*lines, "", text, ""]), encoding="utf-8")
@@ -108,19 +131,22 @@ def lap(seed: int) -> None:
     print(time.process_time() - began_s)
 
 
-def study_of(cohort: str, people: int, seed: int, marks: tuple[int, ...], batch: int = 25) -> Study:
-    """The default on a cohort; the stopping rule is ignored, and the hit delay stated where a version can be told it.
+def study_of(
+    cohort: str, people: int, seed: int, marks: tuple[int, ...], stopping: str = "ignored", batch: int = 25
+) -> Study:
+    """The default on a cohort; the hit delay is stated where a version can be told it.
 
     Args:
         cohort: name of the cohort.
         people: how many.
         seed: of the people.
         marks: trials after which there is an estimate; the last is the last.
+        stopping: what a study makes of the stopping rule.
         batch: how many sessions are side by side.
     """
     told: dict[str, Any] = {"hit_delay": "stated"} if "hit_delay" in inspect.signature(Study).parameters else {}
     default = (StudyStrategy("default"),)
-    plan: dict[str, Any] = {"engine": "batched", "batch": batch, "stopping": "ignored"}
+    plan: dict[str, Any] = {"engine": "batched", "batch": batch, "stopping": stopping}
     return Study(default, (cohort,), people, seed, marks[-1], marks, **plan, **told)
 
 
@@ -142,6 +168,41 @@ def paired(before: Path, now: Path) -> pd.DataFrame:
     table.insert(0, "people", groups.size())
     table.insert(4, "difference_se", groups["difference"].sem())
     return table.reset_index()
+
+
+def ends(before: Path, now: Path) -> pd.DataFrame:
+    """How sessions of both end: stimuli, F1, and who is told a window, by cohort; differences on the same people.
+
+    Args:
+        before: rows of the other version.
+        now: rows of this version.
+    """
+    keys = ["cohort", "person"]
+    both = _ends(now).merge(_ends(before), on=keys, suffixes=("_now", "_before"))
+    rows = []
+    for cohort, people in both.groupby("cohort"):
+        for what in ("stimuli", "f1", "stopped_on_window", "stopped_on_none", "told_window", "told_window_at_60"):
+            difference = people[f"{what}_now"].astype(float) - people[f"{what}_before"].astype(float)
+            means = {which: people[f"{what}_{which}"].mean() for which in ("before", "now")}
+            change = {"difference": difference.mean(), "difference_se": difference.sem()}
+            rows.append({"cohort": cohort, "people": len(people), "": what, **means, **change})
+    return pd.DataFrame(rows)
+
+
+def _ends(rows: Path) -> pd.DataFrame:
+    """The end of each session."""
+    last = pd.read_parquet(rows).sort_values("trial").groupby(["cohort", "person"]).tail(1)
+    stopped = last["stop_trial"].notna()
+    none = stopped & last["stop_reason"].str.startswith("There is no window")
+    told = last["reported_window"].astype(bool)
+    return last[["cohort", "person"]].assign(
+        stimuli=last["stop_trial"].where(stopped, last["trial"]),
+        f1=last["stop_f1"].where(stopped, last["f1"]),
+        stopped_on_window=stopped & ~none,
+        stopped_on_none=none,
+        told_window=(stopped & ~none) | (~stopped & told),
+        told_window_at_60=told,
+    )
 
 
 if __name__ == "__main__":

@@ -104,7 +104,7 @@ def test_no_window_stops_when_it_is_probable_enough(probability: float | None, *
     assert NoWindow(0.9)(progress(probability=probability)).stop == stop
 
 
-def expecting(*f1s: float, told: int = 40, probability: float | None = 0.95) -> Progress:
+def expecting(*f1s: float, told: int = 40, probability: float | None = 0.98) -> Progress:
     past = tuple(WindowEstimate(probability, None, expected_f1=f1) for f1 in f1s)
     return Progress(told, told, past[-1], past=past)
 
@@ -127,7 +127,7 @@ def test_without_an_expected_f1_neither_rule_stops() -> None:
 
 @pytest.mark.parametrize(
     ("first", "told", "probability", "stop"),
-    [(0.79, 40, 0.95, True), (0.7, 40, 0.95, False), (0.79, 39, 0.95, False), (0.79, 40, 0.89, False)],
+    [(0.79, 35, 0.98, True), (0.7, 35, 0.98, False), (0.79, 34, 0.98, False), (0.79, 35, 0.96, False)],
 )
 def test_stimuli_that_added_little_are_the_last(first: float, told: int, probability: float, *, stop: bool) -> None:
     f1s = np.linspace(first, 0.8, 11).tolist()

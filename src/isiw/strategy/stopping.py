@@ -227,8 +227,8 @@ class SmallGain:
 
     gain: float = 0.02
     last: int = 10
-    min_told: int = 40
-    min_probability: float = 0.9
+    min_told: int = 35
+    min_probability: float = 0.97
 
     def __post_init__(self) -> None:
         check_probabilities(self, "gain", "min_probability")
