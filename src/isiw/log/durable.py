@@ -1,7 +1,7 @@
 """Files that survive a crash: synced, locked while they are written, and renamed in one step over nothing else.
 
-On Windows an open file can neither be renamed nor replaced, so files are let go of for that moment. That branch has
-been type-checked, and has not been run.
+On Windows an open file can neither be renamed nor replaced, so files are let go of for that moment. On macOS a disk is
+asked to empty its cache, which `fsync` alone does not. These branches have been type-checked, and have not been run.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from typing import IO, Final, NamedTuple, Self
 
 from isiw.errors import LogError
 from isiw.log.locks import lock
+
+if sys.platform == "darwin":
+    import fcntl
 
 __all__ = [
     "DurableFile",
@@ -92,9 +95,18 @@ def sync_folder(folder: Path) -> None:
         return
     handle = os.open(folder, os.O_RDONLY)
     try:
-        os.fsync(handle)
+        _force(handle)
     finally:
         os.close(handle)
+
+
+def _force(handle: int) -> None:
+    """Return when what was written is on the disk."""
+    if sys.platform == "darwin":
+        with suppress(OSError):  # not every file system can
+            fcntl.fcntl(handle, fcntl.F_FULLFSYNC)
+            return
+    os.fsync(handle)
 
 
 def take_free_place(file: Path, place: Path) -> None:
@@ -163,7 +175,7 @@ def put(path: Path, content: bytes, *, replacing: bool, through: Path | None = N
         with beside.open("wb") as file:
             file.write(content)
             file.flush()
-            os.fsync(file.fileno())
+            _force(file.fileno())
         if replacing:
             beside.replace(path)
             sync_folder(path.parent)
@@ -224,7 +236,7 @@ class DurableFile:
         """Make everything so far durable."""
         with _writing(self.path):
             self._file.flush()
-            os.fsync(self._file.fileno())
+            _force(self._file.fileno())
 
     def displacement(self) -> str | None:
         """What has become of the file's name or size behind its back, in words; None where it is as it was synced."""
