@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import hashlib
 import os
 import signal
 import threading
@@ -153,17 +152,38 @@ def test_what_is_acknowledged_has_disarmed_already() -> None:
     assert done == ["disarmed", "armed again"]
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_comes_after_it_was_acknowledged_is_not_forgotten_with_it(number: signal.Signals) -> None:
+    def work() -> None:
+        with Interrupts(nothing, nothing) as interrupts:
+            interrupt()
+            interrupts.acknowledge()
+            interrupt(number)
+            interrupts.settle()
+            heard.append((interrupts.heard, interrupts.ending))
+
+    heard: list[tuple[bool, bool]] = []
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert heard == [(True, number == signal.SIGTERM)]
+
+
 def test_signals_that_come_at_once_do_not_pass_for_a_session_that_does_not_react(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    def twice() -> None:
+        time.sleep(0.2)  # until the main thread waits
+        for _ in range(2):
+            signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+
     monkeypatch.setattr("isiw.session.interrupts._REACTION_S", 0.5)
     disarmed, stuck = list[str](), list[str]()
     with Interrupts(lambda: disarmed.append("now"), lambda: stuck.append("now")) as interrupts:
-        for delay_s in (0.05, 0.1):
-            threading.Timer(delay_s, os.kill, (os.getpid(), signal.SIGINT)).start()
-        hashlib.pbkdf2_hmac("sha256", b"", b"", 1_000_000)  # no handler runs meanwhile
-        interrupts.acknowledge()
+        sender = threading.Thread(target=twice)
+        sender.start()
+        sender.join()  # no handler runs meanwhile
         assert not interrupts.insisted, "the handler ran more than once: they did not come at once"
+        interrupts.acknowledge()
         time.sleep(1.0)
     assert disarmed == ["now", "now"]
     assert stuck == []

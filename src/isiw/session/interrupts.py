@@ -48,8 +48,8 @@ class Interrupts:
         self._disarm, self._stuck = disarm, stuck
         self._pending = self._allowed = False
         self._heard = self._disarmed = self._handled = 0
-        self._settled = 0
-        self._ending = self._answered = False
+        self._acknowledged = self._settled = self._ended = 0
+        self._answered = False
         self._before: dict[signal.Signals, Any] = {}
         self.away: Callable[[], AbstractContextManager[None]] = nullcontext
         self._main = threading.get_ident()
@@ -97,19 +97,20 @@ class Interrupts:
     @property
     def ending(self) -> bool:
         """Whether the session is to end, and not only to pause."""
-        return self._ending or self.insisted
+        return self._ended > self._settled or self.insisted
 
     def acknowledge(self) -> None:
         """Deliver no KeyboardInterrupt for what was heard so far; it is being dealt with.
 
         Returns when the device was disarmed for it, so that whoever arms it again is not disarmed by an old signal.
         """
+        self._acknowledged = self._handled  # before the next line: a signal between them is heard later
         self._pending = False
         self._wait_until(self._is_disarmed, _DISARMING_S)
 
     def settle(self) -> None:
-        """Forget what was heard; the operator has decided to go on."""
-        self._settled, self._ending, self._pending = self._handled, False, False
+        """Forget what was acknowledged, as the operator has decided to go on; what came since still holds."""
+        self._settled = self._acknowledged
 
     @contextmanager
     def allowed(self) -> Iterator[None]:
@@ -137,7 +138,8 @@ class Interrupts:
     def _receive(self, number: int, frame: FrameType | None) -> None:
         del frame
         self._handled += 1
-        self._ending = self._ending or number not in _PAUSING_SIGNALS
+        if number not in _PAUSING_SIGNALS:
+            self._ended = self._handled
         if number == _SUSPENDING:
             self._suspend()
         if self._allowed:
@@ -159,11 +161,17 @@ class Interrupts:
                     self._heard += 1
                     self._disarm()
                     self._disarmed += 1
-                    if self._heard > self._settled + 1 and not self._reacts():
-                        self._stuck()
+                    if self._heard > self._settled + 1:
+                        self._require_reaction()
 
     def _is_disarmed(self) -> bool:
         return self._disarmed >= self._handled
+
+    def _require_reaction(self) -> None:
+        if self._reacts():
+            self._heard = min(self._heard, self._handled)  # of signals at once some are not handled
+        else:
+            self._stuck()
 
     def _reacts(self) -> bool:
         """Whether the main thread runs handlers: a probe tells, as two signals at once are handled as one."""

@@ -82,7 +82,7 @@ class Pausing:
             return self._last(reason)
         interrupts.settle()
         self._journal.event("pause", "The operator goes on.")
-        if self.reason is None:
+        if not self.due:
             rig.stage()
         return None
 
