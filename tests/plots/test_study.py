@@ -20,7 +20,7 @@ def table(*cohorts: str, strategies: tuple[str, ...] = ("default", "nr"), **valu
     rows = [
         {
             "cohort": cohort, "strategy": strategy, "trial": trial, "people": 4, "f1": 0.5 + trial / 100, "f1_se": 0.1,
-            "delivered": trial + 1.0, "stop_trial": 15.0, "stop_f1": 0.65, "ask_ms": 3.0, "tell_ms": 1.0,
+            "delivered": trial + 1.0, "end_delivered": 15.0, "end_f1": 0.65, "ask_ms": 3.0, "tell_ms": 1.0,
         } | OF_A_BELIEF | values
         for cohort in cohorts
         for strategy in strategies

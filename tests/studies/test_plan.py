@@ -106,9 +106,9 @@ def test_a_study_that_could_not_even_be_listed_is_refused(changed: Any) -> None:
         tiny(**changed)
 
 
-def test_a_setting_that_is_none_by_default_may_be_named_so() -> None:
-    assert StudyStrategy("default", {"hit_delay_ms": None}) == StudyStrategy("default")
-    assert StudyStrategy("nr", {"max_trials": None, "segments": "all"}).settings == {"segments": "all"}
+def test_no_value_for_a_setting_is_refused_as_a_rig_might_state_one() -> None:
+    with pytest.raises(InvalidValueError, match=r"None for hit_delay_ms.*Leave it out.*unstated"):
+        StudyStrategy("default", {"hit_delay_ms": None})
 
 
 def test_a_single_name_is_a_strategy_and_a_cohort() -> None:

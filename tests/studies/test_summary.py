@@ -40,9 +40,17 @@ def test_each_column_is_the_mean_over_people_that_it_says() -> None:
     assert (row["start_coverage"], row["end_coverage"]) == (0.5, 1.0)
     assert row["called_none"] == pytest.approx(1 / 3)
     assert (row["delivered"], row["stop_trial"], row["stop_f1"]) == (9.0, 8.5, 0.75)
+    assert (row["end_delivered"], row["end_f1"]) == (9.0, pytest.approx(0.8))  # who went on has 10 and .9 here
     assert row["converged"] == pytest.approx(2 / 3)
     assert (row["ask_ms"], row["tell_ms"]) == (2.0, 4.0)
     assert row["failed"] == 0
+
+
+def test_where_the_stopping_rule_is_ignored_nobody_ends() -> None:
+    ignored = {"stop_trial": math.nan, "stop_f1": math.nan, "converged": math.nan}
+    (row,) = summarise(rows("nr", "wide", [0.9, 0.6], **ignored), NOBODY).to_dict("records")
+    assert math.isnan(row["end_delivered"])
+    assert math.isnan(row["end_f1"])
 
 
 def test_who_failed_is_counted_and_a_strategy_that_failed_for_all_is_not_left_out() -> None:

@@ -121,8 +121,8 @@ def _draw_frontier(axes: Axes, curves: _Curves, colours: _Colours) -> None:
         kept = np.minimum.accumulate(curve["f1"].to_numpy()[::-1])[::-1]
         axes.step(curve["delivered"], kept, where="post", color=colours[name], lw=1.5, label=name)
         last = curve.tail(1)
-        axes.plot(last["stop_trial"], last["stop_f1"], "o", ms=6, color=colours[name], mec=INK, clip_on=False)
-    axes.plot([], [], "o", ms=6, color="none", mec=INK, label="where its rule stops it, on average")
+        axes.plot(last["end_delivered"], last["end_f1"], "o", ms=6, color=colours[name], mec=INK, clip_on=False)
+    axes.plot([], [], "o", ms=6, color="none", mec=INK, label="where its rule stops it, or else at the end, on average")
     axes.set_ylim(0, 1)
     axes.set_xlabel("stimuli delivered", fontsize=9)
     axes.set_ylabel("mean F1 from there on", fontsize=9)

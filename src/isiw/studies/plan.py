@@ -69,7 +69,7 @@ class StudyStrategy:
 
     Raises:
         StrategyError: an unknown name or setting.
-        InvalidValueError: an invalid setting, or a label that cannot be part of a file's name.
+        InvalidValueError: an invalid setting, or None for one, or a label that cannot be part of a file's name.
     """
 
     name: str
@@ -78,8 +78,13 @@ class StudyStrategy:
 
     def __post_init__(self) -> None:
         chosen = settings_values(settings_for(self.name, **self.settings))
-        # What is None by default has no value to be kept.
-        kept = {key: chosen[key] for key in self.settings if key in chosen}
+        if unset := [key for key in self.settings if key not in chosen]:  # what a rig states could take its place
+            raise InvalidValueError(
+                "a setting of a study's strategy has no value",
+                got=f"None for {', '.join(unset)}",
+                remedy="Leave it out. Of a rig, Study(hit_delay='unstated') tells no strategy anything.",
+            )
+        kept = {key: chosen[key] for key in self.settings}
         object.__setattr__(self, "settings", kept)
         object.__setattr__(self, "label", self.label or self.name)
         if not re.fullmatch(r"[\w.+-]+", self.label):

@@ -19,9 +19,10 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
     Returns:
         Sorted by cohort, strategy and trial: people; mean F1 and its standard error; shares of the people with a window
         whose start and end lie in the 90 % intervals; share reported to have no window; mean of the pairs delivered;
-        mean of the pairs after which the stopping rule fired and of the F1 then, over those for whom it did; share for
-        whom it did so before the budget was used up; people without rows because they failed; median time of an ask and
-        a tell [ms]. A strategy that failed for everybody has one row, at trial 0.
+        mean of the pairs after which the stopping rule fired and of the F1 then, over those for whom it did; the same
+        over all, where those for whom it has not count as they stand at this mark (`end_delivered`, `end_f1`; NaN where
+        the rule is ignored); share for whom it did so before the budget was used up; people without rows because they
+        failed; median time of an ask and a tell [ms]. A strategy that failed for everybody has one row, at trial 0.
     """
     failed = errors.groupby(_GROUP[:2]).size() if len(errors) else pd.Series(dtype="int64")
     table = _means(rows) if len(rows) else pd.DataFrame(columns=[*_GROUP, "people"])
@@ -34,7 +35,12 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
 
 
 def _means(rows: pd.DataFrame) -> pd.DataFrame:
-    groups = rows.groupby(_GROUP)
+    going_on, ignored = rows["stop_trial"].isna(), rows["converged"].isna()
+    at_end = {
+        "end_delivered": rows["stop_trial"].mask(going_on & ~ignored, rows["delivered"]),
+        "end_f1": rows["stop_f1"].mask(going_on & ~ignored, rows["f1"]),
+    }
+    groups = rows.assign(**at_end).groupby(_GROUP)
     return pd.DataFrame(
         {
             "people": groups.size(),
@@ -46,6 +52,8 @@ def _means(rows: pd.DataFrame) -> pd.DataFrame:
             "delivered": groups["delivered"].mean(),
             "stop_trial": groups["stop_trial"].mean(),
             "stop_f1": groups["stop_f1"].mean(),
+            "end_delivered": groups["end_delivered"].mean(),
+            "end_f1": groups["end_f1"].mean(),
             "converged": groups["converged"].mean(),
             "ask_ms": groups["ask_ms"].median(),
             "tell_ms": groups["tell_ms"].median(),
