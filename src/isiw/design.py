@@ -11,6 +11,7 @@ import numpy as np
 
 from isiw.checks import check_choice, check_numbers, number
 from isiw.errors import InvalidValueError, OutOfSpaceError
+from isiw.text.stimuli import TAP, StimulusWords
 from isiw.types import FloatArray, Reference
 
 __all__ = ["IMPACT_SPACE", "VALVE_SPACE", "DesignSpace", "require_space"]
@@ -76,7 +77,15 @@ class DesignSpace:
             )
 
     def __str__(self) -> str:
-        counted = "impact" if self.reference == "impact" else "valve command"
+        return self.told(TAP)
+
+    def told(self, first: StimulusWords) -> str:
+        """The ISIs in words.
+
+        Args:
+            first: what the conditioning stimulus is called.
+        """
+        counted = first.origin(self.reference)
         return f"{self.low_ms:g}–{self.high_ms:g} ms after the {counted}, every {self.step_ms:g} ms"
 
     @cached_property

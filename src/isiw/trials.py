@@ -14,6 +14,7 @@ import pandas as pd
 
 from isiw.checks import check_amplitude, check_numbers, check_texts, check_wholes
 from isiw.errors import InvalidValueError
+from isiw.text.stimuli import TAP, StimulusWords
 from isiw.types import FloatArray
 
 __all__ = [
@@ -305,12 +306,20 @@ class TrialTable:
         return self.trials[position]
 
     def __str__(self) -> str:
+        return self.counted(TAP)
+
+    def counted(self, first: StimulusWords) -> str:
+        """How many trials there are, and of which kinds.
+
+        Args:
+            first: what the conditioning stimulus is called.
+        """
         mistrials = Counter(str(trial.reason) for trial in self.trials if trial.reason is not None)
         reasons = ", ".join(f"{count} {reason}" for reason, count in mistrials.items())
         excluded = sum(trial.excluded for trial in self.trials)
         return (
             f"{len(self)} delivered, {len(self.told)} told"
-            + (f", {taps} of a tap alone" if (taps := sum(trial.tap_alone for trial in self.trials)) else "")
+            + (f", {alone} of {first.one} alone" if (alone := sum(trial.tap_alone for trial in self.trials)) else "")
             + (f", {mistrials.total()} mistrials ({reasons})" if reasons else "")
             + (f", {excluded} excluded" if excluded else "")
         )

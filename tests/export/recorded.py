@@ -59,5 +59,11 @@ def _trial(trial: int) -> Trial:
     )  # fmt: skip
 
 
+def alone(trial: int) -> tuple[Intent, Trial]:
+    """What a log tells of a conditioning stimulus without the magnetic pulse."""
+    given = Trial(trial, Status.ACCEPTED, None, tap_alone=True, t_hit_ms=-10.0)
+    return Intent(trial=trial, isi_ms=None, t_s=60.0, tap_alone=True), given
+
+
 def note(text: str) -> Event:
     return Event(kind="note", trial=0, text=text)

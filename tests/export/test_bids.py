@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -14,11 +15,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from export.recorded import SAMPLES, emg_mv, sweep, write_sweeps
+from export.recorded import SAMPLES, alone, emg_mv, sweep, write_sweeps
+from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.export import export_logs
 from isiw.export.emg import Layout, Run
 from isiw.log.reader import read_session
+from isiw.text.stimuli import STIMULI
 from isiw.trials import Channel, MistrialReason, Status, Stimulus, Trial
 from isiw.visit import Visit
 
@@ -123,6 +126,71 @@ def test_the_events_say_what_was_given_and_what_came_of_it(data_set: Path, log: 
     assert sweeps.mep_mv.tolist() == pytest.approx(trials.mep_mv.tolist(), nan_ok=True)
 
 
+STIMULATOR = DeviceInfo("stimulator", "impact", channels={"emg": "mV"}, conditioning="electrical")
+
+
+def write_pulsed(path: Path) -> Path:
+    """A session with electrical pulses in the place of taps; the last one is alone."""
+    return write_sweeps(path, {trial: sweep(trial) for trial in (0, 2, 3)}, *alone(4), device=STIMULATOR)
+
+
+def test_a_data_set_of_electrical_pulses_speaks_of_no_tap(tmp_path: Path) -> None:
+    export_logs(write_pulsed(tmp_path / "s.mcap"), tmp_path / "out", "bids")
+    texts = [
+        path for path in (tmp_path / "out").rglob("*") if path.suffix in {".tsv", ".json"} or path.name == "README"
+    ]
+    found = {
+        path.name: re.findall(r"\b(?:belly-tendon|taps?|tendon|hammer|impact)\b", path.read_text("utf-8"))
+        for path in texts
+    }
+    assert len(found) > 8
+    found = {name: [word for word in words if word != "belly-tendon"] for name, words in found.items()}
+    assert {name: words for name, words in found.items() if words} == {"sub-P07_sessions.tsv": ["impact"]}  # reference
+    assert errors_of(tmp_path / "out") == []
+
+
+def test_the_electrical_pulse_is_an_event_where_it_was_given(tmp_path: Path) -> None:
+    export_logs(write_pulsed(tmp_path / "s.mcap"), tmp_path / "out", "bids")
+    events = table(tmp_path / "out", f"{NAME}_run-01_events.tsv")
+    assert events[events.trial_type == "electrical pulse"].trial.tolist() == [0, 2, 3]
+    assert set(events.trial_type) == {"sweep", "electrical pulse", "tms"}
+    meanings = json.loads(next((tmp_path / "out").rglob("*_events.json")).read_text("utf-8"))
+    assert meanings["trial_type"]["Description"] == (
+        "sweep: a trial's waveforms; and in it electrical pulse: the electrical pulse, tms: the magnetic pulse"
+    )
+    assert "TMS alone or electrical pulse alone" in meanings["condition"]["Description"]
+    for sidecar in (tmp_path / "out").rglob("*.json"):
+        task = json.loads(sidecar.read_text("utf-8")).get("TaskDescription")
+        assert task is None or task.startswith("An electrical pulse to the nerve, and after an inter-stimulus interval")
+    assert table(tmp_path / "out", "sub-P07_sessions.tsv").conditioning.tolist() == ["electrical"]
+
+
+def test_a_data_set_of_taps_says_so_and_needs_no_column_for_it(data_set: Path) -> None:
+    assert "conditioning" not in table(data_set, "sub-P07_sessions.tsv")
+    meanings = json.loads(next(data_set.rglob("*_events.json")).read_text("utf-8"))
+    assert meanings["trial_type"]["Description"] == (
+        "sweep: a trial's waveforms; and in it valve: the valve command, tap: the impact, tms: the pulse"
+    )
+    assert "at which a tap on the tendon enhances" in (data_set / "README").read_text("utf-8")
+
+
+def test_in_a_data_set_with_both_each_session_says_which_stimulus_came_first(log: Path, tmp_path: Path) -> None:
+    write_pulsed(log.parent / "electrical.mcap").rename(log.parent / "second.mcap")
+    exported = export_logs(log.parent, tmp_path / "out", "bids")
+    assert exported.sessions == 2
+    found = {}
+    for session in ("ses-01", "ses-02"):
+        (sidecar,) = (tmp_path / "out" / "sub-P07" / session).rglob("*_beh.json")
+        events = table(tmp_path / "out" / "sub-P07" / session, "*_events.tsv")
+        task = json.loads(sidecar.read_text("utf-8"))["TaskDescription"].partition(", and after")[0]
+        found[task] = set(events.trial_type) - {"sweep", "tms"}
+    assert found == {"A tap on the tendon": {"tap"}, "An electrical pulse to the nerve": {"electrical pulse"}}
+    task = json.loads((tmp_path / "out" / "task-pairedstimulation_beh.json").read_text("utf-8"))["TaskDescription"]
+    assert task.startswith("A tap on the tendon or an electrical pulse to the nerve, and after")
+    assert set(table(tmp_path / "out", "sub-P07_sessions.tsv").conditioning) == {"tap", "electrical"}
+    assert errors_of(tmp_path / "out") == []
+
+
 def test_all_trials_are_in_a_table_with_what_was_believed(data_set: Path, log: Path) -> None:
     back, trials = table(data_set, f"{NAME}_beh.tsv"), read_session(log).trials
     for name in ("onset_s", "isi_ms", "mep_mv", "p_window", "window_start_ms", "end_high_ms"):
@@ -221,6 +289,8 @@ def test_each_condition_is_named(trial: Trial, condition: str) -> None:
     layout = Layout(1000.0, 4, (("emg", "mV"),))
     (row,) = Run(layout, (trial,), (0.0,), (np.zeros(4),)).events({})
     assert row["condition"] == condition
+    (row,) = Run(layout, (trial,), (0.0,), (np.zeros(4),), STIMULI["electrical"]).events({})
+    assert row["condition"] == condition.replace("tap", "electrical pulse")
 
 
 def test_moments_outside_the_sweep_are_left_out_as_they_would_lie_in_another_trials() -> None:

@@ -12,11 +12,13 @@ import pandas as pd
 import pytest
 
 from export.recorded import note, sweep, write_sweeps
+from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, LogError
 from isiw.export import export_logs
 from isiw.export.tables import session_facts
 from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.reader import read_session
+from isiw.log.schema import StrategyRecipe
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.session.resume import exclude
@@ -64,6 +66,25 @@ def test_every_column_is_explained(log: Path, tmp_path: Path) -> None:
         columns = list(pd.read_csv(tmp_path / "out" / f"{table}.csv").columns)
         assert explained.column[explained.table == table].tolist() == columns
     assert explained.meaning.notna().all()
+
+
+@pytest.mark.parametrize("to", READERS)
+def test_after_electrical_pulses_columns_speak_of_these_and_sessions_say_so(tmp_path: Path, to: str) -> None:
+    device = DeviceInfo("stimulator", "impact", conditioning="electrical")
+    write_sweeps(tmp_path / "s.mcap", {0: {}}, device=device)
+    export_logs(tmp_path / "s.mcap", tmp_path / "out", to)
+    meanings = READERS[to](tmp_path / "out" / f"columns.{to}").set_index("column").meaning.to_dict()
+    assert meanings["t_hit_ms"] == "the electrical pulse, on the sweep's clock"
+    assert meanings["tap_alone"] == "whether it was an electrical pulse without the magnetic pulse"
+    assert meanings["reference"].startswith("the event that ISIs count from: the electrical pulse, or")
+    assert READERS[to](tmp_path / "out" / f"sessions.{to}").conditioning.tolist() == ["electrical"]
+
+
+def test_a_stimulus_that_the_strategy_alone_was_told_of_counts(tmp_path: Path) -> None:
+    recipe = StrategyRecipe(name="default", seed=4, settings={"conditioning": "electrical"})
+    write_sweeps(tmp_path / "s.mcap", {0: {}}, strategy=recipe)
+    export_logs(tmp_path / "s.mcap", tmp_path / "out")
+    assert pd.read_csv(tmp_path / "out" / "sessions.csv").conditioning.tolist() == ["electrical"]
 
 
 def test_a_folder_of_logs_is_one_data_set(tmp_path: Path) -> None:

@@ -43,6 +43,19 @@ def test_a_session_without_trials_and_a_code_that_is_markup_are_drawn(record: Se
     assert picture.stat().st_size > 3000
 
 
+def test_the_axis_names_what_isis_count_from_in_all_sessions(record: SessionRecord) -> None:
+    device = replace(record.header.device, reference="impact")
+    tapped = record.header.model_copy(update={"space": DesignSpace(0, 200, reference="impact"), "device": device})
+    pulsed = tapped.model_copy(update={"device": replace(device, conditioning="electrical")})
+    for headers, name in (
+        ([tapped], "impact"),
+        ([pulsed], "electrical pulse"),
+        ([tapped, pulsed], "impact or electrical pulse"),
+    ):
+        axes = comparison_figure([replace(record, header=header) for header in headers]).axes[0]
+        assert axes.get_xlabel() == f"ISI after the {name} [ms]"
+
+
 def test_sessions_on_different_clocks_are_refused(record: SessionRecord) -> None:
     header = record.header.model_copy(update={"space": DesignSpace(0, 200, reference="impact")})
     with pytest.raises(InvalidValueError, match="one event"):

@@ -18,7 +18,7 @@ from isiw.plots.inline import inline_svg
 from isiw.plots.sweeps import sweeps_figure
 from isiw.plots.timeline import timeline_figure
 from known import instance, known
-from report.sessions import tapped
+from report.sessions import pulsed, tapped
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +46,14 @@ def test_sweeps_are_stacked_by_isi_with_the_hits_before_the_pulse(record: Sessio
     hits = {round(hit_ms, 6) for hit_ms in line_of(axes, "hit of the hammer")[0]}
     assert hits == {round(-isi, 6) for t in told if (isi := t.isi_ms) is not None and isi <= 50}
     assert {"MEP window", "TMS pulse", "EMG, ISI inside the window", "EMG, other trials"} <= legend(figure)
+
+
+def test_after_an_electrical_pulse_no_hammer_hits(record: SessionRecord) -> None:
+    sweeps, timeline = known(sweeps_figure(pulsed(record))), timeline_figure(pulsed(record))
+    assert "electrical pulse" in legend(sweeps)
+    assert "hit of the hammer" not in legend(sweeps)
+    assert [text.get_text() for text in timeline.axes[0].texts] == ["electrical pulse"]
+    assert timeline.axes[0].get_xlabel() == "time after the electrical pulse [ms]"
 
 
 def test_the_offset_of_an_amplifier_moves_no_trace(record: SessionRecord) -> None:

@@ -63,6 +63,13 @@ def test_the_picture_shows_profile_trials_window_and_truth(record: SessionRecord
     assert "after 6 trials" in profile.get_title(loc="left")
 
 
+def test_isis_after_an_electrical_pulse_count_from_it(record: SessionRecord) -> None:
+    device = replace(record.header.device, reference="impact", conditioning="electrical")
+    header = record.header.model_copy(update={"device": device, "space": replace(SPACE, reference="impact")})
+    (profile, *_) = session_figure(replace(record, header=header)).axes
+    assert profile.get_xlabel() == "ISI after the electrical pulse [ms]"
+
+
 def test_trials_lie_where_they_were_realised(record: SessionRecord) -> None:
     profile = session_figure(record).axes[0]
     (trials,) = [line for line in profile.lines if line.get_label() == "trial"]

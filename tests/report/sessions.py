@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 from isiw.design import DesignSpace
 from isiw.devices.robot.tapper import Tapper, TapperSettings
@@ -12,6 +13,7 @@ from isiw.devices.simulated import SimulatedDevice
 from isiw.log.reader import SessionRecord, read_session
 from isiw.session.loop import Session
 from isiw.session.updates import SessionUpdate
+from isiw.trials import Status, Trial
 from isiw.visit import Visit, VisitProtocol
 from scripted import scripted_strategy
 
@@ -47,6 +49,19 @@ def tapped(path: Path, trials: int = 6, subject: str = HOSTILE) -> SessionRecord
     )
     session.run()
     return read_session(path)
+
+
+def pulsed(record: SessionRecord) -> SessionRecord:
+    """The same session with an electrical pulse in the place of the tap, and at its end one alone."""
+    device = replace(record.header.device, name="stimulator", conditioning="electrical")
+    history: list[Any] = [replace(e, t_valve_ms=None) if isinstance(e, Trial) else e for e in record.history]
+    alone = Trial(record.table[-1].index + 1, Status.ACCEPTED, None, tap_alone=True, t_hit_ms=700.0)
+    return replace(
+        record,
+        header=record.header.model_copy(update={"device": device}),
+        history=(*history, alone),
+        waveforms={key: channel for key, channel in record.waveforms.items() if key[1] == "emg"},
+    )
 
 
 class Page(HTMLParser):

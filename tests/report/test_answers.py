@@ -83,6 +83,17 @@ def test_an_isi_that_its_times_contradict_is_not_right_where_nobody_rejected_it(
     assert detail.endswith("The times of pulse and valve contradict the ISI in trial 0.")
 
 
+def test_timing_after_an_electrical_pulse_is_that_of_the_two_pulses(record: SessionRecord) -> None:
+    header = record.header
+    device = replace(header.device, reference="impact", conditioning="electrical")
+    space = replace(header.space, reference="impact")
+    pulsed = replace(record, header=header.model_copy(update={"device": device, "space": space}))
+    assert "no magnetic pulse or electrical pulse time to check it against" in answer(pulsed, "timing").detail
+    trials = [trial(0, t_hit_ms=100.0, t_tms_ms=110.0), trial(1, t_hit_ms=100.0, t_tms_ms=151.0)]
+    said = answer(with_history(pulsed, trials), "timing").detail
+    assert said.endswith("The times of magnetic pulse and electrical pulse contradict the ISI in trial 0.")
+
+
 def test_a_muscle_that_was_never_at_rest_is_not_unknown(record: SessionRecord) -> None:
     trials = [trial(k, background_rms_uv=30.0 + k, reason=MistrialReason.BACKGROUND_ACTIVITY) for k in range(3)]
     _, said, detail = answer(with_history(record, trials), "at rest")

@@ -14,7 +14,7 @@ from isiw.log.schema import Estimate
 from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, drawn
 from isiw.text.found import TOO_FEW
 from isiw.trials import Channel
-from report.sessions import tapped
+from report.sessions import pulsed, tapped
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +53,15 @@ def test_an_offset_costs_no_digits(record: SessionRecord) -> None:
     emg = record.waveforms[record.table[0].index, "emg"]
     plain, moved = (sweep(record, emg=replace(emg, values=emg.values + offset))[0]["values"] for offset in (0.0, 100.0))
     assert np.asarray(moved) - 100.0 == pytest.approx(plain, abs=1e-3 * np.abs(plain).max())
+
+
+def test_axis_and_lines_are_named_after_the_stimulus_that_was_given(record: SessionRecord) -> None:
+    shown, electrical = drawn(record), drawn(pulsed(record))
+    assert shown["isiAxis"] == "ISI after the impact [ms]"
+    assert shown["dotted"] == "Dotted orange lines: valve command and hit of the hammer."
+    assert electrical["isiAxis"] == "ISI after the electrical pulse [ms]"
+    assert electrical["dotted"] == "Dotted orange line: electrical pulse."
+    assert electrical["trials"][-1]["asked"] == "electrical pulse alone"
 
 
 def test_what_is_not_finite_is_left_open_and_the_rest_is_json(record: SessionRecord) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from isiw.report.words import finding_sentences
 from isiw.session.resume import exclude
 from isiw.window import Window
 from logs import cut_after
-from report.sessions import HOSTILE, Page, tapped
+from report.sessions import HOSTILE, Page, pulsed, tapped
 
 LOGS = Path(__file__).parents[1] / "data" / "logs"
 OLD_LOGS = [
@@ -93,6 +94,23 @@ def test_all_pictures_are_there_and_readable_without_javascript(page: Page, reco
         assert words in whole
     assert "var(--ink)" in whole
     assert ("section", "hidden", "") in page.attributes
+
+
+def test_a_page_about_electrical_pulses_speaks_of_no_tap(page: Page, record: SessionRecord) -> None:
+    of_a_tap = re.compile(r"\b(taps?|tapped|hammer|hit|impact|valve)\b")
+    assert {"hammer", "valve", "impact"} <= set(of_a_tap.findall(page.words))
+    words = Page(report_page(pulsed(record))).words
+    assert of_a_tap.findall(words) == []
+    for said in (
+        "time after the electrical pulse [ms]", "ISI after the electrical pulse [ms]", "electrical pulse alone",
+        "Dotted orange line: electrical pulse.", "nothing is learnt from an electrical pulse alone",
+        "0–200 ms after the electrical pulse, every 1 ms",
+    ):  # fmt: skip
+        assert said in words
+
+
+def test_lines_in_a_sweep_are_those_of_valve_and_hammer_after_a_tap(page: Page) -> None:
+    assert "Dotted orange lines: valve command and hit of the hammer. Green: MEP window." in page.words
 
 
 def test_a_log_that_is_whole_and_closed_is_shown_without_a_warning(page: Page) -> None:

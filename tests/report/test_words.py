@@ -11,10 +11,10 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate, Event, Intent, StrategyRecipe
-from isiw.report.words import TRIAL_HEADINGS, final_statement, trial_rows, truth_sentence
+from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, trial_rows, truth_sentence
 from isiw.session.loop import Session
 from isiw.session.resume import exclude
-from isiw.trials import Channel, Measurement
+from isiw.trials import Channel, Measurement, Status, Trial
 from isiw.window import Window
 from known import instance
 from scripted import ScriptedDevice, scripted_strategy
@@ -66,6 +66,17 @@ def test_after_an_electrical_pulse_no_tap_is_spoken_of(record: SessionRecord) ->
     assert "By this method, which gives no probability, the electrical pulse enhances" in final_statement(
         with_estimate(pulsed, probability=None)
     )
+
+
+def test_control_trials_are_named_after_the_stimulus_that_was_given(record: SessionRecord) -> None:
+    alone = Trial(4, Status.ACCEPTED, None, tap_alone=True)
+    device = replace(record.header.device, conditioning="electrical")
+    tapped = replace(record, history=(*record.history, alone))
+    pulsed = replace(tapped, header=tapped.header.model_copy(update={"device": device}))
+    for given, name in ((tapped, "tap"), (pulsed, "electrical pulse")):
+        assert f"5 stimuli were delivered, 1 of {name} alone among them" in counts_sentence(given)
+        assert trial_rows(given)[4][1] == f"{name} alone"
+        assert f"1 of a{'n' if name != 'tap' else ''} {name} alone" in str(given)
 
 
 def test_an_unusual_window_is_said_with_its_probability_once_it_is_worth_saying(record: SessionRecord) -> None:

@@ -13,6 +13,7 @@ from isiw.session.loop import Session
 from isiw.session.progress import COLUMNS, PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
 from isiw.session.updates import SessionUpdate
 from isiw.strategy.stopping import StopDecision
+from isiw.text.stimuli import STIMULI
 from isiw.trials import MistrialReason, Status, Trial
 from isiw.window import Window, WindowEstimate
 from scripted import SPACE, ScriptedDevice, scripted_strategy
@@ -40,6 +41,8 @@ def test_progress_of_a_method_without_posterior_has_gaps() -> None:
 def test_a_tap_alone_is_told_from_tms_alone() -> None:
     tap = Trial(3, Status.ACCEPTED, None, tap_alone=True)
     assert progress_row(update_with(WindowEstimate(None, None), tap))[1:3] == ("tap alone", "–")
+    pulsed = progress_row(update_with(WindowEstimate(None, None), tap), STIMULI["electrical"])
+    assert pulsed[1] == "electrical pulse alone"
     pulse = Trial(3, Status.ACCEPTED, None, mep_mv=0.05)
     assert progress_row(update_with(WindowEstimate(None, None), pulse))[1:3] == ("TMS alone", "50 µV")
 

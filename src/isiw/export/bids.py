@@ -14,12 +14,13 @@ import pandas as pd
 import isiw
 from isiw.errors import InvalidValueError
 from isiw.export import emg
-from isiw.export.collection import Part, log_losses
+from isiw.export.collection import Part, log_losses, stimulus_of
 from isiw.export.emg import Run
-from isiw.export.tables import SESSION_COLUMNS, session_facts, tidy
-from isiw.log.frames import TRIAL_COLUMNS
+from isiw.export.tables import session_columns, session_facts, tidy
+from isiw.log.frames import trial_columns
 from isiw.log.outputs import write_output
 from isiw.text import one_line
+from isiw.text.stimuli import StimulusWords
 
 __all__ = ["write_bids"]
 
@@ -27,11 +28,6 @@ Columns = Mapping[str, tuple[str, str]]
 
 BIDS_VERSION: Final = "1.11.0"
 TASK: Final = "pairedstimulation"
-_TASK: Final = {
-    "TaskName": TASK,
-    "TaskDescription": "A tap on the tendon, and after an inter-stimulus interval a pulse of transcranial magnetic "
-    "stimulation; in control trials one of them alone. The muscle is at rest.",
-}
 _PEOPLE: Final[Columns] = {
     "subject": ("", "the person's code"),
     "simulated": ("", "whether this person was simulated in all sessions"),
@@ -40,7 +36,7 @@ _PEOPLE: Final[Columns] = {
 _README: Final = """# Sessions of isiw
 
 {sessions} sessions of paired stimulation, {simulated} of them with simulated people. isiw looks for the inter-stimulus
-intervals (ISI) at which a tap on the tendon enhances the motor evoked potential (MEP).
+intervals (ISI) at which {given} enhances the motor evoked potential (MEP).
 
 - beh: all trials of a session, with their onsets and what was believed after each.
 - emg: the sweeps, written end to end ("epoched"). Onsets in _events.tsv are times in the file; when a trial was in the
@@ -69,7 +65,8 @@ def write_bids(parts: Sequence[Part], folder: Path) -> list[str]:
     """
     _require_distinct(parts)
     lacking = [sentence for part in parts for sentence in _write_session(part, folder)]
-    people = [_write_person(list(own), folder) for _, own in groupby(parts, key=_label)]
+    columns = session_columns(stimulus_of(parts))
+    people = [_write_person(list(own), folder, columns) for _, own in groupby(parts, key=_label)]
     _tsv(folder / "participants.tsv", pd.DataFrame(people))
     _write_heads(folder, parts, lacking)
     return lacking
@@ -93,18 +90,19 @@ def _require_distinct(parts: Iterable[Part]) -> None:
             )
 
 
-def _write_person(parts: Sequence[Part], folder: Path) -> dict[str, Any]:
+def _write_person(parts: Sequence[Part], folder: Path, columns: Iterable[str]) -> dict[str, Any]:
     """Write what a person's sessions are, and return what the person is."""
     label = _label(parts[0])
-    rows = [{"session_id": f"ses-{part.session}", **session_facts(part.record)} for part in parts]
-    _tsv(folder / f"sub-{label}" / f"sub-{label}_sessions.tsv", pd.DataFrame(rows).astype({"day": "Int64"}))
+    rows = pd.DataFrame([{"session_id": f"ses-{part.session}", **session_facts(part.record)} for part in parts])
+    kept = [name for name in rows.columns if name in {"session_id", *columns}]
+    _tsv(folder / f"sub-{label}" / f"sub-{label}_sessions.tsv", rows[kept].astype({"day": "Int64"}))
     simulated = all(part.record.header.device.simulated for part in parts)
     return {"participant_id": f"sub-{label}", "subject": parts[0].subject, "simulated": simulated}
 
 
 def _write_session(part: Part, folder: Path) -> list[str]:
     """Write a session, and return what of it is left out."""
-    name, home = _name(part), folder / f"sub-{_label(part)}" / f"ses-{part.session}"
+    name, home = _name(part), _home(part, folder)
     trials = part.record.trials.rename_axis("trial").reset_index()
     _tsv(home / "beh" / f"{name}_task-{TASK}_beh.tsv", trials)
     files = [f"beh/{name}_task-{TASK}_beh.tsv"]
@@ -127,13 +125,23 @@ def _write_run(stem: Path, run: Run, onsets_s: Mapping[int, float], part: Part) 
     _json(Path(f"{stem}_emg.json"), _sidecar(run, part))
     _tsv(Path(f"{stem}_channels.tsv"), pd.DataFrame(run.channels))
     _tsv(Path(f"{stem}_events.tsv"), pd.DataFrame(run.events(onsets_s)))
-    _json(Path(f"{stem}_events.json"), _described(emg.EVENT_COLUMNS))
+    _json(Path(f"{stem}_events.json"), _described(run.event_columns))
+
+
+def _task(first: StimulusWords) -> dict[str, Any]:
+    """What is done in a session."""
+    given = f"{first.given[0].upper()}{first.given[1:]}"
+    return {
+        "TaskName": TASK,
+        "TaskDescription": f"{given}, and after an inter-stimulus interval a pulse of transcranial magnetic "
+        "stimulation; in control trials one of them alone. The muscle is at rest.",
+    }
 
 
 def _sidecar(run: Run, part: Part) -> dict[str, Any]:
     """What `_emg.json` says; what nobody has noted is said to be so."""
     visit, device = part.record.header.visit, part.record.header.device
-    return _TASK | {
+    return _task(part.record.header.stimulus) | {
         "SamplingFrequency": run.layout.rate_hz,
         "RecordingType": "epoched",
         "EpochLength": run.sweep_s,
@@ -154,9 +162,8 @@ def _said(what: str, text: str) -> str:
 
 
 def _write_heads(folder: Path, parts: Sequence[Part], lacking: Iterable[str]) -> None:
-    trials = {"trial": ("", "its number"), **TRIAL_COLUMNS}
-    _json(folder / f"task-{TASK}_beh.json", _TASK | _described(trials))
-    _json(folder / "sessions.json", _described(SESSION_COLUMNS))
+    _write_behaviour(folder, parts)
+    _json(folder / "sessions.json", _described(session_columns(stimulus_of(parts))))
     _json(folder / "participants.json", _described(_PEOPLE))
     _json(
         folder / "dataset_description.json",
@@ -170,15 +177,33 @@ def _write_heads(folder: Path, parts: Sequence[Part], lacking: Iterable[str]) ->
     write_output(folder / "README", _readme(parts, lacking).encode())
 
 
+def _write_behaviour(folder: Path, parts: Sequence[Part]) -> None:
+    """Write what the tables of trials say; where not all sessions have one stimulus, each says which it has."""
+    every = stimulus_of(parts)
+    _json(folder / f"task-{TASK}_beh.json", _behaviour(every))
+    for part in parts:
+        if (first := part.record.header.stimulus) != every:
+            _json(_home(part, folder) / "beh" / f"{_name(part)}_task-{TASK}_beh.json", _behaviour(first))
+
+
+def _behaviour(first: StimulusWords) -> dict[str, Any]:
+    return _task(first) | _described({"trial": ("", "its number"), **trial_columns(first)})
+
+
 def _readme(parts: Sequence[Part], lacking: Iterable[str]) -> str:
     simulated = sum(part.record.header.device.simulated for part in parts)
     missing = [f"{part}: {loss}" for part in parts for loss in log_losses(part.record)]
     said = "\n".join(f"- {one_line(each)}" for each in [*missing, *lacking] or ["nothing"])
-    return _README.format(sessions=len(parts), simulated=simulated, lacking=said)
+    given = stimulus_of(parts).given
+    return _README.format(sessions=len(parts), simulated=simulated, given=given, lacking=said)
 
 
 def _name(part: Part) -> str:
     return f"sub-{_label(part)}_ses-{part.session}"
+
+
+def _home(part: Part, folder: Path) -> Path:
+    return folder / f"sub-{_label(part)}" / f"ses-{part.session}"
 
 
 def _moment(part: Part) -> str:

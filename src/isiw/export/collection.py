@@ -12,8 +12,9 @@ from pathlib import Path
 from isiw.errors import LogError
 from isiw.log.durable import log_of
 from isiw.log.reader import SessionRecord, read_session
+from isiw.text.stimuli import StimulusWords, words_of
 
-__all__ = ["Part", "log_losses", "numbered", "read_logs"]
+__all__ = ["Part", "log_losses", "numbered", "read_logs", "stimulus_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +113,15 @@ def numbered(records: Iterable[SessionRecord]) -> list[Part]:
         sessions[subject] += 1
         parts.append(Part(subject, f"{sessions[subject]:02d}", record))
     return sorted(parts, key=lambda part: (part.subject, part.session))
+
+
+def stimulus_of(parts: Iterable[Part]) -> StimulusWords:
+    """What the conditioning stimulus of some sessions is called.
+
+    Args:
+        parts: the sessions.
+    """
+    return words_of(part.record.header.conditioning for part in parts)
 
 
 def log_losses(record: SessionRecord) -> list[str]:

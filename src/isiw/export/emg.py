@@ -18,26 +18,27 @@ import numpy as np
 
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord
+from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Channel, Stimulus, Trial
 from isiw.types import FloatArray
 
 if TYPE_CHECKING:
     from edfio import BdfSignal
 
-__all__ = ["EMG", "EVENT_COLUMNS", "Run", "bdf", "runs"]
+__all__ = ["EMG", "Run", "bdf", "runs"]
 
 EMG: Final = "emg"
 """The channel whose sweeps are exported, with whatever was recorded along with it."""
 
-EVENT_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
+_EVENT_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "onset": ("s", "when it was, in the file"),
     "duration": ("s", "how long it lasted; 0 for a moment"),
     "trial_type": (
         "",
-        "sweep: a trial's waveforms; and in it valve: the valve command, tap: the impact, tms: the pulse",
+        "sweep: a trial's waveforms; and in it {valve}{0.name}: the {0.moment}, tms: the {0.pulse}",
     ),
     "trial": ("", "the number of the trial"),
-    "condition": ("", "paired, TMS alone or tap alone; unknown where its record is lost"),
+    "condition": ("", "paired, TMS alone or {0.alone}; unknown where its record is lost"),
     "commanded_isi_ms": ("ms", "the ISI that was asked for; none for a control trial"),
     "isi_ms": ("ms", "the realised ISI"),
     "status": ("", "accepted, or mistrial: nothing is learnt from it"),
@@ -46,8 +47,6 @@ EVENT_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "mep_mv": ("mV", "peak-to-peak amplitude of the MEP"),
     "session_s": ("s", "when the trial was, since the first stimulus of the log"),
 }
-"""Unit and meaning of what is said about a moment of a sweep."""
-
 _SHORTEST_RECORD_S: Final = 1e-4
 _LARGEST: Final = 1e7
 """More than a BDF file has room for, in whatever unit; what is not finite is not below it either."""
@@ -75,12 +74,14 @@ class Run:
         trials: whose sweeps they are.
         starts_ms: the first sample of each, on the sweep's own clock [ms].
         values: the samples of each channel, the sweeps end to end, shape (trials · samples,) each.
+        first: what the conditioning stimulus is called.
     """
 
     layout: Layout
     trials: tuple[Trial, ...]
     starts_ms: tuple[float, ...]
     values: tuple[FloatArray, ...]
+    first: StimulusWords = TAP
 
     @property
     def sweep_s(self) -> float:
@@ -101,14 +102,20 @@ class Run:
             for label, (name, unit) in zip(_labels(self.layout), self.layout.channels, strict=True)
         ]
 
+    @property
+    def event_columns(self) -> dict[str, tuple[str, str]]:
+        """Unit and meaning of what is said about a moment of a sweep."""
+        has_valve = self.first.by_valve or any(trial.t_valve_ms is not None for trial in self.trials)
+        return meanings(_EVENT_COLUMNS, self.first, valve="valve: the valve command, " if has_valve else "")
+
     def events(self, onsets_s: Mapping[int, float]) -> list[dict[str, Any]]:
-        """The rows of `_events.tsv`, as in `EVENT_COLUMNS`.
+        """The rows of `_events.tsv`, as in `event_columns`.
 
         Args:
             onsets_s: when each trial was, since the first one [s].
         """
         rows = [
-            moment | _facts(trial) | {"session_s": onsets_s.get(trial.index)}
+            moment | _facts(trial, self.first) | {"session_s": onsets_s.get(trial.index)}
             for number, (trial, start_ms) in enumerate(zip(self.trials, self.starts_ms, strict=True))
             for moment in self._moments(number, trial, start_ms)
         ]
@@ -117,17 +124,18 @@ class Run:
     def _moments(self, number: int, trial: Trial, start_ms: float) -> Iterable[dict[str, Any]]:
         begin_s = number * self.sweep_s
         yield {"onset": begin_s, "duration": self.sweep_s, "trial_type": "sweep"}
-        for kind, at_ms in (("valve", trial.t_valve_ms), ("tap", trial.t_hit_ms), ("tms", trial.t_tms_ms)):
+        moments = ("valve", trial.t_valve_ms), (self.first.name, trial.t_hit_ms), ("tms", trial.t_tms_ms)
+        for kind, at_ms in moments:
             within_s = math.nan if at_ms is None else (at_ms - start_ms) / 1e3
             if 0 <= within_s < self.sweep_s:
                 yield {"onset": begin_s + within_s, "duration": 0, "trial_type": kind}
 
 
-def _facts(trial: Trial) -> dict[str, Any]:
+def _facts(trial: Trial, first: StimulusWords) -> dict[str, Any]:
     kind = "TMS alone" if trial.is_control else "unknown" if trial.commanded_isi_ms is None else "paired"
     return {
         "trial": trial.index,
-        "condition": "tap alone" if trial.tap_alone else kind,
+        "condition": first.alone if trial.tap_alone else kind,
         "commanded_isi_ms": trial.commanded_isi_ms,
         "isi_ms": trial.isi_ms,
         "status": str(trial.status),
@@ -154,7 +162,7 @@ def runs(record: SessionRecord) -> tuple[list[Run], list[str]]:
         if channels:
             trial = trials.get(number) or _lost(record, number)
             of_layout.setdefault(_layout(channels), []).append((trial, channels))
-    return [_run(layout, sweeps) for layout, sweeps in of_layout.items()], _sentences(left_out)
+    return [_run(layout, sweeps, record.header.stimulus) for layout, sweeps in of_layout.items()], _sentences(left_out)
 
 
 def _lost(record: SessionRecord, number: int) -> Trial:
@@ -187,10 +195,10 @@ def _layout(channels: Mapping[str, Channel]) -> Layout:
     return Layout(emg.rate_hz, len(emg.values), tuple((name, channels[name].unit) for name in ordered))
 
 
-def _run(layout: Layout, sweeps: Sequence[tuple[Trial, Mapping[str, Channel]]]) -> Run:
+def _run(layout: Layout, sweeps: Sequence[tuple[Trial, Mapping[str, Channel]]], first: StimulusWords) -> Run:
     values = [np.concatenate([channels[name].values for _, channels in sweeps]) for name, _ in layout.channels]
     starts_ms = tuple(channels[EMG].t0_ms for _, channels in sweeps)
-    return Run(layout, tuple(trial for trial, _ in sweeps), starts_ms, tuple(values))
+    return Run(layout, tuple(trial for trial, _ in sweeps), starts_ms, tuple(values), first)
 
 
 def _sentences(left_out: Mapping[tuple[str, bool], Sequence[int]]) -> list[str]:

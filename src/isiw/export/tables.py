@@ -9,13 +9,14 @@ from typing import Any, Final
 
 import pandas as pd
 
-from isiw.export.collection import Part, log_losses
-from isiw.log.frames import TRIAL_COLUMNS
+from isiw.export.collection import Part, log_losses, stimulus_of
+from isiw.log.frames import trial_columns
 from isiw.log.outputs import write_output
 from isiw.log.reader import SessionRecord
 from isiw.text import one_line
+from isiw.text.stimuli import TAP, StimulusWords, meanings
 
-__all__ = ["EVENT_COLUMNS", "SESSION_COLUMNS", "all_trials", "session_facts", "tidy", "write_tables"]
+__all__ = ["EVENT_COLUMNS", "all_trials", "session_columns", "session_facts", "tidy", "write_tables"]
 
 Columns = Mapping[str, tuple[str, str]]
 
@@ -24,12 +25,13 @@ _WHOSE: Final[Columns] = {
     "session": ("", "the number of the person's session, in the order in which they were begun"),
 }
 
-SESSION_COLUMNS: Final[Columns] = {
+_SESSION_COLUMNS: Final[Columns] = {
     "log": ("", "the name of the log"),
     "created": ("", "when it was begun, UTC"),
     "simulated": ("", "whether nobody was stimulated"),
     "device": ("", "what the device calls itself"),
-    "reference": ("", "the event that ISIs count from: the impact, or the command that opens the valve"),
+    "conditioning": ("", "what comes first: {0.given}"),
+    "reference": ("", "the event that ISIs count from: the {0.moment}, or the command that opens the valve"),
     "low_ms": ("ms", "the first ISI that could be asked"),
     "high_ms": ("ms", "the last ISI that could be asked"),
     "strategy": ("", "the strategy's name; none for one of a user's own objects"),
@@ -55,7 +57,6 @@ SESSION_COLUMNS: Final[Columns] = {
     "judged_since": ("", "whether trials were judged anew after what was found, which does not know of it"),
     "lacks": ("", "what the log lacks; empty where it is whole"),
 }
-"""Unit and meaning of what is said about a session."""
 
 EVENT_COLUMNS: Final[Columns] = {
     "kind": ("", "what kind of thing happened"),
@@ -78,7 +79,8 @@ def write_tables(parts: Sequence[Part], folder: Path, suffix: str) -> None:
         folder: where to.
         suffix: csv or parquet.
     """
-    contents = {"sessions": SESSION_COLUMNS, "trials": {"trial": ("", "its number"), **TRIAL_COLUMNS},
+    first = stimulus_of(parts)
+    contents = {"sessions": session_columns(first), "trials": {"trial": ("", "its number"), **trial_columns(first)},
                 "events": EVENT_COLUMNS}  # fmt: skip
     tables = {"sessions": _sessions(parts), "trials": all_trials(parts), "events": _events(parts)}
     meanings = [
@@ -91,6 +93,16 @@ def write_tables(parts: Sequence[Part], folder: Path, suffix: str) -> None:
         content = io.BytesIO()
         _ENCODERS[suffix](tidy(frame), content)
         write_output(folder / f"{name}.{suffix}", content.getvalue())
+
+
+def session_columns(first: StimulusWords) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of what is said about a session; what comes first is said where it is not a tap in all of them.
+
+    Args:
+        first: what the conditioning stimulus of the sessions is called.
+    """
+    columns = meanings(_SESSION_COLUMNS, first)
+    return {name: said for name, said in columns.items() if name != "conditioning" or first != TAP}
 
 
 def tidy(frame: pd.DataFrame) -> pd.DataFrame:
@@ -123,9 +135,9 @@ def _led_by(part: Part, frame: pd.DataFrame) -> pd.DataFrame:
     return frame
 
 
-def _sessions(parts: Iterable[Part]) -> pd.DataFrame:
+def _sessions(parts: Sequence[Part]) -> pd.DataFrame:
     rows = [part.whose | session_facts(part.record) for part in parts]
-    return pd.DataFrame(rows, columns=[*_WHOSE, *SESSION_COLUMNS]).astype({"day": "Int64"})
+    return pd.DataFrame(rows, columns=[*_WHOSE, *session_columns(stimulus_of(parts))]).astype({"day": "Int64"})
 
 
 def _events(parts: Iterable[Part]) -> pd.DataFrame:
@@ -138,7 +150,7 @@ def _events(parts: Iterable[Part]) -> pd.DataFrame:
 
 
 def session_facts(record: SessionRecord) -> dict[str, Any]:
-    """What a session is and found, as in `SESSION_COLUMNS`.
+    """What a session is and found, as in `session_columns`.
 
     Args:
         record: the session.
@@ -153,6 +165,7 @@ def _what_it_is(record: SessionRecord) -> dict[str, Any]:
         "created": header.created,
         "simulated": header.device.simulated,
         "device": header.device.name,
+        "conditioning": header.conditioning,
         "reference": header.space.reference,
         "low_ms": header.space.low_ms,
         "high_ms": header.space.high_ms,

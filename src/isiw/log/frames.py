@@ -10,11 +10,12 @@ import pandas as pd
 
 from isiw.log.onsets import Onset
 from isiw.log.schema import Estimate
+from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Trial, TrialTable
 
-__all__ = ["TRIAL_COLUMNS", "trial_frame"]
+__all__ = ["TRIAL_COLUMNS", "trial_columns", "trial_frame"]
 
-TRIAL_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
+_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "onset_s": ("s", "when it was about to be delivered, since the first stimulus of the log"),
     "intent_utc": ("", "the same by the computer's clock, UTC"),
     "status": ("", "accepted, or mistrial: nothing is learnt from it"),
@@ -25,10 +26,10 @@ TRIAL_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "mep_mv": ("mV", "peak-to-peak amplitude of the MEP; 0 is below the detection limit"),
     "background_rms_uv": ("uV", "RMS of the EMG before the magnetic pulse"),
     "t_valve_ms": ("ms", "the valve command, on the sweep's clock"),
-    "t_hit_ms": ("ms", "the impact, on the sweep's clock"),
+    "t_hit_ms": ("ms", "the {0.moment}, on the sweep's clock"),
     "t_tms_ms": ("ms", "the magnetic pulse, on the sweep's clock"),
     "excluded": ("", "whether an operator excluded it afterwards"),
-    "tap_alone": ("", "whether it was a tap without the magnetic pulse"),
+    "tap_alone": ("", "whether it was {0.one} without the magnetic pulse"),
     "overruled": ("", "why it had been a mistrial before an operator accepted it"),
     "p_window": ("", "probability that there is a window, after this trial"),
     "window_start_ms": ("ms", "start of the window that was believed in after this trial; none where none was"),
@@ -42,7 +43,19 @@ TRIAL_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "expected_f1": ("", "posterior mean of the F1 of the reported window"),
     "next_isi_ms": ("ms", "the ISI that was asked for next"),
 }
-"""Unit and meaning of each column of `trial_frame`, in their order."""
+
+
+def trial_columns(first: StimulusWords) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each column of `trial_frame`, in their order.
+
+    Args:
+        first: what the conditioning stimulus is called.
+    """
+    return meanings(_COLUMNS, first)
+
+
+TRIAL_COLUMNS: Final[Mapping[str, tuple[str, str]]] = trial_columns(TAP)
+"""The same after a tap."""
 
 _TEXTS: Final = ("status", "reason", "overruled")
 _FLAGS: Final = ("excluded", "tap_alone")

@@ -80,8 +80,9 @@ class SessionRecord:
         strategy = header.strategy.name or "of a user's own objects"
         lines = [
             f"Session of {header.subject or 'an unnamed subject'}, {header.created}",
-            f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space}",
-            f"Trials: {self.table}" + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
+            f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space.told(header.stimulus)}",
+            f"Trials: {self.table.counted(header.stimulus)}"
+            + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
         ]
         if last is not None:
             lines += [

@@ -32,6 +32,7 @@ from isiw.signals.limits import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import IntensityRange, ThresholdEstimate
 from isiw.text.found import finding
+from isiw.text.stimuli import STIMULI, StimulusWords
 from isiw.trials import Channel, Trial
 from isiw.types import Conditioning, FloatArray
 from isiw.visit import Visit, VisitProtocol
@@ -126,6 +127,11 @@ class Header(_Record):
         """The conditioning stimulus, as the strategy was told, or as the device says."""
         told: Conditioning = self.strategy.settings.get("conditioning", self.device.conditioning)
         return told
+
+    @property
+    def stimulus(self) -> StimulusWords:
+        """What the conditioning stimulus is called."""
+        return STIMULI[self.conditioning]
 
     @property
     def detection_limit_mv(self) -> float | None:

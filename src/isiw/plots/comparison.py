@@ -14,10 +14,10 @@ from isiw.log.schema import Estimate
 from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, save_figure, tidied
 from isiw.text import one_line
 from isiw.text.found import rules_out
+from isiw.text.stimuli import words_of
 
 __all__ = ["comparison_figure", "save_comparison_plot"]
 
-_AXIS_NAME = {"impact": "ISI after the impact [ms]", "valve": "ISI after the valve command [ms]"}
 _LONGEST_CODE = 24
 
 
@@ -58,7 +58,8 @@ def comparison_figure(records: Sequence[SessionRecord], names: Sequence[str] | N
     axes.set_ylim(len(records) - 0.4, -0.6)
     spaces = [record.header.space for record in records]
     axes.set_xlim(min(space.low_ms for space in spaces), max(space.high_ms for space in spaces))
-    axes.set_xlabel(_AXIS_NAME[spaces[0].reference], fontsize=9)
+    first = words_of(record.header.conditioning for record in records)
+    axes.set_xlabel(first.isi_axis(spaces[0].reference), fontsize=9)
     explain(figure, ncols=3, above=True)
     return figure
 

@@ -37,7 +37,6 @@ from isiw.window import Window
 __all__ = ["save_session_plot", "session_figure"]
 
 SMALLEST_UV = 1.0
-_AXIS_NAME = {"impact": "ISI after the impact [ms]", "valve": "ISI after the valve command [ms]"}
 
 
 def save_session_plot(
@@ -146,7 +145,7 @@ def _finish_profile(axes: Axes, record: SessionRecord) -> None:
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_xlim(space.low_ms, space.high_ms)
-    axes.set_xlabel(_AXIS_NAME[space.reference], fontsize=9)
+    axes.set_xlabel(record.header.stimulus.isi_axis(space.reference), fontsize=9)
     axes.set_ylabel("MEP [µV]", fontsize=9)
     axes.set_title(f"{_title(record)} after {len(record.table)} trials", fontsize=11, loc="left", color=INK, pad=12)
 

@@ -1,4 +1,4 @@
-"""The picture of a session's sweeps: the EMG around the pulse, stacked by ISI, with the MEP window and the taps."""
+"""The picture of a session's sweeps: the EMG around the pulse, stacked by ISI, with MEP window and first stimulus."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def sweeps_figure(record: SessionRecord) -> Figure | None:
     inside, rows_per_mv = _inside(record, traces), _rows_of_largest(traces) / largest_mv
     _draw_traces(axes, traces, inside, rows_per_mv, BLUE, "EMG, ISI inside the window")
     _draw_traces(axes, traces, ~inside, rows_per_mv, INK, "EMG, other trials")
-    _draw_hits(axes, traces)
+    _draw_hits(axes, traces, record.header.stimulus.mark)
     _draw_scale(axes, (len(traces) - 1) / 2, _round_mv(largest_mv), rows_per_mv)
     _finish(axes, traces)
     figure.legend(loc="outside upper left", ncols=3, fontsize=7.5, frameon=False)
@@ -107,7 +107,7 @@ def _draw_traces(
         axes.add_collection(LineCollection(lines, colors=colour, linewidths=width, label=label), autolim=False)
 
 
-def _draw_hits(axes: Axes, traces: Sequence[_Trace]) -> None:
+def _draw_hits(axes: Axes, traces: Sequence[_Trace], label: str) -> None:
     hits = [(t.trial.t_hit_ms - t.trial.t_tms_ms, row) for row, t in enumerate(traces)
             if t.trial.t_hit_ms is not None and t.trial.t_tms_ms is not None]  # fmt: skip
     near = [(hit_ms, row) for hit_ms, row in hits if -BEFORE_MS <= hit_ms <= AFTER_MS]
@@ -118,7 +118,7 @@ def _draw_hits(axes: Axes, traces: Sequence[_Trace]) -> None:
             ms=7 if len(near) < 100 else 4,
             mew=1.6,
             color=ORANGE,
-            label="hit of the hammer",
+            label=label,
         )
 
 

@@ -1,4 +1,4 @@
-"""The picture of a window on the time line of a pair of stimuli: valve command, hit, window, intervals, best ISI."""
+"""The picture of a window on the time line of a pair of stimuli: what comes first, window, intervals, best ISI."""
 
 from __future__ import annotations
 
@@ -13,9 +13,6 @@ from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, tidied
 
 __all__ = ["timeline_figure"]
 
-_ORIGIN = {"impact": "hit of the hammer", "valve": "valve command"}
-_AXIS = {"impact": "time after the hit of the hammer [ms]", "valve": "time after the valve command [ms]"}
-
 
 def timeline_figure(record: SessionRecord) -> Figure:
     """When, within a pair of stimuli, the pulse enhances the MEP.
@@ -24,12 +21,13 @@ def timeline_figure(record: SessionRecord) -> Figure:
         record: the session.
     """
     space = record.header.space
+    origin = record.header.stimulus.shown(space.reference)
     figure = Figure(figsize=(7.2, 2.2), layout="constrained")
     axes = figure.subplots()
     tidied(axes)
     axes.spines["left"].set_visible(False)
     axes.set_yticks([])
-    events = {_ORIGIN[space.reference]: 0.0} | _other_event(record)
+    events = {origin: 0.0} | _other_event(record)
     for name, place_ms in events.items():
         axes.axvline(place_ms, ymax=0.72, color=INK, lw=1.6)
         axes.text(place_ms, 0.76, name, ha="center", va="bottom", fontsize=8, color=INK)
@@ -42,7 +40,7 @@ def timeline_figure(record: SessionRecord) -> Figure:
     )
     axes.set_xlim(low - margin, high + margin)
     axes.set_ylim(0, 1)
-    axes.set_xlabel(_AXIS[space.reference], fontsize=9)
+    axes.set_xlabel(f"time after the {origin} [ms]", fontsize=9)
     explain(figure, ncols=3)
     return figure
 
@@ -54,7 +52,7 @@ def _other_event(record: SessionRecord) -> dict[str, float]:
         return {}
     median_ms = statistics.median(delays_ms)
     if record.header.space.reference == "valve":
-        return {f"hit of the hammer\n{median_ms:.0f} ms (median)": median_ms}
+        return {f"{record.header.stimulus.mark}\n{median_ms:.0f} ms (median)": median_ms}
     return {f"valve command\n−{median_ms:.0f} ms (median)": -median_ms}
 
 

@@ -68,7 +68,8 @@ def _timing(record: SessionRecord) -> Answer:
         )
     confirmed = [timed_isi_ms(trial, space) is not None for trial in record.table]
     if not any(errors_ms) and not any(confirmed):
-        detail = "The device reports every ISI exactly as commanded, and no pulse or hit time to check it against."
+        times = f"{record.header.stimulus.pulse} or {record.header.stimulus.hit} time"
+        detail = f"The device reports every ISI exactly as commanded, and no {times} to check it against."
         answer = _verdict(record, len(rejected), 0) if rejected else "as the device says"
         return Answer(question, answer, f"{detail} {_listed(rejected)}")
     tolerance_ms = record.header.signals.tolerance_ms(space)
@@ -78,8 +79,14 @@ def _timing(record: SessionRecord) -> Answer:
     off = sum(abs(trial.isi_error_ms or 0.0) > tolerance_ms or trial.index in contradicted for trial in others)
     detail = f"Trials that count are off by {sizes}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
     if contradicted:
-        detail += f" The times of pulse and {space.reference} contradict the ISI in {_few(contradicted)}."
+        detail += f" The times of {_events(record)} contradict the ISI in {_few(contradicted)}."
     return Answer(question, _verdict(record, len(rejected) + off, _known(record, measured=any(errors_ms))), detail)
+
+
+def _events(record: SessionRecord) -> str:
+    """The two events between which ISIs are, in words."""
+    first, reference = record.header.stimulus, record.header.space.reference
+    return f"{first.pulse} and {first.moment if reference == 'impact' else reference}"
 
 
 def _known(record: SessionRecord, *, measured: bool) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from isiw.log.reader import SessionRecord
-from isiw.text.found import STIMULI, SURE, rules_out
+from isiw.text.found import SURE, rules_out
 
 __all__ = ["depression_sentence"]
 
@@ -19,7 +19,7 @@ def depression_sentence(record: SessionRecord) -> str:
     Returns:
         One sentence; empty where the strategy did not look, and the pulse is not known to be above the threshold.
     """
-    stimulus = STIMULI[record.header.conditioning]
+    stimulus = record.header.stimulus.name
     estimate, intensity_pct = record.estimates[-1], record.header.visit.intensity_pct_rmt
     if estimate.depressed_probability is not None:
         chance = f" (probability that it does so anywhere: {estimate.depressed_probability:.2f})"

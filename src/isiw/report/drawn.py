@@ -40,6 +40,8 @@ def drawn(record: SessionRecord) -> dict[str, Any]:
     beliefs = {estimate.trial: _belief(record, estimate) for estimate in record.estimates}
     return {
         "reference": header.space.reference,
+        "isiAxis": header.stimulus.isi_axis(header.space.reference),
+        "dotted": _dotted(record),
         "range": [header.space.low_ms, header.space.high_ms],
         "mepWindow": list(header.signals.mep_window_ms),
         "acquisition": plain(str(header.strategy.settings.get("acquisition", ""))),
@@ -50,8 +52,16 @@ def drawn(record: SessionRecord) -> dict[str, Any]:
     }
 
 
+def _dotted(record: SessionRecord) -> str:
+    """What the dotted lines in a sweep are, in a sentence."""
+    first = record.header.stimulus
+    if first.by_valve or any(trial.t_valve_ms is not None for trial in record.table):
+        return f"Dotted orange lines: valve command and {first.mark}."
+    return f"Dotted orange line: {first.mark}."
+
+
 def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
-    row = trial_row(trial)
+    row = trial_row(trial, record.header.stimulus)
     return {
         "number": trial.index,
         "kind": "mistrial" if trial.reason is not None else "excluded" if trial.excluded else "counts",

@@ -48,7 +48,7 @@ def further_facts(record: SessionRecord) -> list[Fact]:
     header = record.header
     groups = {
         "visit": header.visit,
-        "ISIs": str(header.space),
+        "ISIs": header.space.told(header.stimulus),
         "tolerance": f"{header.space.tolerance_ms:g} ms",
         "judgement of a sweep": header.signals,
         "protocol": header.protocol,

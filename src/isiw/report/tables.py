@@ -9,6 +9,7 @@ from typing import NamedTuple
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
 from isiw.session.progress import asked, outcome
+from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import MistrialReason, Trial
 
 __all__ = ["Counted", "TrialRow", "counted_rows", "event_rows", "lost_rows", "trial_row"]
@@ -33,28 +34,29 @@ class Counted(NamedTuple):
     limit: str
 
 
-def trial_row(trial: Trial) -> TrialRow:
+def trial_row(trial: Trial, first: StimulusWords = TAP) -> TrialRow:
     """One trial of the table of all trials.
 
     Args:
         trial: the trial.
+        first: what the conditioning stimulus is called.
     """
     return TrialRow(
         trial.index,
-        asked(trial),
+        asked(trial, first),
         "–" if trial.isi_ms is None else f"{trial.isi_ms:.1f} ms",
         outcome(trial),
         "–" if trial.background_rms_uv is None else f"{trial.background_rms_uv:.2g} µV",
-        _remark(trial),
+        _remark(trial, first),
     )
 
 
-def _remark(trial: Trial) -> str:
+def _remark(trial: Trial, first: StimulusWords) -> str:
     if trial.overruled is not None:
         return f"accepted by the operator; had been: {trial.overruled}"
     if trial.reason is not None and trial.mep_mv is not None:
         return f"{1e3 * trial.mep_mv:.0f} µV were measured"
-    return "nothing is learnt from a tap alone" if trial.tap_alone and trial.counts else ""
+    return f"nothing is learnt from {first.one} alone" if trial.tap_alone and trial.counts else ""
 
 
 def lost_rows(record: SessionRecord) -> list[tuple[int, str, str]]:
@@ -65,7 +67,7 @@ def lost_rows(record: SessionRecord) -> list[tuple[int, str, str]]:
     """
     said = {event.trial: event.text for event in record.events if event.kind == "exclusion"}
     lost = [trial for trial in (*record.table, *record.unknown_trials) if not trial.counts]
-    return sorted((t.index, asked(t), _why(t, said.get(t.index, ""))) for t in lost)
+    return sorted((t.index, asked(t, record.header.stimulus), _why(t, said.get(t.index, ""))) for t in lost)
 
 
 def _why(trial: Trial, said: str) -> str:

@@ -23,7 +23,7 @@ from isiw.report.evidence import (
 from isiw.session.header import OWN_LOOP
 from isiw.session.progress import asked, outcome
 from isiw.strategy.catalogue import known_settings, list_strategies
-from isiw.text.found import STIMULI, SURE, rules_out
+from isiw.text.found import SURE, rules_out
 from isiw.window import MIN_EXCESS_MV, Window
 
 __all__ = [
@@ -147,7 +147,7 @@ def finding_sentence(record: SessionRecord, estimate: Estimate) -> str:
     if window is None:
         is_none = rules_out(probability)
         return f"No window was found{chance}." if is_none else f"It is undecided whether there is a window{chance}."
-    enhances = f"The {STIMULI[record.header.conditioning]} {'' if probability >= SURE else 'probably '}enhances the MEP"
+    enhances = f"The {record.header.stimulus.name} {'' if probability >= SURE else 'probably '}enhances the MEP"
     isis = f"{window} {_after(record)}{chance}"
     if estimate.expected_f1 is not None and estimate.expected_f1 < A_GUESS:
         return f"{enhances}, but at which ISIs is not known well; the best guess is {isis}."
@@ -156,15 +156,12 @@ def finding_sentence(record: SessionRecord, estimate: Estimate) -> str:
 
 def _after(record: SessionRecord) -> str:
     """Which event the session's ISIs count from, in words."""
-    if record.header.space.reference == "valve":
-        return "after the valve command"
-    stimulus = record.header.conditioning
-    return "after the impact" if stimulus == "tap" else f"after the {STIMULI[stimulus]}"
+    return f"after the {record.header.stimulus.origin(record.header.space.reference)}"
 
 
 def _without_probability(record: SessionRecord, estimate: Estimate) -> str:
     """The same, of a method that gives none."""
-    first, space = STIMULI[record.header.conditioning], record.header.space
+    first, space = record.header.stimulus.name, record.header.space
     if estimate.window is not None:
         isis = f"{estimate.window} {_after(record)}"
         return f"By this method, which gives no probability, the {first} enhances the MEP at ISIs of {isis}."
@@ -271,7 +268,7 @@ def counts_sentence(record: SessionRecord) -> str:
 
 def _controls(record: SessionRecord) -> str:
     """How many control trials there were, in words; empty where there were none."""
-    kinds = Counter(asked(trial) for trial in record.table if trial.is_control)
+    kinds = Counter(asked(trial, record.header.stimulus) for trial in record.table if trial.is_control)
     return " and ".join(f"{count} of {kind}" for kind, count in sorted(kinds.items(), reverse=True))
 
 
@@ -338,7 +335,7 @@ def trial_rows(record: SessionRecord) -> list[tuple[str, ...]]:
         record: the session.
     """
     trials = sorted([*record.table, *record.unknown_trials], key=lambda trial: trial.index)
-    return [(str(t.index), asked(t), outcome(t), _isi(t.isi_ms)) for t in trials]
+    return [(str(t.index), asked(t, record.header.stimulus), outcome(t), _isi(t.isi_ms)) for t in trials]
 
 
 def _isi(isi_ms: float | None) -> str:

@@ -251,7 +251,7 @@ class Session(Judging):
 
     def _show(self, update: SessionUpdate) -> None:
         """Show a trial: in a terminal with a last line that says how the session stands."""
-        row, desk = progress_row(update), self._steps.desk
+        row, desk = progress_row(update, self.header.stimulus), self._steps.desk
         if desk is not None and is_terminal(sys.stdout):
             desk.show(fitted(row), standing(update, self._space))
         else:

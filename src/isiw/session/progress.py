@@ -13,6 +13,7 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.session.updates import SessionUpdate
 from isiw.text import plain
+from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
 from isiw.window import Interval, WindowEstimate
 
@@ -45,15 +46,16 @@ MOST_SPARKS: Final = 28
 _WIDTHS = (5, 9, 27, 4, 10, 7, 7, 4)
 
 
-def progress_row(update: SessionUpdate) -> tuple[str, ...]:
+def progress_row(update: SessionUpdate, first: StimulusWords = TAP) -> tuple[str, ...]:
     """One trial in words and figures, as in `PROGRESS_HEADINGS`.
 
     Args:
         update: what is known after the trial.
+        first: what the conditioning stimulus is called.
     """
     trial, estimate = update.trial, update.estimate
     found = _found(estimate) if estimate.rests_on_data else ("", "–", "", "")
-    return (str(trial.index), asked(trial), outcome(trial), *found, str(update.stimuli_left))
+    return (str(trial.index), asked(trial, first), outcome(trial), *found, str(update.stimuli_left))
 
 
 def show_progress(row: Sequence[str]) -> None:
@@ -130,12 +132,17 @@ def _bracketed(sparks: Sequence[str], isi_ms: Sequence[float], estimate: WindowE
     return "".join(itertools.chain(*zip(marks, [*sparks, ""], strict=True)))
 
 
-def asked(trial: Trial) -> str:
-    """What a trial was to be: its ISI, or which control trial."""
+def asked(trial: Trial, first: StimulusWords = TAP) -> str:
+    """What a trial was to be: its ISI, or which control trial.
+
+    Args:
+        trial: the trial.
+        first: what the conditioning stimulus is called.
+    """
     if trial.commanded_isi_ms is not None:
         return f"{trial.commanded_isi_ms:.4g} ms"
     if trial.tap_alone:
-        return "tap alone"
+        return first.alone
     return "TMS alone" if trial.is_control else "–"
 
 

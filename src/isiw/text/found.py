@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Final, TypeAlias
 
-from isiw.types import Conditioning
-
-__all__ = ["ENOUGH_PAIRS", "NO_MEP", "STIMULI", "SURE", "TOO_FEW", "finding", "lacking", "rules_out"]
+__all__ = ["ENOUGH_PAIRS", "NO_MEP", "SURE", "TOO_FEW", "finding", "lacking", "rules_out"]
 
 ENOUGH_PAIRS: Final = 3
 """With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
@@ -22,9 +18,6 @@ NO_MEP: Final = "No MEP was seen in any trial that counts, so nothing is known a
 
 SURE: Final = 0.95
 """Probability from which on it is said outright that there is a window, or none; below it "probably", or undecided."""
-
-STIMULI: Final[Mapping[Conditioning, str]] = MappingProxyType({"tap": "tap", "electrical": "electrical pulse"})
-"""What conditioning stimuli are called."""
 
 _Edge: TypeAlias = tuple[float | None, float | None, float | None]
 

@@ -78,6 +78,16 @@ def test_what_is_of_the_session_needs_the_token_and_the_pages_own_origin(watched
         refused(watched.client.request(method, path, headers={"Origin": "http://127.0.0.1:1"}), 403, "ForeignOrigin")
 
 
+def test_the_page_names_no_stimulus_before_the_session_says_which_it_gives(watched: Watched) -> None:
+    for path in ("/", "/live.js", "/draw.js"):
+        assert "hammer" not in httpx.get(watched.client.base_url.join(path)).text
+    watched.start()
+    with watched.viewer() as news:
+        drawn = next(news)["drawn"]
+    assert drawn["dotted"] == "Dotted orange lines: valve command and hit of the hammer."
+    assert drawn["isiAxis"] == "ISI after the valve command [ms]"
+
+
 def test_what_is_shown_is_what_the_log_holds(watched: Watched) -> None:
     watched.start(trials=3)
     with watched.viewer() as news:

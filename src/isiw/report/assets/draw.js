@@ -2,7 +2,6 @@
 // What the pages of a session draw with plotly: a belief with the trials, and a sweep. Sessions are as `isiw.report.drawn` gives them.
 const draw = (() => {
   const names = { counts: "trial", excluded: "excluded", mistrial: "mistrial" };
-  const after = { impact: "after the impact", valve: "after the valve command" };
   const options = { displayModeBar: false, responsive: true }; // plotly's own buttons would upload what is drawn
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   const axis = (title, more = {}) => ({
@@ -113,7 +112,7 @@ const draw = (() => {
       ? Object.keys(names).map((kind) => trialTrace(session.trials, kind, number, lowestUv)) : [];
     const traces = [...profileTraces(believed), ...points, ...scoreTraces(believed), ...legend(believed)];
     Plotly.react(id, traces, layout({
-      xaxis: axis(`ISI ${after[session.reference]} [ms]`, { range: session.range, anchor: isScored(believed) ? "y2" : "y" }),
+      xaxis: axis(session.isiAxis, { range: session.range, anchor: isScored(believed) ? "y2" : "y" }),
       yaxis2: axis("score", { domain: [0, 0.2], visible: isScored(believed), showticklabels: false }),
       yaxis: axis("MEP [µV]", {
         domain: isScored(believed) ? [0.26, 1] : [0, 1], type: "log", tickvals: ticksUv,

@@ -83,6 +83,7 @@
     shown.beliefOf = number;
     document.title = `${shown.phase === "paused" ? "Paused: " : ""}Session of ${shown.subject}`;
     said("title", `Session of ${shown.subject}`);
+    said("dotted", shown.drawn.dotted);
     tellPhase();
     said("found", belief ? belief.found : "Nothing is known yet.");
     said("reason", belief ? belief.reason : "");

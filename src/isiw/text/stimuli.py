@@ -1,0 +1,122 @@
+"""What the conditioning stimulus is called wherever it is spoken of: a tap on the tendon, or an electrical pulse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+from typing import Final
+
+from isiw.types import Conditioning, Reference
+
+__all__ = ["STIMULI", "TAP", "StimulusWords", "meanings", "words_of"]
+
+
+@dataclass(frozen=True)
+class StimulusWords:
+    """The words for a conditioning stimulus, or for several of them.
+
+    Args:
+        name: in a sentence, behind "the".
+        one: the same with its article.
+        given: what is given, and where to.
+        moment: when it comes, behind "the"; ISIs count from it.
+        mark: the same in a picture.
+        hit: the same, before "time".
+        pulse: what the magnetic pulse is called beside it.
+        by_valve: whether a valve is commanded before it.
+    """
+
+    name: str
+    one: str
+    given: str
+    moment: str
+    mark: str
+    hit: str
+    pulse: str
+    by_valve: bool
+
+    @property
+    def alone(self) -> str:
+        """The stimulus without the magnetic pulse."""
+        return f"{self.name} alone"
+
+    def origin(self, reference: Reference) -> str:
+        """The event that ISIs count from, behind "the".
+
+        Args:
+            reference: which one it is.
+        """
+        return "valve command" if reference == "valve" else self.moment
+
+    def isi_axis(self, reference: Reference) -> str:
+        """What the axis of a picture over ISIs is called.
+
+        Args:
+            reference: the event that they count from.
+        """
+        return f"ISI after the {self.origin(reference)} [ms]"
+
+    def shown(self, reference: Reference) -> str:
+        """The event that ISIs count from, in a picture of a pair of stimuli.
+
+        Args:
+            reference: which one it is.
+        """
+        return "valve command" if reference == "valve" else self.mark
+
+
+STIMULI: Final[Mapping[Conditioning, StimulusWords]] = MappingProxyType(
+    {
+        "tap": StimulusWords(
+            name="tap",
+            one="a tap",
+            given="a tap on the tendon",
+            moment="impact",
+            mark="hit of the hammer",
+            hit="hit",
+            pulse="pulse",
+            by_valve=True,
+        ),
+        "electrical": StimulusWords(
+            name="electrical pulse",
+            one="an electrical pulse",
+            given="an electrical pulse to the nerve",
+            moment="electrical pulse",
+            mark="electrical pulse",
+            hit="electrical pulse",
+            pulse="magnetic pulse",
+            by_valve=False,
+        ),
+    }
+)
+"""What conditioning stimuli are called."""
+
+TAP: Final = STIMULI["tap"]
+
+
+def words_of(stimuli: Iterable[Conditioning]) -> StimulusWords:
+    """The words for all stimuli of some sessions; of none of them, those for the tap.
+
+    Args:
+        stimuli: the conditioning stimulus of each.
+    """
+    given = set(stimuli)
+    several = [words for stimulus, words in STIMULI.items() if stimulus in given] or [TAP]
+    joined = {
+        field.name: " or ".join(dict.fromkeys(getattr(words, field.name) for words in several))
+        for field in fields(StimulusWords)
+        if field.name != "by_valve"
+    }
+    return StimulusWords(**joined, by_valve=any(words.by_valve for words in several))
+
+
+def meanings(columns: Mapping[str, tuple[str, str]], first: StimulusWords, **more: str) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of the columns of a table, of a stimulus.
+
+    Args:
+        columns: their units, and their meanings with words such as `{0.moment}` to be filled in.
+        first: what these are filled in from.
+        more: further words to be filled in.
+    """
+    return {name: (unit, meaning.format(first, **more)) for name, (unit, meaning) in columns.items()}
