@@ -9,7 +9,7 @@ import pytest
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.salvage import current_file, salvage
+from isiw.log.salvage import current_file, holds, only_in, salvage
 from isiw.log.schema import Header, Intent, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel, Status, Trial
@@ -221,3 +221,15 @@ def test_a_second_record_of_a_trial_is_left_out_and_reported(tmp_path: Path, hea
     record = read_session(tmp_path / "s.mcap")
     assert [trial.mep_mv for trial in record.table] == [0.0, 0.01]
     assert record.losses == ("A second record of trial 1 is left out.",)
+
+
+def test_what_one_log_alone_has_is_counted(tmp_path: Path, header: Header) -> None:
+    with LogWriter.create(tmp_path / "s.mcap", header) as log:
+        write_trials(log, range(2))
+    earlier = salvage(tmp_path / "s.mcap")
+    with LogWriter.continuing(tmp_path / "s.mcap", earlier, header) as log:
+        write_trials(log, [2])
+    later = salvage(tmp_path / "s.mcap")
+    assert (only_in(earlier, later), only_in(later, earlier)) == (0, 3)
+    assert holds(later, earlier)
+    assert not holds(earlier, later)

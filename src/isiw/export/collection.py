@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from isiw.errors import LogError
-from isiw.log.durable import log_of
-from isiw.log.reader import SessionRecord, read_session
+from isiw.export.copies import once_each, stimuli
+from isiw.log.reader import SessionRecord, read_salvaged, read_session
+from isiw.log.salvage import salvage_file
 from isiw.text.stimuli import StimulusWords, words_of
 
-__all__ = ["Part", "log_losses", "numbered", "read_logs", "stimulus_of"]
+__all__ = ["Part", "log_losses", "numbered", "read_logs", "stimulus_of", "told_twice"]
+
+
+_LOGS: Final = re.compile(r"\.(mcap|part|damaged\d*)")
+"""How the names of logs end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +50,8 @@ class Part:
 def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
     """The sessions of a log or of a folder with logs, and a sentence for each log that is left out.
 
-    Copies of a log, such as those in an earlier export, count once, and so does one that was copied before its end.
+    Copies of a log, such as those in an earlier export, count once, and so does one that was copied before its end, or
+    was damaged: of a session that is there several times the log counts that tells of most.
 
     Args:
         source: a log, with or without `.part`, or a folder, whose folders are looked into, too.
@@ -55,46 +63,25 @@ def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
         return [read_session(source)], []
     records: dict[str, SessionRecord] = {}
     left_out = []
-    for log in _logs_of(Path(source)):
+    for file in _files_of(Path(source)):
         try:
-            record = read_session(log)
+            record = read_salvaged(salvage_file(file))
         except LogError as error:
-            left_out.append(f"{log.name} is left out: {error.what}.")
+            left_out.append(f"{file.name} is left out: {error.what}.")
             continue
-        first = records.setdefault(hashlib.sha256(record.path.read_bytes()).hexdigest(), record)
+        first = records.setdefault(hashlib.sha256(file.read_bytes()).hexdigest(), record)
         if first is not record:
-            left_out.append(f"{log.name} is left out: it is a copy of {first.path.name}.")
+            left_out.append(f"{file.name} is left out: it is a copy of {first.path.name}.")
     if not records:
         what = "no log in the folder can be read" if left_out else "there is no log in the folder"
         raise LogError(what, got=str(source), expected="files called .mcap or .mcap.part")
-    whole, parts = _without_parts(list(records.values()))
-    return whole, left_out + parts
+    kept, copies = once_each(list(records.values()))
+    return kept, left_out + copies
 
 
-def _without_parts(records: Sequence[SessionRecord]) -> tuple[list[SessionRecord], list[str]]:
-    """The records that are no part of another one, and a sentence for each that is."""
-    kept: list[SessionRecord] = []
-    left_out = []
-    for record in sorted(records, key=lambda each: len(each.history), reverse=True):
-        longer = next((each for each in kept if _is_part(record, each)), None)
-        if longer is None:
-            kept.append(record)
-        else:
-            left_out.append(f"{record.path.name} is left out: it is a part of {longer.path.name}.")
-    return kept, left_out
-
-
-def _is_part(record: SessionRecord, longer: SessionRecord) -> bool:
-    """Whether all that a log tells is told by another one of the same session as well."""
-    one, other = record.header, longer.header
-    same = (one.created, one.subject, one.seed) == (other.created, other.subject, other.seed)
-    return same and record.history == longer.history[: len(record.history)]
-
-
-def _logs_of(folder: Path) -> list[Path]:
-    """Its logs, each once, whether it is finished or not."""
-    files = (file for file in folder.rglob("*.mcap*") if file.suffix in {".mcap", ".part"} and file.is_file())
-    return sorted({log_of(file) for file in files})
+def _files_of(folder: Path) -> list[Path]:
+    """Its logs: finished ones, unfinished ones, and what was kept of damaged ones."""
+    return sorted(file for file in folder.rglob("*.mcap*") if _LOGS.fullmatch(file.suffix) and file.is_file())
 
 
 def numbered(records: Iterable[SessionRecord]) -> list[Part]:
@@ -113,6 +100,25 @@ def numbered(records: Iterable[SessionRecord]) -> list[Part]:
         sessions[subject] += 1
         parts.append(Part(subject, f"{sessions[subject]:02d}", record))
     return sorted(parts, key=lambda part: (part.subject, part.session))
+
+
+def told_twice(parts: Iterable[Part]) -> list[str]:
+    """A sentence for each two sessions that have trials in common.
+
+    Args:
+        parts: the sessions.
+    """
+    of_stimulus: dict[tuple[int, int], Part] = {}
+    said = []
+    for part in parts:
+        others = Counter(str(of_stimulus.setdefault(each, part)) for each in stimuli(part.record).items())
+        said += [
+            f"{part}: {number} of its trials are in {other} as well, as copies of a log went on differently; "
+            "export one of them."
+            for other, number in others.items()
+            if other != str(part)
+        ]
+    return said
 
 
 def stimulus_of(parts: Iterable[Part]) -> StimulusWords:

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from isiw.checks import choice
 from isiw.export.bids import write_bids
-from isiw.export.collection import Part, log_losses, numbered, read_logs
+from isiw.export.collection import Part, log_losses, numbered, read_logs, told_twice
 from isiw.export.folder import new_folder
 from isiw.export.pseudonyms import pseudonymised
 from isiw.export.tables import write_tables
@@ -69,6 +69,7 @@ def export_logs(source: str | Path, folder: str | Path, to: str = "csv", *, pseu
     parts = numbered(records)
     for part in parts:
         lacking += [f"{part}: {loss}" for loss in log_losses(part.record)]
+    lacking += told_twice(parts)
     with new_folder(folder) as beside:
         lacking += FORMATS[to](parts, beside) or ()
     trials = sum(len(part.record.table) for part in parts)

@@ -21,7 +21,7 @@ from isiw.log.durable import Fingerprint, disk_errors, log_of, part_of
 from isiw.log.index import RECORD_HEAD_BYTES, counted_records
 from isiw.log.topics import ANNOUNCEMENT, CHANNEL_IDS
 
-__all__ = ["Message", "Salvage", "current_file", "holds", "salvage", "salvage_file"]
+__all__ = ["Message", "Salvage", "current_file", "holds", "only_in", "salvage", "salvage_file"]
 
 
 @dataclass(frozen=True)
@@ -128,8 +128,18 @@ def holds(later: Salvage, earlier: Salvage) -> bool:
         later: the log.
         earlier: the other one.
     """
-    every, needed = (Counter((m.topic, m.data) for m in found.messages) for found in (later, earlier))
-    return needed <= every
+    return not only_in(earlier, later)
+
+
+def only_in(found: Salvage, other: Salvage) -> int:
+    """How many records a log has that another one has not.
+
+    Args:
+        found: the log.
+        other: the other one.
+    """
+    own, others = (Counter((m.topic, m.data) for m in each.messages) for each in (found, other))
+    return (own - others).total()
 
 
 def salvage_file(path: Path) -> Salvage:
