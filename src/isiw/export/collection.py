@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 from isiw.errors import LogError
 from isiw.export.copies import once_each, stimuli
+from isiw.log.durable import kept_for
 from isiw.log.reader import SessionRecord, read_salvaged, read_session
 from isiw.log.salvage import salvage_file
 from isiw.text.stimuli import StimulusWords, words_of
 
 __all__ = ["Part", "log_losses", "numbered", "read_logs", "stimulus_of", "told_twice"]
-
-
-_LOGS: Final = re.compile(r"\.(mcap|part|damaged\d*)")
-"""How the names of logs end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +76,8 @@ def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
 
 def _files_of(folder: Path) -> list[Path]:
     """Its logs: finished ones, unfinished ones, and what was kept of damaged ones."""
-    return sorted(file for file in folder.rglob("*.mcap*") if _LOGS.fullmatch(file.suffix) and file.is_file())
+    files = (file for file in folder.rglob("*.mcap*") if file.is_file())
+    return sorted(file for file in files if file.suffix in {".mcap", ".part"} or kept_for(file) is not None)
 
 
 def numbered(records: Iterable[SessionRecord]) -> list[Part]:
