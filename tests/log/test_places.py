@@ -12,9 +12,9 @@ from typing import Any, Never
 import pytest
 
 from isiw.errors import LogError
-from isiw.log.durable import take_free_place
+from isiw.log.durable import Fingerprint, take_free_place
 from isiw.log.reader import read_session
-from isiw.log.salvage import salvage
+from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import Event, Header
 from isiw.log.writer import LogWriter
 from isiw.session.resume import exclude
@@ -134,6 +134,23 @@ def test_a_name_that_leads_nowhere_is_taken_too(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(tmp_path / "nowhere")
     with pytest.raises(FileExistsError):
         take_free_place(tmp_path / "ours", tmp_path / "link")
+
+
+def test_a_log_that_a_session_went_on_with_while_its_names_were_looked_at_does_not_go_on_twice(
+    finished_log: Path, another: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    longer = finished_log.with_name("longer")
+    longer.write_bytes(another)
+
+    def meanwhile(target: Path, found: Salvage) -> Fingerprint | None:
+        longer.replace(target)
+        return found.fingerprint
+
+    monkeypatch.setattr("isiw.log.writer._own_file", meanwhile)
+    with pytest.raises(LogError, match="has changed since"):
+        go_on(finished_log)
+    assert finished_log.read_bytes() == another
+    assert [path.name for path in finished_log.parent.iterdir()] == ["s.mcap"]
 
 
 def test_a_disk_that_knows_no_locks_is_refused_and_nothing_is_left_on_it(

@@ -113,6 +113,7 @@ class LogWriter:
         with claimed(salvage.path) as source, disk_errors(target, "the log cannot go on", "It stays as it was."):
             _require_unchanged(source, salvage)
             replaces = _own_file(target, salvage)
+            _require_unchanged(source, salvage)  # again, for a session that went on with it and ended just now
             copy = target.with_name(f"{target.name}{_COPYING}")
             copy.unlink(missing_ok=True)  # of an earlier attempt that was killed; its source is still whole
             with begun(copy) as file:
