@@ -185,9 +185,11 @@ def test_an_estimate_is_printed_with_its_probability_medians_and_intervals() -> 
 
 def test_an_estimate_is_printed_without_what_it_does_not_have() -> None:
     assert str(WindowEstimate(None, Window(10, 40))) == "Window: 10–40 ms"
+    assert str(WindowEstimate(None, None)) == "No answer yet"
+    assert str(WindowEstimate(None, None, grid_ms=np.array([10.0, 40.0]))) == "No window"
     no_window = WindowEstimate(0.2, None, 10.0, 40.0, edge_samples_ms=np.array([[10.0, 40.0]]))
-    assert str(no_window) == "Window: undecided (probability of a window: 0.20)"
-    assert str(replace(no_window, probability=0.03)) == "Window: none (probability of a window: 0.03)"
+    assert str(no_window) == "Undecided (probability of a window: 0.20)"
+    assert str(replace(no_window, probability=0.03)) == "No window (probability of a window: 0.03)"
 
 
 def test_the_robust_interval_is_the_hull_over_probable_hypotheses() -> None:

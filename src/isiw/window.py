@@ -12,7 +12,7 @@ import numpy as np
 
 from isiw.checks import check_probabilities, number
 from isiw.errors import InvalidValueError
-from isiw.text.found import finding, lacking
+from isiw.text.found import finding, lacking, nothing_found
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
@@ -264,7 +264,9 @@ class WindowEstimate:
             return self.too_little
         start, end = self.interval(0.9) or ((None, None), (None, None))
         depressed = self.depressed, self.depressed_probability
-        return finding(self.probability, self.window, (self.start_ms, *start), (self.end_ms, *end), depressed)
+        nothing = nothing_found(self.probability, has_answer=self.probability is not None or self.grid_ms is not None)
+        edges = (self.start_ms, *start), (self.end_ms, *end)
+        return finding(self.probability, self.window, nothing, *edges, depressed)
 
     @property
     def rests_on_data(self) -> bool:

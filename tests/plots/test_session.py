@@ -87,8 +87,13 @@ def test_edges_beyond_the_range_are_drawn_at_its_border(record: SessionRecord) -
 
 
 def test_a_session_without_a_window_is_drawn(record: SessionRecord) -> None:
-    for probability, said in ((0.03, "No window"), (0.25, "Undecided")):
-        update = {"segments_ms": (), "probability": probability}
+    for probability, grid_ms, said in (
+        (0.03, (0.0, 200.0), "No window"),
+        (0.25, (0.0, 200.0), "Undecided"),
+        (None, (), "No answer yet"),
+    ):
+        profile = {} if grid_ms else {"grid_ms": (), "profile_mv": (), "band_low_mv": (), "band_high_mv": ()}
+        update = {"segments_ms": (), "probability": probability, **profile}
         entries = [e.model_copy(update=update) if isinstance(e, Estimate) else e for e in record.history]
         none = type(record)(record.path, record.header, tuple(entries), {}, (), True)
         assert session_figure(none).axes[0].get_title(loc="left").startswith(said)

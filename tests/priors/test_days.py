@@ -168,6 +168,16 @@ def test_days_of_different_muscles_or_intensities_are_refused(noted: Visit, what
             together(one, other)
 
 
+def test_days_of_different_conditioning_stimuli_are_refused(tmp_path: Path) -> None:
+    one, other = (
+        read_session(write_log(tmp_path / f"{day}.mcap", trials=4, created=f"2026-11-2{day}", seed=day))
+        for day in (1, 2)
+    )
+    pulsed = replace(other.header.device, conditioning="electrical")
+    with pytest.raises(InvalidValueError, match="different conditioning stimuli"):
+        priors.moved(one, replace(other, header=other.header.model_copy(update={"device": pulsed})))
+
+
 def test_a_session_counts_once_also_as_a_copy(first: Any, folder: Path) -> None:
     copy = folder / "copy.mcap"
     copy.write_bytes(first.path.read_bytes())

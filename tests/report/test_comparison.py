@@ -31,7 +31,7 @@ def test_the_table_has_a_line_a_session_with_its_window_and_intervals(record: Se
     assert second.startswith("2 ")
 
 
-@pytest.mark.parametrize(("probability", "said"), [(0.03, "none"), (0.25, "undecided"), (None, "none")])
+@pytest.mark.parametrize(("probability", "said"), [(0.03, "no window"), (0.25, "undecided"), (None, "no window")])
 def test_where_no_window_is_reported_it_may_still_be_undecided(
     record: SessionRecord, probability: float | None, said: str
 ) -> None:
@@ -41,7 +41,7 @@ def test_where_no_window_is_reported_it_may_still_be_undecided(
     chance, column = (f" (P(window) = {probability})", probability) if probability else ("", "–   ")
     assert comparison_table([open_still]).splitlines()[1].endswith(f"{column}       {said}")
     words = [text.get_text() for text in comparison_figure([open_still]).axes[0].texts]
-    assert words == [f"{'no window' if said == 'none' else said}{chance}"]
+    assert words == [f"{said}{chance}"]
 
 
 def test_a_session_in_which_too_little_was_measured_says_so(record: SessionRecord) -> None:
@@ -53,8 +53,8 @@ def test_of_the_same_person_it_is_said_whether_the_window_moved(record: SessionR
     difference = Difference(record, record, same_person=True, starts_later=0.97, ends_later=0.6, moved=0.91)
     assert comparison_sentence(difference) == (
         "P07 (s.mcap) against P07 (s.mcap), the same person: the window moved with probability 0.91, beyond the usual "
-        "shift from day to day; it starts later with probability 0.97 and ends later with probability 0.60 (0.5 where "
-        "nothing is known)."
+        "shift from day to day (0.3 where nothing is known); it starts later with probability 0.97 and ends later with "
+        "probability 0.60 (0.5 where nothing is known)."
     )
 
 

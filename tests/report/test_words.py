@@ -57,6 +57,17 @@ def test_an_edge_beyond_the_range_is_said_in_words(record: SessionRecord, low: f
     assert words in final_statement(with_estimate(record, start_low_ms=low, start_high_ms=high))
 
 
+def test_where_too_few_pairs_are_left_no_reason_speaks_of_a_window(record: SessionRecord) -> None:
+    known = with_estimate(record, reason="The window is known, with an expected F1 of 0.93.", stop=True)
+    left = [
+        replace(entry, isi_ms=None, commanded_isi_ms=None) if isinstance(entry, Trial) and entry.index > 1 else entry
+        for entry in known.history
+    ]
+    said = final_statement(type(record)(record.path, record.header, tuple(left), {}, (), True))
+    assert said.startswith("Too little was measured to speak of a window: 1 pair of stimuli counts, of 4 trials.")
+    assert "The window is known" not in said
+
+
 def test_after_an_electrical_pulse_no_tap_is_spoken_of(record: SessionRecord) -> None:
     header, space = record.header, DesignSpace(0, 200, reference="impact")
     device = replace(header.device, reference="impact", conditioning="electrical")

@@ -87,7 +87,8 @@ def test_mistrials_that_use_up_the_budget_are_no_finding(log: Path, space: Desig
 
 def test_two_trials_are_too_few_to_speak_of_a_window(log: Path) -> None:
     Session(ScriptedDevice(), scripted_strategy(2), log=log).run()
-    assert final_statement(read_session(log)).startswith("Too little was measured to speak of a window: 2 of 2 trials")
+    said = "Too little was measured to speak of a window: 2 pairs of stimuli count, of 2 trials. "
+    assert final_statement(read_session(log)).startswith(said)
 
 
 def test_an_isi_whose_trial_was_lost_is_asked_again_twice_and_then_another(log: Path, space: DesignSpace) -> None:

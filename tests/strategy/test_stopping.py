@@ -104,6 +104,11 @@ def test_no_window_stops_when_it_is_probable_enough(probability: float | None, *
     assert NoWindow(0.9)(progress(probability=probability)).stop == stop
 
 
+@pytest.mark.parametrize(("probability", "said"), [(0.04, "There is no window"), (0.1, "There is probably no window")])
+def test_no_window_is_said_outright_from_95_percent_on(probability: float, said: str) -> None:
+    assert NoWindow(0.85)(progress(probability=probability)).reason.startswith(f"{said}, with probability")
+
+
 def expecting(*f1s: float, told: int = 40, probability: float | None = 0.98) -> Progress:
     past = tuple(WindowEstimate(probability, None, expected_f1=f1) for f1 in f1s)
     return Progress(told, told, past[-1], past=past)

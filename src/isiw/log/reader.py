@@ -115,7 +115,12 @@ class SessionRecord:
     @property
     def too_little(self) -> str | None:
         """What is said where too little was measured to speak of a window; None where enough was."""
-        return lacking(sum(trial.isi_ms is not None for trial in self.table.told), silent=self.is_silent)
+        return lacking(self.pairs, silent=self.is_silent)
+
+    @property
+    def pairs(self) -> int:
+        """How many pairs of stimuli count; trials with TMS alone do not."""
+        return sum(trial.isi_ms is not None for trial in self.table.told)
 
     @property
     def is_silent(self) -> bool:

@@ -31,7 +31,7 @@ from isiw.log.production import Production, ProductionHeader
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import IntensityRange, ThresholdEstimate
-from isiw.text.found import finding
+from isiw.text.found import finding, nothing_found
 from isiw.text.stimuli import STIMULI, StimulusWords
 from isiw.trials import Channel, Trial
 from isiw.types import Conditioning, FloatArray
@@ -289,7 +289,18 @@ class Estimate(_Record):
     def __str__(self) -> str:
         start = (self.start_ms, self.start_low_ms, self.start_high_ms)
         end = (self.end_ms, self.end_low_ms, self.end_high_ms)
-        return finding(self.probability, self.window, start, end, (self.depressed, self.depressed_probability))
+        depressed = self.depressed, self.depressed_probability
+        return finding(self.probability, self.window, self.nothing, start, end, depressed)
+
+    @property
+    def has_answer(self) -> bool:
+        """Whether the method has one: some have none before they have measured enough."""
+        return self.probability is not None or self.window is not None or bool(self.grid_ms)
+
+    @property
+    def nothing(self) -> str:
+        """What is said in short where no window is reported."""
+        return nothing_found(self.probability, has_answer=self.has_answer)
 
     @property
     def window(self) -> Window | None:

@@ -13,7 +13,6 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, save_figure, tidied
 from isiw.text import one_line
-from isiw.text.found import rules_out
 from isiw.text.stimuli import words_of
 
 __all__ = ["comparison_figure", "save_comparison_plot"]
@@ -83,8 +82,8 @@ def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
 
 
 def _nothing(estimate: Estimate) -> str:
-    nothing, chance = "no window" if rules_out(estimate.probability) else "undecided", _chance(estimate)
-    return f"{nothing} ({chance})" if chance else nothing
+    chance = _chance(estimate)
+    return f"{estimate.nothing} ({chance})" if chance else estimate.nothing
 
 
 def _chance(estimate: Estimate) -> str:

@@ -29,7 +29,6 @@ from isiw.plots.style import (
     saying,
     tidied,
 )
-from isiw.text.found import rules_out
 from isiw.trials import Trial
 from isiw.types import FloatArray
 from isiw.window import Window
@@ -154,11 +153,11 @@ def _title(record: SessionRecord) -> str:
     if record.is_silent:
         return "No MEP was seen"
     if not record.rests_on_data:
-        return f"Too little was measured ({len(record.table.told)} count)"
+        return f"Too little was measured ({record.pairs} pairs of stimuli count)"
     if not record.estimates:
         return "No estimate"
     last = record.estimates[-1]
-    found = f"Window {last.window}" if last.window else "No window" if rules_out(last.probability) else "Undecided"
+    found = f"Window {last.window}" if last.window else last.nothing.capitalize()
     since = ", before trials were judged anew," if record.is_judged_since else ""
     return f"{found}{since}"
 

@@ -156,6 +156,13 @@ def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
                 expected=f"the same muscle, and intensities at most {MOST_APART_PCT_RMT:g} % of RMT apart",
                 remedy="Leave one out.",
             )
+        if first.header.conditioning != second.header.conditioning:
+            raise InvalidValueError(
+                "the sessions have different conditioning stimuli, and each has a window of its own",
+                got=paths,
+                expected="taps in both, or electrical pulses in both",
+                remedy="Leave one out.",
+            )
         if trials and all(one == other for one, other in trials):
             raise InvalidValueError("two logs are of the same session", got=paths, expected="each session once")
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
+from isiw.priors.days import DayToDay
 from isiw.priors.differing import Difference
 from isiw.report.words import JUDGED_SINCE
 from isiw.text import one_line
-from isiw.text.found import rules_out
 
 __all__ = ["HEADINGS", "comparison_rows", "comparison_sentence", "comparison_table"]
 
@@ -56,7 +56,7 @@ def _row(number: int, record: SessionRecord) -> tuple[str, ...]:
 def _found(last: Estimate) -> tuple[str, ...]:
     chance = "–" if last.probability is None else f"{last.probability:.2f}"
     if last.window is None:
-        return chance, "none" if rules_out(last.probability) else "undecided", "", ""
+        return chance, last.nothing, "", ""
     edges = (_edge(last.start_low_ms, last.start_high_ms), _edge(last.end_low_ms, last.end_high_ms))
     return chance, str(last.window), *edges
 
@@ -92,7 +92,11 @@ def _whose(record: SessionRecord) -> str:
 def _moved(difference: Difference) -> str:
     if difference.moved is None:
         return ""
-    return f"the window moved with probability {difference.moved:.2f}, beyond the usual shift from day to day;"
+    before = 1.0 - DayToDay().p_stays
+    return (
+        f"the window moved with probability {difference.moved:.2f}, beyond the usual shift from day to day "
+        f"({before:g} where nothing is known);"
+    )
 
 
 def _later(difference: Difference) -> str:

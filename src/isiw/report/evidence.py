@@ -63,7 +63,8 @@ def nothing_measured(record: SessionRecord) -> str | None:
     if record.is_silent:
         return f"{NO_MEP} The amplitudes of all {told} trials that count are 0. {_LOOK}"
     if told:
-        return f"Too little was measured to speak of a window: {told} of {given} trials count."
+        count = f"{record.pairs} {'pair of stimuli counts' if record.pairs == 1 else 'pairs of stimuli count'}"
+        return f"Too little was measured to speak of a window: {count}, of {given} trials."
     lost = [trial for trial in record.table if trial.reason is not None]
     if not lost:
         return f"Nothing was measured: none of {given} trials counts."

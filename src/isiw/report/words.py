@@ -78,7 +78,7 @@ def final_statement(record: SessionRecord) -> str:
             fit_sentence(record),
             _unstated_hit_delay(record),
             _expects_a_tap(record),
-            "" if record.is_silent and _OF_THE_WINDOW.search(last.reason) else last.reason,
+            last.reason if record.rests_on_data or not _OF_THE_WINDOW.search(last.reason) else "",
         ]
     if record.end_lost:
         sentences.append(
@@ -165,7 +165,7 @@ def _without_probability(record: SessionRecord, estimate: Estimate) -> str:
     if estimate.window is not None:
         isis = f"{estimate.window} {_after(record)}"
         return f"By this method, which gives no probability, the {first} enhances the MEP at ISIs of {isis}."
-    if not estimate.grid_ms:
+    if not estimate.has_answer:
         return "The method has no answer yet: it has not measured enough for one."
     first_ms, last_ms = estimate.grid_ms[0], estimate.grid_ms[-1]
     if last_ms - first_ms < MOST_OF_THE_RANGE * (space.high_ms - space.low_ms):

@@ -10,6 +10,7 @@ from typing import Protocol, runtime_checkable
 
 from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.errors import InvalidValueError
+from isiw.text.found import SURE
 from isiw.window import WindowEstimate
 
 __all__ = [
@@ -176,7 +177,8 @@ class NoWindow:
             return StopDecision(stop=False, reason=progress.estimate.too_little)
         absent = 1.0 - progress.estimate.probability
         if absent >= self.probability:
-            return StopDecision(stop=True, reason=f"There is no window, with probability {absent:.2f}.")
+            there_is = "There is no window" if absent >= SURE else "There is probably no window"
+            return StopDecision(stop=True, reason=f"{there_is}, with probability {absent:.2f}.")
         return StopDecision(stop=False, reason=f"The probability that there is no window is {absent:.2f}.")
 
 

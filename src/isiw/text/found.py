@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, TypeAlias
 
-__all__ = ["ENOUGH_PAIRS", "NO_MEP", "SURE", "TOO_FEW", "finding", "lacking", "rules_out"]
+__all__ = ["ENOUGH_PAIRS", "NO_MEP", "SURE", "TOO_FEW", "finding", "lacking", "nothing_found", "rules_out"]
 
 ENOUGH_PAIRS: Final = 3
 """With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
@@ -43,9 +43,22 @@ def rules_out(probability: float | None) -> bool:
     return probability is None or 1 - probability >= SURE
 
 
+def nothing_found(probability: float | None, *, has_answer: bool) -> str:
+    """What is said in short where no window is reported.
+
+    Args:
+        probability: that there is a window; None where the method has none.
+        has_answer: whether the method has one yet.
+    """
+    if not has_answer:
+        return "no answer yet"
+    return "no window" if rules_out(probability) else "undecided"
+
+
 def finding(
     probability: float | None,
     window: object | None,
+    nothing: str,
     start: _Edge,
     end: _Edge,
     depressed: tuple[object | None, float | None] = (None, None),
@@ -55,13 +68,13 @@ def finding(
     Args:
         probability: that there is a window.
         window: the reported decision, which prints as its ISIs.
+        nothing: what is said where it is None, as by `nothing_found`.
         start: median, and lower and upper end of the 90 % interval, of its start [ms]; None where not known.
         end: those of its end [ms].
         depressed: the reported ISIs that depress the MEP, and the probability of any; None where nobody looked.
     """
     chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
-    nothing = "none" if rules_out(probability) else "undecided"
-    lines = [f"Window: {nothing if window is None else window}{chance}"]
+    lines = [f"{nothing.capitalize() if window is None else f'Window: {window}'}{chance}"]
     for name, edge in (("Start", start), ("End", end)):
         median, low, high = ("" if edge_ms is None else _edge(edge_ms) for edge_ms in edge)
         if window is not None and low:
