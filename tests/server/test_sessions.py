@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Never
 
 import httpx
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.log.reader import read_session
+from isiw.server.driven import DrivenSession
 from isiw.session.journal import Journal
 from isiw.strategy.catalogue import make_strategy
 from isiw.text.found import TOO_FEW
@@ -276,6 +278,21 @@ def test_a_trial_that_was_logged_and_could_not_be_learnt_closes_its_session(
     refused(client.post(f"{session}/tell", json=outcome), 409, "NotOpen")
     done(client.post(f"{session}/resume"))
     assert done(client.post(f"{session}/tell", json=outcome))["mep_mv"] == 0.1
+
+
+def test_a_session_that_cannot_be_closed_as_the_server_ends_is_told_and_keeps_no_other_open(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def failing(_: DrivenSession) -> Never:
+        monkeypatch.undo()
+        raise ZeroDivisionError
+
+    with client_of(tmp_path) as client:
+        for name in ("P07", "P08"):
+            created(client, name)
+        monkeypatch.setattr(DrivenSession, "close", failing)
+    assert "The session P07 was not closed (ZeroDivisionError: ). It can be resumed." in capsys.readouterr().err
+    assert (tmp_path / "P08.mcap").exists()
 
 
 def test_what_nobody_foresaw_is_an_answer_in_words(

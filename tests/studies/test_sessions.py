@@ -129,6 +129,8 @@ def test_an_invalid_session_is_refused(wrong: dict[str, Any]) -> None:
 def test_a_study_without_workers_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="worker"):
         run_study([small()], workers=0)
+    with pytest.raises(InvalidValueError, match="needs sessions"):
+        run_study([])
 
 
 def test_what_a_session_would_reject_is_delivered_again_and_not_told() -> None:

@@ -6,12 +6,12 @@ import dataclasses
 import re
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
 from isiw.devices.limits import Limits
-from isiw.errors import IsiwError
+from isiw.errors import told
 from isiw.log.durable import log_of, part_of
 from isiw.log.outputs import made_folder
 from isiw.log.reader import SessionRecord, read_session
@@ -21,6 +21,7 @@ from isiw.server.driven import DrivenSession, not_open
 from isiw.server.refusals import Refusal
 from isiw.server.requests import NAME, CreateRequest
 from isiw.session.opening import open_session
+from isiw.session.operator import alarm
 from isiw.session.replay import strategy_of
 from isiw.strategy.catalogue import make_strategy
 
@@ -141,10 +142,12 @@ class Sessions:
         return self.stands(name)
 
     def close_all(self) -> None:
-        """Close all sessions, as the server ends."""
+        """Close all sessions, as the server ends; of one that cannot be closed it is said why."""
         for name in list(self._open):
-            with suppress(IsiwError):
+            try:
                 self.close(name)
+            except Exception as error:  # noqa: BLE001 - the others are to be closed all the same
+                alarm(f"The session {name} was not closed ({told(error)}). It can be resumed.")
 
     def stands(self, name: str) -> SessionAnswer:
         """How a session stands, open or not.

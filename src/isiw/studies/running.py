@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.errors import StudyError
+from isiw.errors import InvalidValueError, StudyError
 from isiw.studies.execution import Executor, Failure, Processes
 from isiw.studies.plan import Study, Unit, run_unit
 from isiw.studies.sessions import TIMES, SimulatedSession, simulate
@@ -133,9 +133,11 @@ def run_study(
         One row a mark of each session, sorted; columns as in `isiw.studies.sessions.examine`.
 
     Raises:
-        InvalidValueError: fewer than one worker.
+        InvalidValueError: no sessions, or fewer than one worker.
         StudyError: a session failed.
     """
+    if not sessions:
+        raise InvalidValueError("a study needs sessions", got=sessions, remedy="paired_sessions(...) makes some.")
     tables = []
     for session, result in Processes(workers).results(run, sessions):
         if isinstance(result, Failure):
