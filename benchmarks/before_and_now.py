@@ -76,9 +76,7 @@ def stops(
 ) -> None:
     """Compare where the stopping rules of both versions end, on the people that both measured."""
     table = pd.concat([ends(before / path.name, path) for path in sorted(now.glob("*.parquet"))])
-    _write(
-        table, now, out, "who has not stopped by trial 60 counts as he stands there; a rule stops on a window or none"
-    )
+    _write(table, now, out, "a session that has not stopped by trial 60 counts as it stands there")
 
 
 def _write(table: pd.DataFrame, now: Path, out: Path, how: str) -> None:
