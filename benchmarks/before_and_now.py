@@ -191,7 +191,7 @@ def _ends(rows: Path) -> pd.DataFrame:
     """The end of each session."""
     last = pd.read_parquet(rows).sort_values("trial").groupby(["cohort", "person"]).tail(1)
     stopped = last["stop_trial"].notna()
-    none = stopped & last["stop_reason"].str.startswith("There is no window")
+    none = stopped & last["stop_reason"].str.startswith(("There is no window", "There is probably no window"))
     told = last["reported_window"].astype(bool)
     return last[["cohort", "person"]].assign(
         stimuli=last["stop_trial"].where(stopped, last["trial"]),

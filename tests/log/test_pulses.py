@@ -85,7 +85,12 @@ def test_an_earlier_log_without_its_end_is_an_error_with_the_way_out(tmp_path: P
 
 def test_a_damaged_file_is_no_error_where_its_log_went_on_with_what_was_left(tmp_path: Path, header: Header) -> None:
     log = without_its_end(make_log(tmp_path / "a.mcap", header, intents=3))
+    with LogWriter.continuing(log, salvage(log), header):
+        pass
+    with pytest.raises(DamagedLogError):  # what was lost is not told yet
+        earlier(tmp_path)
     with LogWriter.continuing(log, salvage(log), header) as going_on:
+        going_on.append(Event(kind="resume"))
         going_on.append(Intent(trial=3, isi_ms=50.0))
     left = len(pulses_s(salvage(tmp_path / "a.mcap.damaged")))
     assert len(earlier(tmp_path)) == left + 1

@@ -52,9 +52,9 @@ def test_a_session_in_which_too_little_was_measured_says_so(record: SessionRecor
 def test_of_the_same_person_it_is_said_whether_the_window_moved(record: SessionRecord) -> None:
     difference = Difference(record, record, same_person=True, starts_later=0.97, ends_later=0.6, moved=0.91)
     assert comparison_sentence(difference) == (
-        "P07 (s.mcap) against P07 (s.mcap), the same person: the window moved with probability 0.91, beyond the usual "
-        "shift from day to day (0.3 where nothing is known); it starts later with probability 0.97 and ends later with "
-        "probability 0.60 (0.5 where nothing is known)."
+        "P07 (s.mcap) against P07 (s.mcap), the same person: with probability 0.91 (0.3 where nothing is known) the "
+        "window moved beyond the usual shift from day to day; it starts later with probability 0.97 and ends later "
+        "with probability 0.60 (0.5 where nothing is known)."
     )
 
 

@@ -178,14 +178,23 @@ def test_signals_that_come_at_once_do_not_pass_for_a_session_that_does_not_react
 
     monkeypatch.setattr("isiw.session.interrupts._REACTION_S", 0.5)
     disarmed, stuck = list[str](), list[str]()
-    with Interrupts(lambda: disarmed.append("now"), lambda: stuck.append("now")) as interrupts:
+
+    def disarm() -> None:
+        time.sleep(0.1 * len(disarmed))
+        disarmed.append("now")
+
+    with Interrupts(disarm, lambda: stuck.append("now")) as interrupts:
         sender = threading.Thread(target=twice)
         sender.start()
         sender.join()  # no handler runs meanwhile
         assert not interrupts.insisted, "the handler ran more than once: they did not come at once"
         interrupts.acknowledge()
         time.sleep(1.0)
-    assert disarmed == ["now", "now"]
+        assert disarmed == ["now", "now"]
+        interrupts.settle()
+        interrupt()
+        interrupts.acknowledge()
+        assert disarmed == ["now"] * 3, "it was acknowledged before the device was disarmed"
     assert stuck == []
 
 

@@ -15,6 +15,7 @@ import pytest
 
 from forked import Forked
 from isiw.log.reader import read_session
+from isiw.session.interrupts import Interrupts
 from isiw.session.lastresort import INTERRUPTED
 from isiw.session.loop import Session
 from isiw.session.resume import resume
@@ -197,6 +198,23 @@ def test_without_anybody_to_ask_a_pause_ends_the_session_and_it_can_be_resumed(l
     assert result.decision.reason == "The session is paused: Three mistrials in a row."
     assert len(result.trials) == 3
     assert len(resume(log, ScriptedDevice(), scripted_strategy(6)).run().trials) == 6
+
+
+def test_a_request_to_end_that_comes_just_before_a_pause_is_asked_about_ends_the_session(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    acknowledge, reasons = Interrupts.acknowledge, list[str]()
+
+    def after_a_signal(self: Interrupts) -> None:
+        signal.raise_signal(signal.SIGTERM)
+        acknowledge(self)
+
+    monkeypatch.setattr(Interrupts, "acknowledge", after_a_signal)
+    device, session = session_hanging_in("ask", signal.SIGINT, log, goes_on_after(reasons))
+    with pytest.raises(KeyboardInterrupt):
+        session.run()
+    assert reasons == []
+    assert len(device.delivered) == 2
 
 
 VICTIM = """

@@ -53,7 +53,7 @@ def test_what_is_being_typed_is_not_torn_apart(capsys: pytest.CaptureFixture[str
     assert seen(written) == ["trial 0", "trial 1", "Note: acd", "The note is in the log.", "16 left", ""]
 
 
-@pytest.mark.parametrize("key", ["[A", "OR", "O5R", "[15~", "[1;5A", "[[A", "r", "\x1b[A"])
+@pytest.mark.parametrize("key", ["[A", "OR", "O5R", "[15~", "[1;5A", "[[A", "r", "\x1b[A", "]0;q\x07", "P1r\x1b\\"])
 def test_a_longer_key_is_no_letter_also_where_it_comes_in_parts(key: str) -> None:
     assert typed(f"a\x1b{key}b") == ("ab", "")
     for length in range(len(key)):

@@ -118,9 +118,18 @@ def _raise(error: OSError) -> None:
 
 
 def _went_on(damaged: Salvage) -> bool:
-    """Whether a damaged file is only kept, and its log went on with all that was left: its pulses count there."""
+    """Whether a damaged file is only kept, and its log was resumed with all that was left: its pulses count there."""
     log = kept_for(damaged.path)
-    return log is not None and (log.exists() or part_of(log).exists()) and holds(salvage(log), damaged)
+    if log is None or not (log.exists() or part_of(log).exists()):
+        return False
+    later = salvage(log)
+    return holds(later, damaged) and _resumed(later) > _resumed(damaged)
+
+
+def _resumed(salvaged: Salvage) -> int:
+    """How often a session was resumed, with a word on disk for each stimulus that may have been given before."""
+    records = (_timed(message) for message in salvaged.messages)
+    return sum(isinstance(record, Event) and record.kind == "resume" for record in records)
 
 
 def _of_subject(log: Path, subject: str) -> list[tuple[int, int]]:

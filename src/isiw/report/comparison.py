@@ -94,8 +94,8 @@ def _moved(difference: Difference) -> str:
         return ""
     before = 1.0 - DayToDay().p_stays
     return (
-        f"the window moved with probability {difference.moved:.2f}, beyond the usual shift from day to day "
-        f"({before:g} where nothing is known);"
+        f"with probability {difference.moved:.2f} ({before:g} where nothing is known) the window moved beyond the "
+        "usual shift from day to day;"
     )
 
 

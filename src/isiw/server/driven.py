@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
-from isiw.errors import InvalidValueError, LimitExceededError
+from isiw.errors import InvalidValueError, LimitExceededError, LogError
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.server.answers import AskAnswer, EstimateAnswer, SessionAnswer, TrialAnswer, TrialRow
@@ -64,11 +64,13 @@ class DrivenSession:
             self._require_open()
             yield
         except BaseException as error:
-            if not (isinstance(error, _HARMLESS) and len(self.recorder.trials) == len(self._outcomes)):
-                self.closed = True
-                self.recorder.__exit__(type(error), error, error.__traceback__)
-                if isinstance(error, InvalidValueError):  # not a value that the client sent
-                    raise failed(error) from error
+            concluded = len(self.recorder.trials) == len(self._outcomes)
+            if concluded and isinstance(error, _HARMLESS):
+                raise
+            self.closed = True
+            self.recorder.__exit__(type(error), error, error.__traceback__)
+            if not concluded and not isinstance(error, LogError):  # not for anything that the client sent
+                raise failed(error) from error
             raise
         finally:
             self._lock.release()

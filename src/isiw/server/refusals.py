@@ -63,10 +63,10 @@ def as_refusal(error: BaseException) -> Refusal:
 
 
 def failed(error: BaseException) -> Refusal:
-    """That not the request was wrong: the server has failed.
+    """The answer where the server has failed, and the request is not at fault.
 
     Args:
-        error: at what.
+        error: what it failed with.
     """
     return Refusal(
         500,

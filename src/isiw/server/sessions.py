@@ -6,7 +6,7 @@ import dataclasses
 import re
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
@@ -142,12 +142,13 @@ class Sessions:
         return self.stands(name)
 
     def close_all(self) -> None:
-        """Close all sessions, as the server ends; of one that cannot be closed it is said why."""
+        """Close all sessions, as the server ends; where one cannot be closed, the reason is shown."""
         for name in list(self._open):
             try:
                 self.close(name)
             except Exception as error:  # noqa: BLE001 - the others are to be closed all the same
-                alarm(f"The session {name} was not closed ({told(error)}). It can be resumed.")
+                with suppress(OSError, ValueError):  # the screen is gone
+                    alarm(f"The session {name} was not closed ({told(error)}). It can be resumed.")
 
     def stands(self, name: str) -> SessionAnswer:
         """How a session stands, open or not.

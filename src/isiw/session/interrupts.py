@@ -23,7 +23,7 @@ _SUSPENDING = getattr(signal, "SIGTSTP", None)
 _PAUSING_SIGNALS = tuple(getattr(signal, name) for name in _PAUSING if hasattr(signal, name))
 _SIGNALS = (*_PAUSING_SIGNALS, *(getattr(signal, name) for name in _ENDING if hasattr(signal, name)))
 
-_PROBE = getattr(signal, "SIGURG", None)  # means nothing to those who do not wait for it; Windows has none
+_HANDLED = 0  # no signal has this number
 _REACTION_S = 5.0  # a main thread that runs no handler for so long is stuck
 _DISARMING_S = 30.0
 _GLANCE_S = 0.01
@@ -49,10 +49,8 @@ class Interrupts:
         self._pending = self._allowed = False
         self._heard = self._disarmed = self._handled = 0
         self._acknowledged = self._settled = self._ended = 0
-        self._answered = False
         self._before: dict[signal.Signals, Any] = {}
         self.away: Callable[[], AbstractContextManager[None]] = nullcontext
-        self._main = threading.get_ident()
         self._watcher: threading.Thread | None = None
         self._over = False
 
@@ -65,8 +63,6 @@ class Interrupts:
             self._watcher.start()
             heard = [number for number in _SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
             self._before = {number: signal.signal(number, self._receive) for number in heard}
-            if _PROBE is not None:
-                self._before[_PROBE] = signal.signal(_PROBE, self._answer)
         return self
 
     def __exit__(
@@ -138,6 +134,8 @@ class Interrupts:
     def _receive(self, number: int, frame: FrameType | None) -> None:
         del frame
         self._handled += 1
+        with suppress(OSError):
+            self._mouth.send(bytes([_HANDLED]))  # behind the signals that this is for: two at once are handled as one
         if number not in _PAUSING_SIGNALS:
             self._ended = self._handled
         if number == _SUSPENDING:
@@ -156,34 +154,28 @@ class Interrupts:
     def _watch(self) -> None:
         """Disarm at every signal, however busy the main thread is."""
         with suppress(OSError):  # closed at the end
-            while numbers := self._ears.recv(1):
-                if numbers[0] in _SIGNALS:
+            while told := self._next():
+                if told[0] == _HANDLED:
+                    self._disarmed += 1
+                    self._heard = self._disarmed
+                elif told[0] in _SIGNALS:
                     self._heard += 1
                     self._disarm()
-                    self._disarmed += 1
-                    if self._heard > self._settled + 1:
-                        self._require_reaction()
+
+    def _next(self) -> bytes:
+        """What is told next; where more than one signal waits for its handler, the main thread has to react by then."""
+        insisting = self._heard > max(self._disarmed, self._settled + 1)
+        self._ears.settimeout(_REACTION_S if insisting else None)
+        try:
+            return self._ears.recv(1)
+        except TimeoutError:
+            if not self._over:
+                self._stuck()
+            self._ears.settimeout(None)
+            return self._ears.recv(1)
 
     def _is_disarmed(self) -> bool:
         return self._disarmed >= self._handled
-
-    def _require_reaction(self) -> None:
-        if self._reacts():
-            self._heard = min(self._heard, self._handled)  # of signals at once some are not handled
-        else:
-            self._stuck()
-
-    def _reacts(self) -> bool:
-        """Whether the main thread runs handlers: a probe tells, as two signals at once are handled as one."""
-        if _PROBE is None:
-            return self._wait_until(lambda: self._over or self._handled >= self._heard, _REACTION_S)
-        self._answered = False
-        signal.pthread_kill(self._main, _PROBE)
-        return self._wait_until(lambda: self._over or self._answered, _REACTION_S)
-
-    def _answer(self, number: int, frame: FrameType | None) -> None:
-        del number, frame
-        self._answered = True
 
     @staticmethod
     def _wait_until(holds: Callable[[], bool], at_most_s: float) -> bool:

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
+import time
+from contextlib import suppress
 from typing import Final, Never
 
 from isiw.log.schema import Event
@@ -24,6 +25,7 @@ INTERRUPTED: Final = 130
 """The exit code where a session did not react to Ctrl-C: what shells report for it."""
 
 _PATIENCE_S = 2.0
+_GLANCE_S = 0.02
 
 
 def end_process(reason: str, log: LogWriter | None, code: int) -> Never:
@@ -35,19 +37,19 @@ def end_process(reason: str, log: LogWriter | None, code: int) -> Never:
         code: the exit code.
     """
     ends = f"{reason} The process ends."
+    end_s = time.monotonic() + _PATIENCE_S
+    # Each in a thread of its own: a terminal or a disk that holds one up, or is gone, holds up nothing else.
+    steps = [threading.Thread(target=_show, args=(ends, log), daemon=True)]
+    if log is not None:
+        steps.append(threading.Thread(target=_write, args=(ends, log), daemon=True))
     try:
-        _try(lambda: _show(ends, log))
-        if log is not None:
-            _try(lambda: _write(ends, log))
+        for step in steps:
+            step.start()
+        while any(step.is_alive() for step in steps) and time.monotonic() < end_s:
+            with suppress(KeyboardInterrupt):  # once more: there is an end to it already
+                time.sleep(_GLANCE_S)
     finally:
         os._exit(code)
-
-
-def _try(step: Callable[[], object]) -> None:
-    """Take a step in a thread of its own: a terminal or a disk that holds it up, or is gone, holds up nothing else."""
-    trying = threading.Thread(target=step, daemon=True)
-    trying.start()
-    trying.join(_PATIENCE_S)
 
 
 def _show(text: str, log: LogWriter | None) -> None:

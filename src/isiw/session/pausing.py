@@ -70,9 +70,9 @@ class Pausing:
         rig, interrupts = self._rig, self._rig.interrupts
         rig.disarm()
         self._journal.faults(rig.faults)
+        interrupts.acknowledge()
         if interrupts.ending:
             raise KeyboardInterrupt
-        interrupts.acknowledge()
         reason, self.reason = self.reason or _INTERRUPTED, None
         self._journal.event("pause", reason)
         self._journal.log.sync()

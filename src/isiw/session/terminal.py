@@ -35,8 +35,10 @@ ERASED: Final = "\b \b"
 ESCAPE: Final = "\x1b"
 
 # What a terminal sends for an arrow, a function key, or a letter with Alt: Escape and more, all at once.
-_SEQUENCE = re.compile(r"\x1b+(\[\[.|\[[ -?]*[^ -?\[]|O[ -?]*[^ -?]|[^\x1b\[O])", re.DOTALL)
-_BEGUN = re.compile(r"\x1b+(\[\[|\[[ -?]*|O[ -?]*)?$")
+_SEQUENCE = re.compile(
+    r"\x1b+(\[\[.|\[[ -?]*[^ -?\[]|O[ -?]*[^ -?]|[]PX^_].*?(\x07|\x1b\\)|[^\x1b\[O\]PX^_])", re.DOTALL
+)
+_BEGUN = re.compile(r"\x1b+(\[\[|\[[ -?]*|O[ -?]*|[]PX^_].*)?$", re.DOTALL)
 
 _as_they_were: dict[int, Any] = {}
 """The settings of terminals that are read key by key, for `restore`: a process that ends itself runs nothing else."""
@@ -214,7 +216,7 @@ class Keys:
                 self._over.wait(_GLANCE_S)
                 return None
             character = msvcrt.getwch()
-            if character in "\x00\xe0" and msvcrt.kbhit():  # an arrow or a function key, which is two characters
+            if character in "\x00\xe0":  # an arrow or a function key, which is two characters
                 msvcrt.getwch()
                 return None
             return character.encode()

@@ -220,7 +220,7 @@ class SmallGain:
     Args:
         gain: what the last stimuli must have added to the expected F1 for the session to go on; 0 for any, also a loss.
         last: how many stimuli.
-        min_told: the fewest trials to stop after.
+        min_told: the fewest pairs to stop after.
         min_probability: the least probability of a window.
 
     Raises:

@@ -82,7 +82,7 @@ class StudyStrategy:
             raise InvalidValueError(
                 "a setting of a study's strategy has no value",
                 got=f"None for {', '.join(unset)}",
-                remedy="Leave it out. Of a rig, Study(hit_delay='unstated') tells no strategy anything.",
+                remedy="Leave it out. To tell strategies no hit delay, use Study(hit_delay='unstated').",
             )
         kept = {key: chosen[key] for key in self.settings}
         object.__setattr__(self, "settings", kept)
