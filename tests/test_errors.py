@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from isiw import errors
-from isiw.errors import IsiwError
+from isiw.errors import IsiwError, did_you_mean
 
 
 def test_a_message_says_what_was_got_what_was_expected_and_the_way_out() -> None:
@@ -49,3 +49,10 @@ def test_every_error_of_the_module_has_the_one_root() -> None:
 @pytest.mark.parametrize("name", ["InvalidValueError", "OutOfSpaceError", "ConfigError"])
 def test_bad_values_are_also_value_errors(name: str) -> None:
     assert issubclass(getattr(errors, name), ValueError)
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"), [("impct", "impact"), ("VALVE", "valve"), ("coil", ""), (3, ""), (["valve"], "")]
+)
+def test_the_known_word_that_was_probably_meant_is_asked_for(given: object, meant: str) -> None:
+    assert did_you_mean(given, ["impact", "valve"]) == (f"Did you mean {meant}?" if meant else "")

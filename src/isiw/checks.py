@@ -15,7 +15,7 @@ from typing import Any, TypedDict, TypeVar, Unpack
 
 import numpy as np
 
-from isiw.errors import InvalidValueError
+from isiw.errors import InvalidValueError, did_you_mean
 
 __all__ = [
     "MOST_MEP_MV",
@@ -72,10 +72,7 @@ def number(what: str, value: object, **bounds: Unpack[Bounds]) -> float:
     Raises:
         InvalidValueError: anything else.
     """
-    plain = _as_float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
-    if not (math.isfinite(plain) and _within(plain, bounds)):
-        raise InvalidValueError(f"{what} must be {_described('a finite number', bounds)}", got=value)
-    return plain
+    return _number(what, value, bounds)
 
 
 def amplitude(what: str, value: object) -> float:
@@ -238,7 +235,8 @@ def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
     """
     values = tuple(known)
     if not any(type(value) is type(each) and value == each for each in values):
-        raise InvalidValueError(f"{what} is unknown", got=value, expected=" or ".join(map(str, values)))
+        remedy = did_you_mean(value, values) or None
+        raise InvalidValueError(f"{what} is unknown", got=value, expected=" or ".join(map(str, values)), remedy=remedy)
     return value
 
 
@@ -277,18 +275,24 @@ def check_numbers(owner: object, *names: str, optional: bool = False, **bounds: 
             _put(owner, name, number(f"{type(owner).__name__}.{name}", value, **bounds))
 
 
-def check_probabilities(owner: object, *names: str, optional: bool = False) -> None:
-    """Check fields of a frozen dataclass that are probabilities; as `check_numbers` with bounds of 0 and 1.
+def check_probabilities(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
+    """Check fields of a frozen dataclass that are probabilities or shares; what is in % is told so.
 
     Args:
         owner: the instance.
         *names: its fields.
         optional: whether None is allowed.
+        **bounds: as for `number`; by default 0 and 1, both included.
 
     Raises:
         InvalidValueError: a field that is not a probability.
     """
-    check_numbers(owner, *names, optional=optional, least=0.0, most=1.0)
+    bounds = bounds or {"least": 0.0, "most": 1.0}
+    for name in names:
+        value = getattr(owner, name)
+        if not (optional and value is None):
+            remedy = "Is it in %? Divide by 100." if isinstance(value, int | float) and 1 < value <= 100 else None
+            _put(owner, name, _number(f"{type(owner).__name__}.{name}", value, bounds, remedy))
 
 
 def check_wholes(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
@@ -356,6 +360,14 @@ def check_choice(owner: object, name: str, known: Iterable[Any]) -> None:
         InvalidValueError: an unknown value.
     """
     choice(f"{type(owner).__name__}.{name}", getattr(owner, name), known)
+
+
+def _number(what: str, value: object, bounds: Bounds, remedy: str | None = None) -> float:
+    """As `number`, with what to do about anything else."""
+    plain = _as_float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    if not (math.isfinite(plain) and _within(plain, bounds)):
+        raise InvalidValueError(f"{what} must be {_described('a finite number', bounds)}", got=value, remedy=remedy)
+    return plain
 
 
 def _as_float(value: Real) -> float:

@@ -25,6 +25,9 @@ Warnings, which are no errors:
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
+
 __all__ = [
     "ConfigError",
     "DamagedLogError",
@@ -42,6 +45,7 @@ __all__ = [
     "StillArmedError",
     "StrategyError",
     "StudyError",
+    "did_you_mean",
     "told",
 ]
 
@@ -140,3 +144,15 @@ def told(error: BaseException) -> str:
         text = "(its message cannot be told)"
     whole = f"{type(error).__name__}: {text[:_LONGEST_TEXT]}"
     return whole.encode(errors="backslashreplace").decode()
+
+
+def did_you_mean(given: object, known: Iterable[object]) -> str:
+    """The known word that was probably meant, as a question; empty where none is near. Capitals make no difference.
+
+    Args:
+        given: what was given; of what is no text nobody knows what was meant.
+        known: the words that there are.
+    """
+    words = {word.casefold(): word for word in map(str, known)}
+    near = difflib.get_close_matches(given.casefold(), words, n=1) if isinstance(given, str) else []
+    return f"Did you mean {words[near[0]]}?" if near else ""

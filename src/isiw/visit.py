@@ -10,10 +10,10 @@ from fractions import Fraction
 
 import numpy as np
 
-from isiw.checks import check_numbers, check_texts, check_wholes, number
+from isiw.checks import check_numbers, check_probabilities, check_texts, check_wholes, number
 from isiw.errors import InvalidValueError
 
-__all__ = ["Control", "Visit", "VisitProtocol", "different_muscles"]
+__all__ = ["Control", "Visit", "VisitProtocol", "different_muscles", "interval_s"]
 
 _ITI_DRAWS, _CONTROL_DRAWS = 1, 2
 """What is drawn, so that the two never share their draws."""
@@ -112,7 +112,7 @@ class VisitProtocol:
     rest_s: float = 120.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, "tms_alone", "tap_alone", least=0, below=1)
+        check_probabilities(self, "tms_alone", "tap_alone", least=0, below=1)
         check_wholes(self, "block_trials", least=1, optional=True)
         check_numbers(self, "rest_s", above=0)
         if self.iti_s is not None:
@@ -196,10 +196,31 @@ def _exact(share: float) -> Fraction:
     return Fraction(share).limit_denominator(_FINEST_SHARE)
 
 
+def interval_s(what: str, value: object) -> float:
+    """An interval between two stimuli, no longer than anybody waits [s].
+
+    Args:
+        what: its name, for the message.
+        value: what was given.
+
+    Raises:
+        InvalidValueError: anything else.
+    """
+    plain_s = number(what, value, least=0)
+    if plain_s > MOST_ITI_S:
+        raise InvalidValueError(
+            f"{what} is longer than anybody waits between two stimuli",
+            got=value,
+            expected=f"at most {MOST_ITI_S:g} s",
+            remedy="Is it in ms? Divide by 1000.",
+        )
+    return plain_s
+
+
 def _interval(iti_s: object) -> tuple[float, float]:
     if not isinstance(iti_s, tuple | list) or len(iti_s) != 2:
         raise InvalidValueError("VisitProtocol.iti_s must be the shortest and the longest interval [s]", got=iti_s)
-    low_s, high_s = (number("VisitProtocol.iti_s", value, least=0, most=MOST_ITI_S) for value in iti_s)
+    low_s, high_s = (interval_s("VisitProtocol.iti_s", value) for value in iti_s)
     if low_s > high_s:
         raise InvalidValueError("VisitProtocol.iti_s must ascend", got=(low_s, high_s))
     return low_s, high_s

@@ -251,7 +251,7 @@ COMMAND = [sys.executable, "-c", "from isiw.cli import app; app()"]
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 def test_ctrl_c_closes_the_log_and_the_exit_code_says_so(tmp_path: Path) -> None:
-    (tmp_path / "long.toml").write_text("[strategy.settings]\nmax_trials = 190\nstop_width_ms = 0.01\n")
+    (tmp_path / "long.toml").write_text("[strategy.settings]\nmax_trials = 190\nstop_width_ms = 0.001\n")
     command = [*COMMAND, "run", "long.toml", "--log", "s.mcap"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603
         lines = [known(process.stdout).readline() for _ in range(7)]  # the log, two of a legend, headings, trials
@@ -271,7 +271,7 @@ def test_ctrl_c_closes_the_log_and_the_exit_code_says_so(tmp_path: Path) -> None
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 def test_a_killed_run_is_resumed_to_where_it_would_have_come(tmp_path: Path, isiw: Command) -> None:
-    text = "[strategy.settings]\nmax_trials = 12\nstop_width_ms = 0.01\nstop_expected_f1 = 1.0\n"
+    text = "[strategy.settings]\nmax_trials = 12\nstop_width_ms = 0.001\nstop_expected_f1 = 1.0\n"
     (tmp_path / "twelve.toml").write_text(text)
     with subprocess.Popen(  # noqa: S603
         [*COMMAND, "run", "twelve.toml", "--log", "killed.mcap"], cwd=tmp_path, stdout=subprocess.PIPE, text=True

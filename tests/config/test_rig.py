@@ -61,6 +61,17 @@ def test_an_error_of_the_labs_own_code_is_no_wrong_setting(tmp_path: Path) -> No
         device_from_factory("broken_rig:make", {"prot": "COM4"}, tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("factory", "settings", "meant"),
+    [("rig:mak", {}, "make"), ("rg:make", {}, "rig"), ("rig:make", {"simulatd": True}, "simulated")],
+)
+def test_of_a_misspelt_module_function_or_setting_the_one_that_was_meant_is_named(
+    template: Path, factory: str, settings: dict[str, Any], meant: str
+) -> None:
+    with pytest.raises(ConfigError, match=rf"Did you mean {meant}\?"):
+        device_from_factory(factory, settings, template)
+
+
 def test_a_session_runs_with_the_users_own_rig_and_the_log_does_not_name_it(template: Path) -> None:
     text = (template / "session.toml").read_text(encoding="utf-8").replace("max_trials = 40", "max_trials = 3")
     (template / "session.toml").write_text(text, encoding="utf-8")

@@ -65,6 +65,7 @@ def test_a_file_changes_what_it_names(config_file: WriteFile) -> None:
         ("[strategy.settings]\nhit_delay_ms = [0.183, 0.006]", ["hit_delay_ms", "in seconds? Multiply by 1000"]),
         ("[limits]\nmin_iti_s = nan", ["limits.min_iti_s", "nan"]),
         ("[subject]\nkind = 'real'", ["subject.kind", "'real'", "'simulated' or 'recorded'"]),
+        ("[subject]\nkind = 'Recordd'", ["subject.kind", "'Recordd'", "Did you mean recorded?"]),
         ("[space]\nreference = 'coil'", ["space.reference", "'coil'", "'impact' or 'valve'"]),
         ("[strategy]\nname = 'foo'", ["session.toml", "value of strategy.name", "'foo'", "default or "]),
         ("[subject]\ncohort = 'foo'", ["session.toml", "value of subject.cohort", "'foo'", "nonresponder"]),
@@ -83,6 +84,45 @@ def test_a_bad_file_is_an_error_that_names_file_key_value_and_remedy(
     for part in parts:
         assert part in str(caught.value)
     assert str(caught.value).endswith(".")
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("[subject]\ncohort = 'recruitmnt'", "recruitment"),
+        ("[strategy]\nname = 'defualt'", "default"),
+        ("[strategy.settings]\nacquisition = 'edge-varianc'", "edge-variance"),
+        ("[strategy.settings]\nmuscle = 'forarm'", "forearm"),
+        ("[space]\nreference = 'impct'", "impact"),
+    ],
+)
+def test_of_a_misspelt_value_the_one_that_was_meant_is_named(config_file: WriteFile, text: str, meant: str) -> None:
+    with pytest.raises(ConfigError, match=rf"Did you mean {meant}\?"):
+        load_config(config_file(text))
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("[limits]\nmin_iti_s = 5000", "Is it in ms"),
+        ("[protocol]\niti_s = [5000, 8000]", "Is it in ms"),
+        ("[protocol]\ntms_alone = 10", "Is it in %"),
+        ("[strategy.settings]\nstop_expected_f1 = 92", "Is it in %"),
+        ("[strategy.settings]\nstop_no_window = 95", "Is it in %"),
+        ("[strategy.settings]\nstop_width_ms = 0.025", "probably in s;.*Multiply it by 1000"),
+        ("[visit]\nintensity_pct_mso = 0.6", "probably a ratio"),
+    ],
+)
+def test_a_slip_of_unit_is_refused_with_the_unit_that_it_is_probably_in(
+    config_file: WriteFile, text: str, hint: str
+) -> None:
+    with pytest.raises(ValueError, match=hint):
+        load_config(config_file(text))
+
+
+def test_a_width_that_is_to_end_no_session_is_no_slip(config_file: WriteFile) -> None:
+    config = load_config(config_file("[strategy.settings]\nstop_width_ms = 0.001\n"))
+    assert config.strategy.settings == {"stop_width_ms": 0.001}
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:

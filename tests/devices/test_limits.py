@@ -53,6 +53,12 @@ def test_a_rest_or_a_period_that_limits_nothing_is_refused_where_it_is_stated(
     assert waits_s(limits) == {5.0}
 
 
+def test_an_interval_in_milliseconds_is_refused_where_it_is_stated(space: DesignSpace) -> None:
+    limits = Limits.of_space(space, min_iti_s=5000.0)  # which an earlier log may have
+    with pytest.raises(InvalidValueError, match=r"min_iti_s.*Is it in ms"):
+        limits.require_effect()
+
+
 @pytest.mark.parametrize("values", [{"max_block_pulses": 3, "rest_s": 5.1}, {"max_period_pulses": 3, "period_s": 15.1}])
 def test_a_rest_or_a_period_that_makes_a_session_wait_is_none_that_limits_nothing(values: dict[str, Any]) -> None:
     limits = Limits(0, 200, **values)

@@ -45,6 +45,12 @@ def opened(log: Path, method: str = "maximum-likelihood", max_pulses: int = 100)
     return open_threshold(search(method), log, device=SIMULATED, subject="P1", max_pulses=max_pulses)
 
 
+def test_an_interval_in_milliseconds_is_refused_before_a_log_is_begun(log: Path) -> None:
+    with pytest.raises(InvalidValueError, match="Is it in ms"):
+        open_threshold(search(), log, device=SIMULATED, min_iti_s=5000.0)
+    assert list(log.parent.iterdir()) == []
+
+
 def answer(recorder: ThresholdRecorder, pulses: int) -> list[float]:
     asked = []
     for _ in range(pulses):

@@ -31,6 +31,7 @@ from isiw.config.sections import (
     VisitConfig,
     require_together,
 )
+from isiw.config.slips import require_units
 from isiw.devices.limits import Limits
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord
@@ -40,9 +41,6 @@ from isiw.text.toml_files import checked, read_toml
 from isiw.visit import VisitProtocol
 
 __all__ = ["RunConfig", "config_of_log", "limits_for", "load_config"]
-
-LEAST_PCT = 3.0
-"""Nobody stimulates with so low an intensity; 1.2 is meant as 120 %."""
 
 
 class RunConfig(Section):
@@ -128,7 +126,7 @@ def load_config(path: str | Path | None = None) -> RunConfig:
 
     Raises:
         ConfigError: it cannot be read, or has an unknown key or a bad value; the message names file, key and value.
-        InvalidValueError: a rest or a period that limits nothing.
+        InvalidValueError: a rest or a period that limits nothing, or an interval in ms.
     """
     if path is None:
         return _validated({}, "the defaults")
@@ -136,23 +134,11 @@ def load_config(path: str | Path | None = None) -> RunConfig:
     if isinstance(values.get("device"), dict):  # a module of the user's own usually lies beside the file
         values["device"] = {"folder": Path(path).resolve().parent} | values["device"]
     config = _validated(values, str(path))
-    _require_percent(config.visit)
+    require_units(values)
     require_together(values)
     limits_for(config).require_effect()
     config.protocol.require_effect(config.limits.min_iti_s)
     return config
-
-
-def _require_percent(visit: VisitConfig) -> None:
-    for name in ("intensity_pct_rmt", "intensity_pct_mso"):
-        intensity_pct = getattr(visit, name)
-        if intensity_pct is not None and intensity_pct < LEAST_PCT:
-            raise ConfigError(
-                f"visit.{name} is in %, and this is probably a ratio",
-                got=intensity_pct,
-                expected=f"at least {LEAST_PCT:g}",
-                remedy="Multiply it by 100: 90 for 90 %.",
-            )
 
 
 def _validated(values: Mapping[str, Any], source: str) -> RunConfig:

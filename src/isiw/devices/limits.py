@@ -11,6 +11,7 @@ from isiw.checks import check_numbers, check_wholes
 from isiw.design import DesignSpace, require_space
 from isiw.devices.protocol import Readiness
 from isiw.errors import InvalidValueError, LimitExceededError
+from isiw.visit import interval_s
 
 __all__ = ["Limits"]
 
@@ -96,8 +97,10 @@ class Limits:
         It is for limits that somebody states: those of earlier logs stay readable.
 
         Raises:
-            InvalidValueError: a rest that is no longer than the interval, or a period that always lets a stimulus pass.
+            InvalidValueError: a rest that is no longer than the interval, or a period that always lets a stimulus pass;
+                or an interval in ms.
         """
+        interval_s("Limits.min_iti_s", self.min_iti_s)
         if self.max_block_pulses is not None and self.rest_s <= self.min_iti_s:
             raise InvalidValueError(
                 "the rest of the limits is no longer than the interval between two stimuli, so there is none",

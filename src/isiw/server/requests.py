@@ -12,10 +12,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig, require_together
+from isiw.config.slips import require_units
 from isiw.errors import IsiwError
 from isiw.log.schema import MOST_TRIALS
 from isiw.server.refusals import Refusal
-from isiw.text.expected import UNKNOWN, expected_instead, first_to_tell, known_keys
+from isiw.text.expected import UNKNOWN, expected_instead, first_to_tell, known_keys, meant_instead
 from isiw.visit import VisitProtocol
 
 __all__ = [
@@ -169,7 +170,9 @@ def _read(kind: type[_Kind], content_type: str, body: bytes) -> _Kind:
         request = kind.model_validate_json(body, strict=True)
     except ValidationError as error:
         raise _refused(kind, first_to_tell(error.errors())) from error
-    require_together(json.loads(body))  # a request does not know which of its fields were sent
+    sent = json.loads(body)  # a request does not know which of its fields were sent
+    require_units(sent)
+    require_together(sent)
     return request
 
 
@@ -207,7 +210,7 @@ def _refused(kind: type[BaseModel], error: ErrorDetails) -> Refusal:
         )
     if error["type"] == "json_invalid":
         return Refusal(400, "MalformedBody", "the body is no JSON", expected=error["msg"])
-    known = ", ".join(known_keys(kind, error["loc"][:-1])) if error["type"] in UNKNOWN else None
+    known = known_keys(kind, error["loc"][:-1]) if error["type"] in UNKNOWN else []
     missing = error["type"] == "missing"
     what = "is unknown" if known else "is missing" if missing else "cannot be used"
     return Refusal(
@@ -215,6 +218,7 @@ def _refused(kind: type[BaseModel], error: ErrorDetails) -> Refusal:
         "InvalidValueError",
         f"the field {field} {what}" if field else "the body cannot be used",
         got=None if missing else error["input"],
-        expected=f"one of {known}" if known else None if missing else expected_instead(error),
+        expected=f"one of {', '.join(known)}" if known else None if missing else expected_instead(error),
+        remedy=meant_instead(error, known) or None,
         field=field,
     )

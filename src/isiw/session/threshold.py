@@ -57,17 +57,19 @@ def open_threshold(
 
     Raises:
         DeviceError: a virtual clock for a device that is not simulated.
-        InvalidValueError: no search, one that knows of pulses already, or limits that limit nothing.
+        InvalidValueError: no search, one that knows of pulses already, limits that limit nothing, or an interval in ms.
         LogError: there is a log already, or it cannot be written.
     """
     path = require_parts(log, search=(search, ThresholdSearch), device=(device, DeviceInfo))
     if search.pulses:
         raise InvalidValueError("the search knows of pulses that are not this log's", got=len(search.pulses))
+    limits = Limits.of_space(VALVE_SPACE, min_iti_s=min_iti_s, max_pulses=max_pulses)
+    limits.require_effect()
     header = header_with(
         StrategyRecipe(name=f"threshold/{search.name}", seed=0, settings=search.settings),
         subject=text("subject", subject),
         space=VALVE_SPACE,
-        limits=Limits.of_space(VALVE_SPACE, min_iti_s=min_iti_s, max_pulses=max_pulses),
+        limits=limits,
         device=device,
         signals=SignalLimits(),
         config=dict(config or {}),

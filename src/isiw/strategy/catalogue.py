@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from isiw.checks import whole
 from isiw.design import VALVE_SPACE, DesignSpace, require_space
-from isiw.errors import StrategyError
+from isiw.errors import StrategyError, did_you_mean
 from isiw.strategy.settings.common import Settings, settings_from, settings_keys, settings_values
 from isiw.strategy.settings.described import DescribedSetting, described
 from isiw.strategy.strategy import Recipe, Strategy
@@ -125,7 +125,12 @@ def settings_for(name: str, **settings: Any) -> Settings:
         InvalidValueError: an invalid value.
     """
     if not isinstance(name, str) or name not in _CATALOGUE:
-        raise StrategyError("unknown strategy", got=name, expected=", ".join(_CATALOGUE))
+        raise StrategyError(
+            "unknown strategy",
+            got=name,
+            expected=", ".join(_CATALOGUE),
+            remedy=did_you_mean(name, _CATALOGUE) or "isiw strategies says what each of them does.",
+        )
     entry = _CATALOGUE[name]
     family = pkgutil.resolve_name(f"isiw.strategy.settings.{entry.family}")
     chosen: Settings = settings_from(family, {**entry.meant, **settings}, name)

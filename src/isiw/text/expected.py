@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from types import NoneType, UnionType
@@ -9,7 +10,9 @@ from typing import Any, Final, get_args, get_type_hints
 
 from pydantic_core import ErrorDetails
 
-__all__ = ["UNKNOWN", "expected_instead", "first_to_tell", "known_keys"]
+from isiw.errors import did_you_mean
+
+__all__ = ["UNKNOWN", "expected_instead", "first_to_tell", "known_keys", "meant_instead"]
 
 UNKNOWN: Final = {"extra_forbidden", "unexpected_keyword_argument"}
 """Pydantic's types of error for a key that there is not."""
@@ -39,6 +42,20 @@ def expected_instead(error: ErrorDetails) -> str:
     if kind in _KINDS and fault in {"type", "parsing", "from_float", "attributes_type"}:
         return _KINDS[kind]
     return error["msg"].removeprefix("Input should be ")
+
+
+def meant_instead(error: ErrorDetails, keys: Sequence[str] = ()) -> str:
+    """What was probably meant, as a question; empty where nothing that there is comes near.
+
+    Args:
+        error: as pydantic found it.
+        keys: those that there are, where the error is about one that there is not.
+    """
+    if error["type"] in UNKNOWN:
+        return did_you_mean(error["loc"][-1], keys)
+    if error["type"] == "literal_error":  # pydantic tells the values in quotes
+        return did_you_mean(error["input"], re.findall(r"'([^']*)'", error["ctx"]["expected"]))
+    return ""
 
 
 def first_to_tell(errors: Sequence[ErrorDetails]) -> ErrorDetails:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import tomllib
 from collections.abc import Mapping
@@ -13,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
 from isiw.errors import ConfigError, IsiwError
-from isiw.text.expected import UNKNOWN, expected_instead, first_to_tell, known_keys
+from isiw.text.expected import UNKNOWN, expected_instead, first_to_tell, known_keys, meant_instead
 
 __all__ = ["checked", "parsed", "read_toml"]
 
@@ -83,15 +82,12 @@ def _explained(kind: Any, error: ErrorDetails, source: str) -> ConfigError:
     key = ".".join(str(part) for part in path)
     if error["type"] in UNKNOWN:
         known = known_keys(kind, path[:-1])
-        close = difflib.get_close_matches(str(path[-1]), known, n=1)
-        ways = [f"Did you mean {close[0]}?"] if close else []
-        if "settings" in known:
-            ways.append(f"Settings go into [{'.'.join(map(str, [*path[:-1], 'settings']))}].")
+        where = f"Settings go into [{'.'.join(map(str, [*path[:-1], 'settings']))}]." if "settings" in known else ""
         return ConfigError(
             f"{source}: the key {key} is unknown",
             got=error["input"],
             expected=f"one of {', '.join(known)}",
-            remedy=" ".join([*ways, "Correct it or remove it."]),
+            remedy=_sentences(meant_instead(error, known), where, "Correct it or remove it."),
         )
     if error["type"] == "missing":
         return ConfigError(f"{source}: the key {key} is missing", remedy="Add it.")
@@ -100,4 +96,9 @@ def _explained(kind: Any, error: ErrorDetails, source: str) -> ConfigError:
     own = error.get("ctx", {}).get("error")
     if isinstance(own, IsiwError):
         return ConfigError(f"{what}: {own.what}", got=own.got, expected=own.expected, remedy=own.remedy or remedy)
+    remedy = _sentences(meant_instead(error), remedy)
     return ConfigError(what, got=error["input"], expected=expected_instead(error), remedy=remedy)
+
+
+def _sentences(*sentences: str) -> str:
+    return " ".join(filter(None, sentences))

@@ -8,7 +8,6 @@ a lab knows, `KNOWN`, has short keys of its own.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import reduce
@@ -21,7 +20,7 @@ from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import acquisition_named
 from isiw.checks import MOST_OF_A_KIND, check_numbers, check_probabilities, check_wholes, whole
 from isiw.design import DesignSpace
-from isiw.errors import ConfigError, StrategyError
+from isiw.errors import ConfigError, StrategyError, did_you_mean
 from isiw.models.protocol import ResponseModel
 from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoWindow, SmallGain, StoppingRule
 from isiw.text.toml_files import checked
@@ -129,7 +128,7 @@ class Stopping:
     def __post_init__(self) -> None:
         check_wholes(self, "max_trials", least=1)
         check_numbers(self, "stop_width_ms", above=0)
-        check_numbers(self, "stop_no_window", above=0, most=1)
+        check_probabilities(self, "stop_no_window", above=0, most=1)
         check_probabilities(self, "stop_expected_f1", "stop_gain")
 
     def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - the budget counts from the first stimulus
@@ -217,11 +216,10 @@ def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
     known = settings_keys(kind)
     for key in values:
         if key not in known:
-            close = difflib.get_close_matches(key, known, n=1)
             raise StrategyError(
                 f"the strategy {name!r} has no setting {key!r}",
                 expected=", ".join(known),
-                remedy=f"{f'Did you mean {close[0]}? ' if close else ''}Correct it or remove it.",
+                remedy=f"{did_you_mean(key, known)} Correct it or remove it.".lstrip(),
             )
     settings = kind()
     # What is deep in a part goes into the part that was given.
