@@ -123,7 +123,7 @@ def test_the_suite_finds_a_device_with_wrong_timing(space: DesignSpace) -> None:
 
 
 def test_the_suite_finds_a_device_on_another_reference(space: DesignSpace) -> None:
-    with pytest.raises(AssertionError, match="reference"):
+    with pytest.raises(AssertionError, match=r'required that .*, valve; seen: impact\. .*reference = "impact"'):
         check_device(lambda: SimulatedDevice(SimulatedPerson(responder("impact"), "impact")), space)
 
 
@@ -214,8 +214,21 @@ def test_an_invalid_interval_is_an_error(space: DesignSpace, iti_s: float) -> No
 
 def test_the_suite_finds_what_is_no_device(space: DesignSpace) -> None:
     nothing: Any = object()
-    with pytest.raises(AssertionError, match="describe, stage"):
+    with pytest.raises(AssertionError, match=r"describe, stage.*; seen: .*\(object\) without describe, stage"):
         check_device(lambda: nothing, space)
+
+
+@pytest.mark.parametrize(("answer", "seen"), [(None, "None"), (0.12, r"0\.12 \(float\)")])
+def test_the_suite_says_what_is_required_of_an_answer_and_what_was_seen(
+    space: DesignSpace, answer: Any, seen: str
+) -> None:
+    class Wrong(Hardware):
+        def deliver(self, stimulus: Stimulus, timeout_s: float) -> Any:
+            super().deliver(stimulus, timeout_s)
+            return answer
+
+    with pytest.raises(AssertionError, match=f"it is required that deliver returns a Sweep .*; seen: {seen}$"):
+        check_device(Wrong, space, clock=VirtualClock())
 
 
 class Slow(Hardware):
@@ -228,7 +241,7 @@ class Slow(Hardware):
 
 
 def test_the_suite_finds_a_device_that_ignores_its_timeout(space: DesignSpace) -> None:
-    with pytest.raises(AssertionError, match="within its timeout"):
+    with pytest.raises(AssertionError, match=r"within its timeout of 0.05 s; seen: "):
         check_device(Slow, space, clock=VirtualClock(), timeout_s=0.05)
 
 
@@ -408,7 +421,7 @@ class HangingHardware(Hardware):
 def test_a_delivery_that_hangs_is_given_up_and_the_device_disarmed(space: DesignSpace) -> None:
     device = HangingHardware()
     began_s = time.monotonic()
-    with pytest.raises(AssertionError, match=r"within its timeout, here after .* given up and disarmed"):
+    with pytest.raises(AssertionError, match=r"timeout of 0.2 s; seen: nothing after .* given up and disarmed"):
         check_device(lambda: device, space, clock=VirtualClock(), timeout_s=0.2)
     assert time.monotonic() - began_s < 10.0
     assert len(device.fired_s) == 2
@@ -442,7 +455,7 @@ def test_the_suite_finds_a_stop_that_fails_before_anything_is_armed(space: Desig
             raise RuntimeError("no port")
 
     device = Unstoppable()
-    with pytest.raises(AssertionError, match=r"stop works in any state, here: .*no port"):
+    with pytest.raises(AssertionError, match=r"stop works in any state; seen: .*no port"):
         check_device(lambda: device, space, clock=VirtualClock())
     assert not device.taken
 

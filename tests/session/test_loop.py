@@ -240,10 +240,20 @@ def test_an_impossible_isi_is_an_error_that_names_it(log: Path, isi_ms: float) -
     assert record.finished
 
 
-@pytest.mark.parametrize("answer", [None, 0.1, (50.0, 0.1)])
-def test_an_answer_of_another_type_is_an_error(log: Path, answer: object) -> None:
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (None, "returned None;"),
+        (0.1, "returned 0.1 (float);"),
+        ((50.0, 0.1), "returned (50.0, 0.1) (tuple);"),
+        ([0.1] * 999, "… (list);"),
+    ],
+)
+def test_an_answer_of_another_type_is_an_error_that_shows_it_shortly(log: Path, answer: object, words: str) -> None:
     _, message = run_failing(Session(ScriptedDevice(lambda _: answer), scripted_strategy(), log=log), DeviceError)
-    assert "Sweep or a Measurement" in message
+    assert words in message
+    assert "expected an isiw.Sweep or an isiw.Measurement" in message
+    assert len(message) < 400
 
 
 def test_an_answer_to_another_kind_of_trial_is_an_error(log: Path) -> None:
@@ -292,11 +302,14 @@ def test_an_error_of_the_observer_ends_the_session_with_an_intact_log(log: Path)
     assert device.calls == ["stage", "stop", "unstage"]
 
 
-def test_a_device_on_another_reference_is_refused(log: Path) -> None:
-    device = ScriptedDevice()
-    object.__setattr__(device.info, "reference", "impact")
-    with pytest.raises(DeviceError, match="different events"):
-        Session(device, scripted_strategy(), log=log)
+@pytest.mark.parametrize(("device_s", "space_s"), [("impact", "valve"), ("valve", "impact")])
+def test_a_device_on_another_reference_is_refused_and_the_space_is_to_be_given_the_devices(
+    log: Path, device_s: Any, space_s: Any
+) -> None:
+    device, strategy = ScriptedDevice(), scripted_strategy(space=dataclasses.replace(IMPACT_SPACE, reference=space_s))
+    object.__setattr__(device.info, "reference", device_s)
+    with pytest.raises(DeviceError, match=rf'different events.*set reference = "{device_s}" under \[space\]'):
+        Session(device, strategy, log=log)
 
 
 @pytest.mark.parametrize("settings", [{}, {"conditioning": "electrical"}])

@@ -14,6 +14,7 @@ from isiw.session.rig import Rig
 from isiw.session.watch import Watch
 from isiw.signals.judgement import judge, judge_measurement
 from isiw.signals.limits import SignalLimits
+from isiw.text.shown import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
 __all__ = ["Delivery"]
@@ -108,7 +109,9 @@ class Delivery:
         if isinstance(answer, Measurement):
             return judge_measurement(answer, stimulus, self.space, self.signals)
         raise DeviceError(
-            "the device answered with something else than its promise", got=answer, expected="a Sweep or a Measurement"
+            f"the device's deliver returned {shown(answer)}",
+            expected="an isiw.Sweep or an isiw.Measurement",
+            remedy="Let it return what it recorded, or the MEP that it measured: isiw.Measurement(mep_mv, isi_ms).",
         )
 
 

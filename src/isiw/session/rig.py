@@ -23,9 +23,10 @@ from isiw.session.safeguards import Safeguards
 from isiw.signals.units import EMG_UNITS_MV, require_unit
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus
+from isiw.types import Reference
 from isiw.visit import VisitProtocol
 
-__all__ = ["Rig", "require_matching"]
+__all__ = ["Rig", "own_reference", "require_matching"]
 
 
 class Rig:
@@ -170,6 +171,19 @@ class Rig:
         end_process("The session does not react. The device is disarmed.", self.log, INTERRUPTED)
 
 
+def own_reference(reference: Reference) -> str:
+    """What to do where a device counts ISIs from another event than the design space, in sentences.
+
+    Args:
+        reference: the event that the device counts from.
+    """
+    return (
+        f'If the device is right, set reference = "{reference}" under [space], or '
+        f'DesignSpace(low_ms, high_ms, reference="{reference}"), and count low_ms and high_ms from there. If not, '
+        "correct what the device's describe() returns."
+    )
+
+
 def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtocol) -> None:
     """Raise where the strategy would misread the device's answers, or the device cannot do what the protocol asks.
 
@@ -185,9 +199,9 @@ def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtoc
     if info.reference != strategy.space.reference:
         raise DeviceError(
             "the device and the design space count ISIs from different events",
-            got=info.reference,
-            expected=strategy.space.reference,
-            remedy="Give the DesignSpace the device's reference.",
+            got=f"{info.reference} from the device, {strategy.space.reference} in the space",
+            expected="the same one",
+            remedy=own_reference(info.reference),
         )
     assumed = strategy.recipe.settings.get("conditioning", info.conditioning)
     if info.conditioning not in {"tap", assumed}:  # a tap is also what a device says that states nothing

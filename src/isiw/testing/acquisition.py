@@ -25,13 +25,13 @@ def check_acquisition(acquisition: AcquisitionFunction, posterior: Posterior, sp
     """
     require(isinstance(acquisition, AcquisitionFunction), "an acquisition function is callable and says what it needs")
     missing = [c.__name__ for c in acquisition.needs if not isinstance(posterior, c)]
-    require(not missing, f"the posterior has what the acquisition function needs, here not {', '.join(missing)}")
+    require(not missing, "the posterior has what the acquisition function needs", f"not {', '.join(missing)}")
     before = posterior.estimate()
     for count in (1, 2, 23):
         isi_ms = torch.linspace(space.low_ms, space.high_ms, count)
         scores = acquisition(posterior, isi_ms)
         shaped = scores.dim() == 2 and scores.shape[1] == count
-        require(shaped, f"scores have the shape (b, t), here {tuple(scores.shape)} for {count} ISIs")
-        require(bool(scores.isfinite().all()), f"scores are finite, here {scores.tolist()}")
+        require(shaped, "scores have the shape (b, t)", f"{tuple(scores.shape)} for {count} ISIs")
+        require(bool(scores.isfinite().all()), "scores are finite", str(scores.tolist()))
         require(torch.equal(scores, acquisition(posterior, isi_ms)), "the same posterior gives the same scores")
     require(same_estimates(posterior.estimate(), before), "scoring leaves the posterior as it was")

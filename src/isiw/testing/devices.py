@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from isiw.checks import number
 from isiw.design import DesignSpace
@@ -13,16 +14,20 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
 from isiw.errors import IsiwError
 from isiw.log.topics import waveform_topic
+from isiw.session.rig import own_reference
 from isiw.signals import SignalLimits, judge, judge_measurement
 from isiw.signals.doubts import DoubtKind, doubt_of
 from isiw.signals.faults import likely_fault, too_early_by_chance
 from isiw.testing.device_table import Delivery, DeviceTable, device_table
 from isiw.testing.guarded import Guarded, Pace
 from isiw.testing.phantom import artefact_in_window
-from isiw.testing.requirements import require
+from isiw.testing.requirements import broken, require
+from isiw.text.shown import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
 __all__ = ["check_device"]
+
+_VERBS: Final = ("describe", "stage", "deliver", "stop", "unstage")
 
 
 def check_device(
@@ -77,7 +82,8 @@ def _checked(
     make: Callable[[], Device], rules: _Rules, pace_of: Callable[[Device], Pace], say: Callable[[str], None]
 ) -> DeviceTable:
     device = make()
-    require(isinstance(device, Device), "it has describe, stage, deliver, stop and unstage")
+    lacking = [verb for verb in _VERBS if not hasattr(device, verb)]
+    require(not lacking, f"a device has {', '.join(_VERBS)}", f"{shown(device)} without {', '.join(lacking)}")
     _check_description(device, rules.space)
     pace = pace_of(device)
     say(_announcement(device, pace))
@@ -156,27 +162,41 @@ def _delivery(guarded: Guarded, stimulus: Stimulus, rules: _Rules) -> Delivery:
 
 def _check_description(device: Device, space: DesignSpace) -> None:
     info = device.describe()
-    require(isinstance(info, DeviceInfo), "describe() returns a DeviceInfo before it is staged")
-    require(info == device.describe(), "describe() says the same each time")
-    require(info.reference == space.reference, f"its reference is the space's, {space.reference}")
+    require(isinstance(info, DeviceInfo), "describe() returns a DeviceInfo before it is staged", shown(info))
+    again = device.describe()
+    require(info == again, "describe() says the same each time", f"{info}, then {again}")
+    require(
+        info.reference == space.reference,
+        f"the device counts ISIs from the event that the space counts from, {space.reference}",
+        f"{info.reference}. {own_reference(info.reference)}",
+    )
 
 
 def _checked_answer(info: DeviceInfo, stimulus: Stimulus, answer: Answer, rules: _Rules) -> Trial:
-    require(isinstance(answer, Sweep | Measurement), "deliver returns a Sweep or a Measurement")
+    require(isinstance(answer, Sweep | Measurement), "deliver returns a Sweep or a Measurement", shown(answer))
     if isinstance(answer, Sweep):
         units = {name: channel.unit for name, channel in answer.channels.items()}
-        require(units == dict(info.channels), f"a sweep has the channels and units of describe(), here {units}")
-        require("emg" in units, "a sweep has its EMG")
+        described = dict(info.channels)
+        require(units == described, f"a sweep has the channels and units of describe(), {described}", str(units))
+        require("emg" in units, "a sweep has a channel emg", ", ".join(units) or "no channels")
         timed = answer.t_tms_ms is not None
-        require(timed is not stimulus.tap_alone, "a sweep has the time of the pulse, and a tap alone has no pulse")
+        promise = "a sweep has the time of the pulse, t_tms_ms, and a tap alone has no pulse"
+        require(timed is not stimulus.tap_alone, promise, f"t_tms_ms = {answer.t_tms_ms} of {_named(stimulus)}")
     else:
-        require(not info.channels, "a device that measures the MEP itself describes no channels")
-        alone = stimulus.isi_ms is None
-        require((answer.isi_ms is None) is alone, "the realised ISI is None for TMS alone, and only then")
+        promise = "a device that returns a Measurement describes no channels"
+        require(not info.channels, promise, f"a Measurement, and the channels {', '.join(info.channels)}")
+        alone, promise = stimulus.isi_ms is None, "the realised ISI is None for TMS alone, and only then"
+        require((answer.isi_ms is None) is alone, promise, f"isi_ms = {answer.isi_ms} of {_named(stimulus)}")
     try:
         return rules.judged(answer, stimulus)
     except IsiwError as error:
-        raise AssertionError(f"broken promise: a session can judge what deliver returns, here: {error}") from error
+        raise broken("a session can judge what deliver returns", str(error)) from error
+
+
+def _named(stimulus: Stimulus) -> str:
+    if stimulus.isi_ms is not None:
+        return f"a pair at {stimulus.isi_ms:g} ms"
+    return "a tap alone" if stimulus.tap_alone else "TMS alone"
 
 
 def _require_usable(deliveries: Sequence[Delivery], rules: _Rules, *, real: bool) -> None:
@@ -195,7 +215,7 @@ def _require_usable(deliveries: Sequence[Delivery], rules: _Rules, *, real: bool
     artefact = artefact_in_window(deliveries, rules.limits) if real else None
     if artefact is not None:
         said.append(artefact)
-    require(not said, f"a session can use what deliver returns, here {'; '.join(dict.fromkeys(said))}")
+    require(not said, "a session can use what deliver returns", "; ".join(dict.fromkeys(said)))
 
 
 def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: Pace) -> None:
@@ -206,7 +226,8 @@ def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: Pace) ->
     if isinstance(resumed, HasMemory):
         resumed.resume_after(stimuli[:3])
     (last,) = _answers(resumed, stimuli[3:], pace)
-    require(_same(last, uninterrupted[3]), "after resume_after it answers as if it had never been interrupted")
+    promise = "after resume_after a device answers as if it had never been interrupted"
+    require(_same(last, uninterrupted[3]), promise, f"{shown(last)} instead of {shown(uninterrupted[3])}")
 
 
 def _answers(device: Device, stimuli: Sequence[Stimulus], pace: Pace) -> list[Answer]:

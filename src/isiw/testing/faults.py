@@ -250,21 +250,22 @@ def check_ledger(ledger: Iterable[Fired], record: SessionRecord, limits: Limits)
     trials = {trial.index: trial for trial in record.table}
     open_isis = _isis_of_open_intents(record)
     counts = Counter(each.trial for each in fired)
-    require(max(counts.values(), default=0) <= 1, f"no trial is fired twice, here {counts.most_common(1)}")
-    require(set(counts) <= set(open_isis), f"no pair is fired without an intent, here {set(counts) - set(open_isis)}")
+    require(max(counts.values(), default=0) <= 1, "no trial is fired twice", str(counts.most_common(1)))
+    require(set(counts) <= set(open_isis), "no pair is fired without an intent", str(set(counts) - set(open_isis)))
     for each in fired:
-        require(open_isis[each.trial] == each.isi_ms, f"what is fired is what the intent says, in trial {each.trial}")
+        intended, promise = open_isis[each.trial], f"what is fired is what the intent says, in trial {each.trial}"
+        require(intended == each.isi_ms, promise, f"{each.isi_ms} ms instead of {intended} ms")
         if each.isi_ms is not None:
             limits.require_isi(each.isi_ms)
     known = {intent.trial for intent in record.unknown} | set(trials)
-    require(set(counts) <= known, f"every pair that was fired is in the log, here not {set(counts) - known}")
+    require(set(counts) <= known, "every pair that was fired is in the log", f"not {set(counts) - known}")
     accepted = {index for index, trial in trials.items() if trial.status is Status.ACCEPTED}
-    require(accepted <= set(counts), f"no trial counts that was not fired, here {accepted - set(counts)}")
+    require(accepted <= set(counts), "no trial counts that was not fired", str(accepted - set(counts)))
     require(list(trials) == list(range(len(trials))), "the trials are numbered without a gap")
-    require(len(fired) <= limits.max_pulses, f"at most {limits.max_pulses} pairs are fired, here {len(fired)}")
+    require(len(fired) <= limits.max_pulses, f"at most {limits.max_pulses} pairs are fired", str(len(fired)))
     for before, after in itertools.pairwise(fired):
         spent_s = after.t_s - before.t_s
-        require(spent_s >= limits.min_iti_s - _ROUNDING_S, f"pairs come {limits.min_iti_s:g} s apart, here {spent_s:g}")
+        require(spent_s >= limits.min_iti_s - _ROUNDING_S, f"pairs come {limits.min_iti_s:g} s apart", f"{spent_s:g} s")
 
 
 def _isis_of_open_intents(record: SessionRecord) -> dict[int, float | None]:
@@ -272,9 +273,7 @@ def _isis_of_open_intents(record: SessionRecord) -> dict[int, float | None]:
     isis: dict[int, float | None] = {}
     for entry in record.history:
         if isinstance(entry, Intent):
-            require(
-                entry.trial not in isis, f"there is one intent for a stimulus, in trial {entry.trial} there are two"
-            )
+            require(entry.trial not in isis, "there is one intent for a stimulus", f"two in trial {entry.trial}")
             isis[entry.trial] = entry.isi_ms
         elif isinstance(entry, Event) and entry.kind == "refused" and entry.trial is not None:
             isis.pop(entry.trial, None)

@@ -15,7 +15,7 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, Reports
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered, StillArmedError, told
 from isiw.session.rig import Rig
 from isiw.session.safeguards import Safeguards
-from isiw.testing.requirements import require
+from isiw.testing.requirements import broken, require
 from isiw.trials import Stimulus
 
 __all__ = ["Guarded", "Pace"]
@@ -64,7 +64,7 @@ class Guarded:
         with driven(self._device, self._rig.info), self._rig.interrupts:
             yield
         faults = "; ".join(self._rig.faults)
-        require(not faults, f"stop and unstage work in any state, here: {faults}")
+        require(not faults, "stop and unstage work in any state", faults)
 
     @contextmanager
     def armed(self, *, kept_disarmed: bool = False) -> Iterator[None]:
@@ -112,7 +112,7 @@ class Guarded:
             self._tried(Stimulus(0, None))
         except DeviceError:
             return
-        raise AssertionError(f"broken promise: deliver raises a DeviceError {when}")
+        raise broken(f"deliver raises a DeviceError {when}", "it delivered and raised nothing")
 
     def require_stop(self) -> None:
         """Raise where `stop` fails before anything is armed; once the device is armed that would be too late.
@@ -124,7 +124,7 @@ class Guarded:
         try:
             punctual.stop()
         except StillArmedError as error:
-            raise AssertionError(f"broken promise: stop works in any state, here: {told(error)}") from error
+            raise broken("stop works in any state", told(error)) from error
         finally:
             punctual.release_thread()
 
@@ -137,20 +137,21 @@ class Guarded:
             answer = self._rig.deliver(stimulus, timeout_s)
         except DeviceTimeoutError as error:
             if (spent_s := time.monotonic() - began_s) > timeout_s:
-                raise AssertionError(f"broken promise: {_in_time(spent_s)}; it was given up and disarmed") from error
+                seen = f"nothing after {spent_s:.3g} s, when it was given up and disarmed"
+                raise broken(_in_time(timeout_s), seen) from error
             raise
         self._delivered += 1
         self._pace.given_s.append(self._pace.clock.now_s())
         spent_s = time.monotonic() - began_s
-        require(spent_s <= timeout_s, _in_time(spent_s))
+        require(spent_s <= timeout_s, _in_time(timeout_s), f"{spent_s:.3g} s")
         return answer, spent_s
 
     def _sleep(self, duration_s: float) -> None:
         self._rig.interrupts.freely(self._pace.clock.sleep_s, duration_s)
 
 
-def _in_time(spent_s: float) -> str:
-    return f"deliver returns or raises within its timeout, here after {spent_s:.3g} s"
+def _in_time(timeout_s: float) -> str:
+    return f"deliver returns or raises within its timeout of {timeout_s:g} s"
 
 
 class _KeptDisarmed:

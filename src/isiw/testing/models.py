@@ -106,17 +106,17 @@ def _check_order(model: ResponseModel, space: DesignSpace, trials: Trials, toler
     if windows[0] is not None and windows[1] is not None:
         off_ms = max(abs(windows[0].start_ms - windows[1].start_ms), abs(windows[0].end_ms - windows[1].end_ms))
         within = off_ms <= tolerance_ms
-        require(within, f"the reported edges depend on the order by at most {tolerance_ms:g} ms, here {off_ms:g} ms")
+        require(within, f"the reported edges depend on the order by at most {tolerance_ms:g} ms", f"{off_ms:g} ms")
 
 
 def _check_capabilities(posterior: Posterior, space: DesignSpace, people: int, when: str) -> None:
     isi_ms = torch.linspace(space.low_ms, space.high_ms, 7)
     shapes = _sample_shapes(posterior, isi_ms, when)
     wrong = [shape for shape in shapes if shape[0] != people]
-    require(not wrong, f"all samples are of {people} people {when}, here {wrong}")
-    require(len({shape[1] for shape in shapes}) <= 1, f"all capabilities have the same samples {when}, here {shapes}")
+    require(not wrong, f"all samples are of {people} people {when}", str(wrong))
+    require(len({shape[1] for shape in shapes}) <= 1, f"all capabilities have the same samples {when}", str(shapes))
     wrong = [shape for shape in shapes if len(shape) > 2 and shape[2] != len(isi_ms)]
-    require(not wrong, f"there is a value for each of {len(isi_ms)} ISIs {when}, here {wrong}")
+    require(not wrong, f"there is a value for each of {len(isi_ms)} ISIs {when}", str(wrong))
     _check_further(posterior, people, when)
     if isinstance(posterior, PredictsMeps):
         for person in range(people):
@@ -127,7 +127,7 @@ def _check_prediction(posterior: Any, person: int, when: str) -> None:
     grid_ms = posterior.estimate(person).grid_ms
     wide, narrow = (np.stack(posterior.prediction_mv(level, person)) for level in (0.9, 0.5))
     shape = None if grid_ms is None else (2, len(grid_ms))
-    require(wide.shape == shape, f"prediction_mv is at the ISIs of the estimate {when}, here {wide.shape}, not {shape}")
+    require(wide.shape == shape, f"prediction_mv is at the ISIs of the estimate {when}", f"{wide.shape}, not {shape}")
     require(bool(np.isfinite(wide).all()), f"prediction_mv is finite {when}")
     nested = bool((np.diff([wide[0], narrow[0], narrow[1], wide[1]], axis=0) >= -1e-9).all())
     require(nested, f"a band of prediction_mv holds those of smaller probability {when}")
@@ -138,7 +138,7 @@ def _sample_shapes(posterior: Any, isi_ms: Tensor, when: str) -> list[tuple[int,
     shapes = []
     if isinstance(posterior, PredictsOutcomes):
         mass = posterior.outcome_mass(isi_ms)
-        require(mass.dim() == 4, f"outcome_mass has the shape (b, s, t, y) {when}, here {tuple(mass.shape)}")
+        require(mass.dim() == 4, f"outcome_mass has the shape (b, s, t, y) {when}", str(tuple(mass.shape)))
         proper = bool((mass >= 0).all()) and bool(((mass.sum(-1) - 1).abs() < 1e-3).all())
         require(proper, f"outcome_mass is a probability of each value {when}")
         shapes.append(tuple(mass.shape))
@@ -162,11 +162,11 @@ def _check_further(posterior: Posterior, people: int, when: str) -> None:
     if isinstance(posterior, HasEvidence):
         evidence = posterior.log_evidence()
         fine = tuple(evidence.shape) == (people,) and bool(evidence.isfinite().all())
-        require(fine, f"log_evidence is finite and has the shape (b,) {when}, here {evidence}")
+        require(fine, f"log_evidence is finite and has the shape (b,) {when}", str(evidence))
     if isinstance(posterior, ProposesIsi):
         plan = posterior.proposed_isis_ms()
         fine = plan.dim() == 2 and plan.shape[0] == people and plan.shape[1] > 0 and bool(plan.isfinite().all())
-        require(fine, f"proposed_isis_ms has the shape (b, k) with k of at least 1 {when}, here {tuple(plan.shape)}")
+        require(fine, f"proposed_isis_ms has the shape (b, k) with k of at least 1 {when}", str(tuple(plan.shape)))
     if isinstance(posterior, ReportsTrouble):
         trouble = posterior.trouble
-        require(trouble is None or trouble.endswith("."), f"trouble is told in sentences {when}, here {trouble!r}")
+        require(trouble is None or trouble.endswith("."), f"trouble is told in sentences {when}", repr(trouble))

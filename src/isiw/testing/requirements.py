@@ -8,9 +8,18 @@ from typing import Final
 import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.text.shown import shown
 from isiw.window import WindowEstimate
 
-__all__ = ["Trials", "check_estimate", "require", "same_estimates", "trials_that_break_things", "usual_trials"]
+__all__ = [
+    "Trials",
+    "broken",
+    "check_estimate",
+    "require",
+    "same_estimates",
+    "trials_that_break_things",
+    "usual_trials",
+]
 
 Trials = tuple[tuple[float | None, float], ...]
 """ISIs [ms] (None is TMS alone) and MEPs [mV], in the order of telling."""
@@ -18,18 +27,29 @@ Trials = tuple[tuple[float | None, float], ...]
 _USUAL_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0, 0.4, 0.6, 0.45, 0.55, 0.5, 0.35, 0.65)
 
 
-def require(condition: object, promise: str) -> None:
+def require(condition: object, promise: str, seen: str = "") -> None:
     """Raise where a promise is broken.
 
     Args:
         condition: whether it is kept.
-        promise: what it is, for the message.
+        promise: what must hold, as a clause, for the message.
+        seen: what was found instead.
 
     Raises:
         AssertionError: it is; the message says which.
     """
     if not condition:
-        raise AssertionError(f"broken promise: {promise}")
+        raise broken(promise, seen)
+
+
+def broken(promise: str, seen: str) -> AssertionError:
+    """That a promise is broken, as an error whose message sets what was found against what must hold.
+
+    Args:
+        promise: what must hold, as a clause.
+        seen: what was found instead; empty where there is nothing to add.
+    """
+    return AssertionError(f"broken promise: it is required that {promise}{f'; seen: {seen}' if seen else ''}")
 
 
 def usual_trials(space: DesignSpace) -> Trials:
@@ -73,15 +93,15 @@ def check_estimate(estimate: object, space: DesignSpace, when: str) -> None:
     Raises:
         AssertionError: it cannot.
     """
-    require(isinstance(estimate, WindowEstimate), f"an estimate is a WindowEstimate {when}")
+    require(isinstance(estimate, WindowEstimate), f"an estimate is a WindowEstimate {when}", shown(estimate))
     if not isinstance(estimate, WindowEstimate):
         return
     if estimate.window is not None:
         inside = space.low_ms <= estimate.window.start_ms <= estimate.window.end_ms <= space.high_ms
-        require(inside, f"the reported window lies in the space {when}, here {estimate.window}")
+        require(inside, f"the reported window lies in the space {when}", str(estimate.window))
     if estimate.edge_samples_ms is not None:
         shape = estimate.edge_samples_ms.shape
-        require(len(shape) == 2 and shape[1] == 2, f"samples of the edges have the shape (s, 2) {when}, here {shape}")
+        require(len(shape) == 2 and shape[1] == 2, f"samples of the edges have the shape (s, 2) {when}", str(shape))
         require(not np.isnan(estimate.edge_samples_ms).any(), f"no sample of an edge is NaN {when}")
     if estimate.profile_quantiles_mv is not None:
         require(np.isfinite(estimate.profile_quantiles_mv).all(), f"the profile is finite {when}")

@@ -11,6 +11,7 @@ from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.testing.requirements import (
     Trials,
+    broken,
     check_estimate,
     require,
     same_estimates,
@@ -42,15 +43,15 @@ def check_strategy(make: Callable[[], Strategy], *, trials: int = 12) -> None:
 
 def _check_asking(strategy: Strategy) -> None:
     isi_ms = strategy.ask()
-    require(isi_ms in strategy.space.grid_ms, f"ask answers an ISI on the grid, here {isi_ms}")
+    require(isi_ms in strategy.space.grid_ms, "ask answers an ISI on the grid", str(isi_ms))
     require(strategy.ask() == isi_ms, "ask answers the same until the next tell")
     require(strategy.ask_batch(1) == [isi_ms], "a batch of one is what ask answers")
     try:
         batch = strategy.ask_batch(3)
     except StrategyError:
         return
-    require(len(batch) == 3 and batch[0] == isi_ms, f"a batch has n ISIs and begins with ask's, here {batch}")
-    require(all(isi in strategy.space.grid_ms for isi in batch), f"a batch is on the grid, here {batch}")
+    require(len(batch) == 3 and batch[0] == isi_ms, "a batch has n ISIs and begins with ask's", str(batch))
+    require(all(isi in strategy.space.grid_ms for isi in batch), "a batch is on the grid", str(batch))
 
 
 def _check_refusals(strategy: Strategy) -> None:
@@ -71,7 +72,7 @@ def _check_refusals(strategy: Strategy) -> None:
             strategy.tell(isi, **outcome)
         except InvalidValueError:
             continue
-        raise AssertionError(f"broken promise: tell refuses {outcome} at {isi} ms")
+        raise broken(f"tell refuses {outcome} at {isi} ms", "it was taken")
     unchanged = strategy.ask() == isi_ms and same_estimates(strategy.estimate(), before)
     require(unchanged, "a tell that was refused changes nothing")
 

@@ -72,8 +72,13 @@ def test_something_is_left_to_anywhere_else() -> None:
 def test_places_count_from_one_event_and_that_of_the_space() -> None:
     with pytest.raises(InvalidValueError, match="one event"):
         prior_with(HERE, replace(THERE, reference="impact"))
-    with pytest.raises(InvalidValueError, match="different events"):
-        ParticleModel(prior_with(HERE), particles=10).begin(IMPACT_SPACE, 0)
+    of_the_impact = replace(HERE, reference="impact", hit_delay_ms=None)
+    for place, other, space in ((HERE, "impact", IMPACT_SPACE), (of_the_impact, "valve command", VALVE_SPACE)):
+        reference = place.reference
+        with pytest.raises(
+            InvalidValueError, match=rf'set reference = "{reference}".*sessions that count from the {other}'
+        ):
+            ParticleModel(prior_with(place), particles=10).begin(space, 0)
 
 
 @pytest.mark.parametrize("wrong", [{"share": 1.5}, {"width_ms": (0.0, 0.1)}, {"reference": "tms"}])

@@ -18,9 +18,12 @@ from isiw.models.particles.laws import check_laws, check_shares
 from isiw.models.particles.places import Place
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.models.shared.start import TAP_SPANS, Span, StartPrior
-from isiw.types import Conditioning
+from isiw.types import Conditioning, Reference
 
 __all__ = ["ProfilePrior", "ShapeShares", "Width"]
+
+_EVENTS: Final[Mapping[Reference, str]] = MappingProxyType({"impact": "impact", "valve": "valve command"})
+"""What the events are called that ISIs count from."""
 
 
 @dataclass(frozen=True)
@@ -160,12 +163,13 @@ class ProfilePrior:
                 expected=self.places[0].conditioning,
                 remedy="Learn a prior from sessions with this stimulus.",
             )
-        if self.places and self.places[0].reference != space.reference:
+        if self.places and (learnt := self.places[0].reference) != space.reference:
             raise InvalidValueError(
-                "the prior's places and the design space count ISIs from different events",
+                "the earlier sessions of the prior and the design space count ISIs from different events",
                 got=f"{space.reference} in the space",
-                expected=self.places[0].reference,
-                remedy="Use the prior with the kind of space that it was learnt in.",
+                expected=f"{learnt}, as in those sessions",
+                remedy=f'If the rig counts from the {_EVENTS[learnt]}, set reference = "{learnt}" in the space. If '
+                f"not, learn from sessions that count from the {_EVENTS[space.reference]}, or leave the prior out.",
             )
         delay_ms = self.start.hit_delay_ms
         if others := [place.hit_delay_ms for place in self.places if not place.is_of_rig(delay_ms)]:
@@ -173,5 +177,5 @@ class ProfilePrior:
                 "the prior was learnt on a rig with another hit delay, so its windows would be in the wrong place",
                 got=f"a hit delay of {delay_ms} ms",
                 expected=f"about {others[0]} ms",
-                remedy="Use the prior with the rig that it was learnt with, or count ISIs from the impact.",
+                remedy="Learn a prior from sessions with this rig; or correct hit_delay_ms, if it is not this rig's.",
             )
