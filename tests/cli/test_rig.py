@@ -68,6 +68,8 @@ def test_a_session_goes_on_within_the_limits_that_the_configuration_says_now(isi
     hot = isiw("resume", "s.mcap", begun)
     assert hot.exit_code == 1
     assert "no temperature" in hot.output
+    assert f"The limits stand under [limits] in {begun}" in hot.output
+    assert hot.stdout.endswith(f"The log is kept; go on with: isiw resume s.mcap {begun}\n")
     assert len(read_session("s.mcap").trials) == 3
     changed(begun, "\nmax_coil_c = 40.0", "")
     changed(begun, "background_uv = 10.0", "background_uv = 25.0")
@@ -81,6 +83,44 @@ def test_a_session_goes_on_within_the_limits_that_the_configuration_says_now(isi
     assert len(record.trials) == 5
     assert (record.header.limits.max_pulses, record.header.limits.min_iti_s) == (5, 5.0)
     assert (record.header.signals.background_uv, record.header.timeout_s) == (25.0, 7.0)
+
+
+def test_a_session_that_its_limits_have_ended_says_which_file_to_change(isiw: Command, begun: Path) -> None:
+    for output in (isiw("resume", "s.mcap", begun).output, isiw("run", begun, "--log", "new.mcap").output):
+        assert f"a higher max_pulses under [limits] in {begun}, then go on with: isiw resume" in output
+        assert output.endswith(f".mcap {begun}\n")
+
+
+def test_a_session_that_was_over_says_so_when_it_is_resumed_and_how_the_person_goes_on(
+    isiw: Command, begun: Path
+) -> None:
+    changed(begun, "max_trials = 6", "max_trials = 2")
+    ran = isiw("run", begun, "--log", "over.mcap")
+    assert (ran.exit_code, "is over" in ran.output) == (0, False)
+    resumed = isiw("resume", "over.mcap", begun)
+    assert resumed.exit_code == 0
+    assert "The session is over, so no stimulus was delivered." in resumed.output
+    command = f"isiw run {begun} --after over.mcap"
+    assert resumed.output.endswith(f"{command}\n")
+    assert isiw(*command.split()[1:], "--log", "another.mcap").exit_code == 0
+
+
+def test_a_session_that_was_over_and_learns_nothing_goes_on_without_what_it_found(isiw: Command, begun: Path) -> None:
+    changed(begun, "max_trials = 6", "max_trials = 2")
+    isiw("run", begun, "--strategy", "gp-ei", "--log", "over.mcap")
+    assert isiw("resume", "over.mcap", begun).output.endswith(f"isiw run {begun}\n")
+
+
+def test_a_log_and_a_configuration_in_the_wrong_order_are_told_with_the_right_command(
+    isiw: Command, begun: Path
+) -> None:
+    result = isiw("resume", begun, "s.mcap")
+    assert result.exit_code == 1
+    assert f"are swapped; got '{begun} s.mcap'" in result.output
+    assert f"Type: isiw resume s.mcap {begun}" in result.output
+    alone = isiw("resume", begun)
+    assert alone.exit_code == 3
+    assert "swapped" not in alone.output
 
 
 def test_a_section_that_the_configuration_does_not_have_stays_as_it_was_logged(isiw: Command, begun: Path) -> None:
@@ -131,6 +171,41 @@ def test_a_faulty_rig_fails_its_check_with_a_table_and_the_fault(isiw: Command, 
     assert "in µV, and described as mV" in checked.output
 
 
+def test_a_configuration_without_a_device_has_nothing_to_check_and_is_told_how_to_name_one(
+    isiw: Command, tmp_path: Path
+) -> None:
+    (tmp_path / "c.toml").write_text("seed = 1\n", encoding="utf-8")
+    result = isiw("check", "c.toml")
+    assert result.exit_code == 1
+    assert "c.toml names no device, so there is nothing to check; expected a section [device]" in result.output
+    assert 'factory = "rig:make"' in result.output
+
+
+def test_a_persons_code_is_not_taken_for_a_kind_of_simulation(isiw: Command, tmp_path: Path) -> None:
+    isiw("new", "rig", ".")
+    result = isiw("run", "session.toml", "--subject", "P07")
+    assert result.exit_code == 1
+    assert 'under [visit] write subject = "P07"' in result.output
+    assert list(tmp_path.glob("*.mcap*")) == []
+    assert "Did you mean recorded?" in isiw("run", "--subject", "recordd").output
+
+
+def test_a_refusal_before_the_first_trial_says_how_to_go_on_and_one_before_the_log_does_not(
+    isiw: Command, tmp_path: Path
+) -> None:
+    isiw("new", "rig", ".")
+    changed(tmp_path / "rig.py", "self.armed = True", 'raise isiw.errors.DeviceError("no cable")')
+    assert "go on with" not in isiw("run", "session.toml", "--log", "s.mcap").output
+    assert not (tmp_path / "s.mcap").exists()
+    not_ready = "\n    def readiness(self):\n        return isiw.Readiness(ready=False)\n\n    def deliver("
+    changed(tmp_path / "rig.py", 'raise isiw.errors.DeviceError("no cable")', "self.armed = True")
+    changed(tmp_path / "rig.py", "\n    def deliver(", not_ready)
+    refused = isiw("run", "session.toml", "--log", "s.mcap")
+    assert refused.exit_code == 1
+    assert "The log is kept; go on with: isiw resume s.mcap session.toml" in refused.output
+    assert "limit (before the first trial): " in isiw("show", "s.mcap").output
+
+
 def test_a_rig_that_stimulates_is_checked_only_when_somebody_says_so(isiw: Command, tmp_path: Path) -> None:
     isiw("new", "rig", ".")
     changed(tmp_path / "session.toml", "simulated = true", "simulated = false")
@@ -169,7 +244,8 @@ def test_a_session_that_pauses_where_nobody_is_ends_with_a_code_of_its_own(isiw:
     result = isiw("run", "session.toml", "--log", "a lab.mcap")
     assert result.exit_code == 5
     assert "The session is paused" in result.output
-    assert "go on with: isiw resume 'a lab.mcap' CONFIG" in result.output
+    assert "go on with: isiw resume 'a lab.mcap' session.toml" in result.output
+    assert "isiw resume 'a lab.mcap' CONFIG, where CONFIG names your device" in isiw("show", "a lab.mcap").output
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,9 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
     subject: Annotated[
         str | None,
         typer.Option(
-            help="simulated, or recorded: simulated MEPs in recorded EMG. A person's code is visit.subject in CONFIG.",
+            metavar="KIND",
+            help="How a person is simulated: simulated, or recorded (simulated MEPs in recorded EMG). The code of the "
+            "person who is examined is visit.subject in CONFIG.",
             **NO_DEFAULT,
         ),
     ] = None,
@@ -105,7 +107,7 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
             day=day,
             operator=operator,
         )
-        _run_to_the_end(isiw.config.session_for(settings), config if settings.device else None, live=live)
+        _run_to_the_end(isiw.config.session_for(settings), config, live=live)
 
 
 @app.command()
@@ -125,7 +127,7 @@ def resume(
 ) -> None:
     """Go on with a session that was interrupted: in its space and with its strategy, within the limits of CONFIG."""
     with errors_reported():
-        record = isiw.read_session(log)
+        record = isiw.config.read_to_resume(log, config)
         settings = isiw.config.load_config(config) if config else isiw.config.config_of_log(record)
         isiw.config.require_same_person(settings, [record])
         changes = isiw.config.changes_on_resume(settings, record) if config else {}
@@ -133,7 +135,7 @@ def resume(
         session = isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify, **changes)
         for difference in isiw.config.differences_on_resume(settings, record) if config else ():
             show(difference, style="yellow", stderr=True)
-        _run_to_the_end(session, config, live=live)
+        _run_to_the_end(session, config, live=live, resumed=True)
 
 
 @app.command()
@@ -147,6 +149,7 @@ def check(
     """
     with errors_reported("Interrupted: the device is stopped."):
         settings = isiw.config.load_config(config)
+        isiw.config.require_device(settings, config)
         device, space = isiw.config.device_for(settings), settings.space.design()
         if not (yes or device.describe().simulated):
             typer.confirm("The check stimulates. Is the coil on a phantom?", abort=True)
@@ -188,7 +191,8 @@ def show_log(log: Log) -> None:
         for row in (isiw.report.TRIAL_HEADINGS, *isiw.report.trial_rows(record)):
             show(isiw.session.aligned(row))
         for event in record.events:
-            show(f"{event.kind} (trial {event.trial}): {event.text}")
+            when = "before the first trial" if event.trial is None else f"trial {event.trial}"
+            show(f"{event.kind} ({when}): {event.text}")
         show(isiw.report.final_statement(record), style="bold")
         exit_if_damaged(record.losses)
 
@@ -322,24 +326,25 @@ def _is_log(source: str) -> bool:
     return Path(closed).is_file() or Path(f"{closed}.part").is_file()
 
 
-def _run_to_the_end(session: Session, config: Path | None, *, live: bool) -> None:
+def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resumed: bool = False) -> None:
     if session.log_path.suffix.lower() == ".png":
         raise isiw.errors.ConfigError(
             "the log would be overwritten by its picture", got=str(session.log_path), expected=".mcap"
         )
-    before = len(session.trials)
+    before, ours = len(session.trials), resumed or not _is_log(str(session.log_path))
     try:
         with errors_reported(_INTERRUPTED), _shown_live(session) if live else nullcontext():
             show(f"log: {session.log_path}")
             result = session.run(progress=True)
-    except BaseException:
-        if len(session.trials) > before:
-            command = shlex.join(["isiw", "resume", *map(str, filter(None, (session.log_path, config)))])
-            show(f"The session ended early. Its log is safe; go on with: {command}")
+    except BaseException as end:
+        delivered, refused = len(session.trials) > before, isinstance(end.__cause__, isiw.errors.DeviceError)
+        if delivered or (refused and ours and _is_log(str(session.log_path))):
+            for line in isiw.config.after_error(session, config, end.__cause__, delivered=delivered):
+                show(line)
         raise
     record = isiw.read_session(result.log)
     truth = isiw.config.true_window(record)
-    show(f"\n{isiw.report.final_statement(record)}", style="bold")
+    show(f"\n{isiw.report.final_statement(record, config)}", style="bold")
     if isiw.config.has_truth(record):
         show(isiw.report.truth_sentence(record, truth))
     show(f"log:     {result.log}")
@@ -351,6 +356,9 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool) -> Non
         show(f"The picture cannot be written ({error.strerror}). The log is complete; draw it later with: {later}")
     if not result.decision.stop:
         raise typer.Exit(NOT_OVER)
+    more = isiw.config.after_end(session, config, delivered=len(session.trials) > before)
+    if more is not None:
+        show(more)
 
 
 @contextmanager

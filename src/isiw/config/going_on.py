@@ -5,18 +5,51 @@ from __future__ import annotations
 import dataclasses
 import shlex
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from isiw.config.run import RunConfig, config_of_log
 from isiw.config.session import has_truth
 from isiw.devices.limits import Limits
-from isiw.errors import ConfigError
-from isiw.log.reader import SessionRecord
+from isiw.errors import ConfigError, LogError
+from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Header
 from isiw.session.resume import limits_of_log
 from isiw.strategy.catalogue import make_strategy
 
-__all__ = ["changes_on_resume", "differences_on_resume"]
+__all__ = ["changes_on_resume", "differences_on_resume", "read_to_resume"]
+
+
+def read_to_resume(log: Path, config: Path | None) -> SessionRecord:
+    """The session to go on with.
+
+    Args:
+        log: its log.
+        config: the configuration to go on with; None where there is none.
+
+    Raises:
+        ConfigError: the two are swapped.
+        LogError: as for `isiw.read_session`.
+    """
+    try:
+        return read_session(log)
+    except LogError as error:
+        if config is None or not _is_session(config):
+            raise
+        raise ConfigError(
+            "the log and the configuration are swapped",
+            got=f"{log} {config}",
+            expected="the log first",
+            remedy=f"Type: {shlex.join(['isiw', 'resume', str(config), str(log)])}",
+        ) from error
+
+
+def _is_session(path: Path) -> bool:
+    try:
+        read_session(path)
+    except LogError:
+        return False
+    return True
 
 
 def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any]:

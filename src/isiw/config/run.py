@@ -16,7 +16,7 @@ import dataclasses
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -33,7 +33,7 @@ from isiw.config.sections import (
 )
 from isiw.config.slips import require_units
 from isiw.devices.limits import Limits
-from isiw.errors import ConfigError
+from isiw.errors import ConfigError, did_you_mean
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import RUN_KEY
 from isiw.signals.limits import SignalLimits
@@ -101,6 +101,7 @@ class RunConfig(Section):
             day: the number of the person's visit, from 1.
             operator: who runs the session.
         """
+        _require_simulation(subject)
         values = self.model_dump(exclude_unset=True)  # what nobody set is not known to be wanted
         values |= _given(seed=seed, log=log, prior=prior, after=after or None)
         sections = {
@@ -112,6 +113,19 @@ class RunConfig(Section):
             if given:
                 values[name] = values.get(name, {}) | given
         return _validated(values, "the command line")
+
+
+def _require_simulation(kind: str | None) -> None:
+    """Raise where a person's code is where the kind of a simulated person should be."""
+    kinds = get_args(SubjectConfig.model_fields["kind"].annotation)
+    if kind is not None and kind not in kinds:
+        code = f'A person\'s code goes into the configuration: under [visit] write subject = "{kind}".'
+        raise ConfigError(
+            "the command line: --subject (subject.kind) says how a person is simulated, not who is examined",
+            got=kind,
+            expected=" or ".join(kinds),
+            remedy=did_you_mean(kind, kinds) or code,
+        )
 
 
 def _given(**values: object) -> dict[str, object]:
@@ -155,8 +169,8 @@ def config_of_log(record: SessionRecord) -> RunConfig:
         raise ConfigError(
             "the session was not run by isiw run with a simulated person, so its device is not known here",
             got=record.header.device.name,
-            remedy=f"With a configuration that has a device: isiw resume {shlex.quote(str(record.path))} CONFIG. From "
-            "other software: isiw.resume(path, device).run(), or for a loop of your own "
+            remedy=f"Name the configuration that has your device, CONFIG: isiw resume {shlex.quote(str(record.path))} "
+            "CONFIG. From other software: isiw.resume(path, device).run(), or for a loop of your own "
             "isiw.open_session(strategy, path, resume=True).",
         )
     return _validated(record.header.config[RUN_KEY], str(record.path))

@@ -26,7 +26,7 @@ from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import SimulatedSubject
 from isiw.window import Window
 
-__all__ = ["device_for", "fresh_log_path", "has_truth", "session_for", "subject_for", "true_window"]
+__all__ = ["device_for", "fresh_log_path", "has_truth", "require_device", "session_for", "subject_for", "true_window"]
 
 SESSIONS: Final = Path("isiw-sessions")
 """The folder for logs of sessions without a path."""
@@ -80,6 +80,24 @@ def device_for(config: RunConfig) -> Device:
     recordings = load_recordings(config.subject.data)
     recorded = RecordedPerson(respond, reference, recordings, config.seed, hit_delay_ms, subject.conditioning)
     return SimulatedDevice(recorded)
+
+
+def require_device(config: RunConfig, path: Path) -> None:
+    """Check that a configuration names a device of the lab's own.
+
+    Args:
+        config: the configuration.
+        path: its file, for the message.
+
+    Raises:
+        ConfigError: it would simulate a person.
+    """
+    if config.device is None:
+        raise ConfigError(
+            f"{path} names no device, so there is nothing to check",
+            expected='a section [device] with the function that makes it, such as factory = "rig:make"',
+            remedy="Add it. isiw new rig FOLDER writes a device, and a configuration that names it.",
+        )
 
 
 def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:

@@ -15,7 +15,7 @@ from isiw.priors import after, read_lab_prior
 from isiw.strategy.catalogue import settings_for
 from isiw.visit import Visit
 
-__all__ = ["require_same_person", "settings_with_taught"]
+__all__ = ["learns_from_earlier", "require_same_person", "settings_with_taught"]
 
 
 def settings_with_taught(config: RunConfig, device: DeviceInfo) -> dict[str, Any]:
@@ -39,14 +39,25 @@ def settings_with_taught(config: RunConfig, device: DeviceInfo) -> dict[str, Any
             "strategy.settings.prior and a prior from earlier sessions exclude each other",
             remedy="Give only one of them.",
         )
-    try:
-        settings_for(config.strategy.name, prior=Prior())
-    except StrategyError as error:  # no prior, or that of another model
+    if not learns_from_earlier(config.strategy.name):
         raise StrategyError(
             f"the strategy {config.strategy.name} learns nothing from earlier sessions",
             remedy="Leave out the prior and the earlier sessions, or choose another strategy, such as default.",
-        ) from error
+        )
     return settings | {"prior": _taught(config, device)}
+
+
+def learns_from_earlier(name: str) -> bool:
+    """Whether a strategy has a prior for what earlier sessions teach.
+
+    Args:
+        name: the strategy's.
+    """
+    try:
+        settings_for(name, prior=Prior())
+    except StrategyError:  # no prior, or that of another model
+        return False
+    return True
 
 
 def _taught(config: RunConfig, device: DeviceInfo) -> Prior:

@@ -121,7 +121,10 @@ class LimitedDevice:
     def _check_state(self) -> None:
         state = self._readiness()
         if not state.ready:
-            raise NotDelivered(f"the device is not ready: {state.reason or 'it does not say why'}")
+            raise NotDelivered(
+                f"the device is not ready: {state.reason or 'it does not say why'}",
+                remedy="Nothing was delivered. Go on when it is ready.",
+            )
         self._limits.require_state(state)
 
     def _readiness(self) -> Readiness:

@@ -130,7 +130,7 @@ class Limits:
         if delivered >= self.max_pulses:
             raise LimitExceededError(
                 f"the limit of {self.max_pulses} pulses is reached",
-                remedy="Nothing was delivered. End the session, or start one with a higher max_pulses.",
+                remedy="Nothing was delivered. For more pulses raise max_pulses in the limits.",
             )
 
     def require_isi(self, isi_ms: float) -> None:
@@ -144,7 +144,7 @@ class Limits:
                 "the ISI is beyond the limits",
                 got=isi_ms,
                 expected=f"{self.low_ms:g} to {self.high_ms:g} ms",
-                remedy="Nothing was delivered. Let the limits hold the whole design space.",
+                remedy="Nothing was delivered. Give the limits the whole range of the design space.",
             )
         if self.step_ms is not None and self._off_grid_ms(isi_ms) > _GRID_TOLERANCE_MS:
             raise LimitExceededError(
@@ -163,19 +163,23 @@ class Limits:
         Raises:
             LimitExceededError: the coil is too hot, the intensity is another one, or a limited value is not reported.
         """
-        if self.max_coil_c is not None and not (state.coil_c is not None and state.coil_c <= self.max_coil_c):
+        coil_c, intensity = state.coil_c, state.intensity_pct_mso
+        if self.max_coil_c is not None and not (coil_c is not None and coil_c <= self.max_coil_c):
+            way_on = "Let the device's readiness() report coil_c" if coil_c is None else "Let the coil cool"
             raise LimitExceededError(
                 "the coil is too hot, or its temperature is not known",
-                got="no temperature" if state.coil_c is None else f"{state.coil_c:g} °C",
+                got="no temperature" if coil_c is None else f"{coil_c:g} °C",
                 expected=f"at most {self.max_coil_c:g} °C",
-                remedy="Nothing was delivered. Let the coil cool, then resume the session.",
+                remedy=f"Nothing was delivered. {way_on}, then resume the session.",
             )
-        if self.intensity_pct_mso is not None and state.intensity_pct_mso != self.intensity_pct_mso:
+        if self.intensity_pct_mso is not None and intensity != self.intensity_pct_mso:
+            reporting = "Let the device's readiness() report intensity_pct_mso"
             raise LimitExceededError(
                 "the intensity is not the session's, or is not known",
-                got="no intensity" if state.intensity_pct_mso is None else f"{state.intensity_pct_mso:g} % MSO",
+                got="no intensity" if intensity is None else f"{intensity:g} % MSO",
                 expected=f"{self.intensity_pct_mso:g} % MSO",
-                remedy="Nothing was delivered. Set the intensity back, then resume the session.",
+                remedy="Nothing was delivered. "
+                f"{reporting if intensity is None else 'Set the intensity back'}, then resume the session.",
             )
 
     def earliest_s(self, times_s: Sequence[float], since_s: float) -> float:

@@ -83,7 +83,11 @@ def current_file(path: str | Path) -> Path:
     for candidate in (part_of(log), log):
         if candidate.is_file():
             return candidate
-    raise LogError("there is no such log", got=str(path), remedy="Check the path; what wrote it printed it at its end.")
+    raise LogError(
+        "there is no such log",
+        got=str(path),
+        remedy="Check the path; isiw run prints it when it begins and when it ends.",
+    )
 
 
 def salvage(path: str | Path) -> Salvage:
@@ -159,7 +163,9 @@ def salvage_file(path: Path) -> Salvage:
         _read_file(file, found)
     if not found.messages and not found.attachments:
         raise DamagedLogError(
-            "nothing can be read from the log", got=str(found.path), remedy="Is it an isiw log (MCAP)?"
+            "nothing can be read from this file as a log",
+            got=str(found.path),
+            remedy="Name the log that isiw wrote, an MCAP file; a configuration (TOML) is none.",
         )
     return found
 

@@ -29,7 +29,7 @@ from isiw.log.durable import (
 )
 from isiw.log.locks import claimed, refuse_if_locked
 from isiw.log.salvage import Message, Salvage, holds, salvage_file
-from isiw.log.schema import AnyHeader, Header, Record
+from isiw.log.schema import RUN_KEY, AnyHeader, Header, Record
 from isiw.log.topics import CHANNEL_IDS, announcement, decode, encode, is_of_isiw, json_schema, topic_of
 
 __all__ = ["CONFIGURATION", "LogWriter"]
@@ -311,9 +311,11 @@ def _way_on(existing: Path) -> str:
         return "Choose another path; nothing of this log can be continued."
     if header.intensities is not None:
         return f"Choose another path, or go on with it: isiw threshold {name} --resume"
+    if RUN_KEY in header.config:
+        return f"Choose another path, or go on with it: isiw resume {name}"
     return (
-        f"Choose another path, or go on with it: isiw resume {name}, if isiw run has made it, with CONFIG behind it "
-        "if there was one; otherwise isiw.resume(path, device).run() in your own software."
+        f"Choose another path, or go on with it: isiw resume {name} CONFIG, where CONFIG names your device, or in your "
+        "own software isiw.resume(path, device).run() or isiw.open_session(strategy, path, resume=True)."
     )
 
 

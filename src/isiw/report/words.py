@@ -6,6 +6,7 @@ import math
 import re
 import shlex
 from collections import Counter
+from pathlib import Path
 
 from isiw.design import DesignSpace
 from isiw.log.durable import log_of
@@ -60,17 +61,18 @@ JUDGED_SINCE = "Trials were judged anew after this estimate; resume the session 
 """What is said where `SessionRecord.is_judged_since`."""
 
 
-def final_statement(record: SessionRecord) -> str:
+def final_statement(record: SessionRecord, config: Path | None = None) -> str:
     """What a session found, in a few sentences.
 
     Args:
         record: the session.
+        config: the configuration that it was run with, for the command that goes on with it; None where not known.
 
     Raises:
         InvalidValueError: no record of a session.
     """
     require_records((record,))
-    last, way_on = record.estimates[-1] if record.estimates else None, _resuming(record)
+    last, way_on = record.estimates[-1] if record.estimates else None, _resuming(record, config)
     sentences = finding_sentences(record)
     if last is not None:
         sentences += [
@@ -91,7 +93,7 @@ def final_statement(record: SessionRecord) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def _resuming(record: SessionRecord) -> str:
+def _resuming(record: SessionRecord, config: Path | None) -> str:
     """What goes on with a session: a command, or the call that a loop of the lab's own was begun with."""
     if SERVED_KEY in record.header.config:
         lost = ", with lost_pulses in its body" if record.end_lost else ""
@@ -103,7 +105,9 @@ def _resuming(record: SessionRecord) -> str:
     command = f"isiw resume {lost}{shlex.quote(str(record.path))}"
     if RUN_KEY in record.header.config:
         return command
-    return f"{command} CONFIG, or in your own software isiw.resume(path, device).run()"
+    if config is not None:
+        return f"{command} {shlex.quote(str(config))}"
+    return f"{command} CONFIG, where CONFIG names your device, or in your own software isiw.resume(path, device).run()"
 
 
 def finding_sentences(record: SessionRecord) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -235,8 +236,8 @@ def _require_end(record: SessionRecord) -> None:
         raise DamagedLogError(
             "the log's end is missing, so nobody knows how many stimuli were given",
             got=str(record.path),
-            remedy="Look at the stimulator's counter, and resume with the number of pulses that isiw show does not "
-            "list: isiw resume --lost-pulses N, or isiw.resume(..., lost_pulses=N).",
+            remedy="Look at the stimulator's counter, and resume with the number N of pulses that isiw show does not "
+            f"list: isiw resume --lost-pulses N {shlex.quote(str(record.path))}, or isiw.resume(..., lost_pulses=N).",
         )
 
 

@@ -1,0 +1,65 @@
+"""What to type next once a session has ended: to go on with it, or with the same person in a new one."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+from isiw.config.taught import learns_from_earlier
+from isiw.errors import LimitExceededError
+from isiw.log.schema import RUN_KEY
+from isiw.session.loop import Session
+
+__all__ = ["after_end", "after_error"]
+
+
+def after_error(session: Session, config: Path | None, error: BaseException | None, *, delivered: bool) -> list[str]:
+    """How to go on with a session that an error has ended, in lines; the command comes last.
+
+    Args:
+        session: the session.
+        config: the configuration that it was run with; None where there was none.
+        error: what ended it.
+        delivered: whether it had delivered anything since it was begun or resumed.
+    """
+    limited = config is not None and isinstance(error, LimitExceededError)
+    lines = (
+        [f"The limits stand under [limits] in {config}; they are read anew when the session is resumed."]
+        if limited
+        else []
+    )
+    safe = "The session ended early. Its log is safe" if delivered else "No stimulus was delivered. The log is kept"
+    return [*lines, f"{safe}; go on with: {_resume(session, config, named=limited)}"]
+
+
+def after_end(session: Session, config: Path | None, *, delivered: bool) -> str | None:
+    """How more can be delivered to the same person after a session is over; None where nobody has asked for that.
+
+    Args:
+        session: the session, after a decision that stops.
+        config: the configuration that it was run with; None where there was none.
+        delivered: whether it has delivered anything since it was begun or resumed.
+    """
+    if not session.strategy.decision().stop:  # so that it was the limits
+        where = f"in {config}" if config is not None else "of a configuration"
+        command = f"{_resume(session, config, named=True)}{'' if config else ' CONFIG'}"
+        return f"For more pulses set a higher max_pulses under [limits] {where}, then go on with: {command}"
+    if delivered:
+        return None
+    same = "" if config else ", with the configuration of this one if it had one"
+    more = f"For more trials with this person begin a new session{same}: {_anew(session, config)}"
+    return f"The session is over, so no stimulus was delivered. {more}"
+
+
+def _resume(session: Session, config: Path | None, *, named: bool) -> str:
+    """The command that goes on; a simulated person is known from the log, so that the file need not be named."""
+    files = [session.log_path, config] if named or RUN_KEY not in session.header.config else [session.log_path]
+    return shlex.join(["isiw", "resume", *map(str, filter(None, files))])
+
+
+def _anew(session: Session, config: Path | None) -> str:
+    """The command that begins a session of the same person, from what this one has found where its strategy can."""
+    header = session.header
+    seed = ["--seed", str(header.seed)] if RUN_KEY in header.config else []
+    after = ["--after", str(session.log_path)] if learns_from_earlier(header.strategy.name) else []
+    return shlex.join(["isiw", "run", *([str(config)] if config else []), *seed, *after])
