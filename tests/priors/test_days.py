@@ -68,7 +68,7 @@ def test_another_day_on_a_rig_with_another_hit_delay_is_refused(tmp_path: Path) 
     for compared in (priors.after, priors.moved):
         with pytest.raises(InvalidValueError, match=r"another hit delay.*80\.0.*180\.0"):
             compared(first, elsewhere)
-    with pytest.raises(InvalidValueError, match="rig that it was learnt with"):
+    with pytest.raises(InvalidValueError, match="learnt on a rig with another hit delay"):
         make_strategy(prior=both, hit_delay_ms=(80.0, 5.0), particles=50)
     with pytest.raises(LogError, match=r"from 80 to 180 ms.*Learn a prior for each rig"):
         priors.learn([paths[0], paths[2]], again=True)
