@@ -69,7 +69,7 @@ def test_what_is_compared_is_the_plain_number() -> None:
     ],
 )
 def test_bounds_are_kept_and_named_in_the_message(
-    bounds: dict[str, float], inside: tuple[float, ...], outside: tuple[float, ...], words: str
+    bounds: Any, inside: tuple[float, ...], outside: tuple[float, ...], words: str
 ) -> None:
     for value in inside:
         assert number("x", value, **bounds) == value

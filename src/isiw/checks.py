@@ -61,18 +61,22 @@ class Bounds(TypedDict, total=False):
     most: float
 
 
-def number(what: str, value: object, **bounds: Unpack[Bounds]) -> float:
+def number(what: str, value: object, *, remedy: str | None = None, **bounds: Unpack[Bounds]) -> float:
     """A finite number within some bounds.
 
     Args:
         what: its name, for the message.
         value: what was given.
+        remedy: what to do about anything else.
         **bounds: `above` and `below` exclude the bound itself, `least` and `most` include it.
 
     Raises:
         InvalidValueError: anything else.
     """
-    return _number(what, value, bounds)
+    plain = _as_float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    if not (math.isfinite(plain) and _within(plain, bounds)):
+        raise InvalidValueError(f"{what} must be {_described('a finite number', bounds)}", got=value, remedy=remedy)
+    return plain
 
 
 def amplitude(what: str, value: object) -> float:
@@ -292,7 +296,7 @@ def check_probabilities(owner: object, *names: str, optional: bool = False, **bo
         value = getattr(owner, name)
         if not (optional and value is None):
             remedy = "Is it in %? Divide by 100." if isinstance(value, int | float) and 1 < value <= 100 else None
-            _put(owner, name, _number(f"{type(owner).__name__}.{name}", value, bounds, remedy))
+            _put(owner, name, number(f"{type(owner).__name__}.{name}", value, remedy=remedy, **bounds))
 
 
 def check_wholes(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
@@ -360,14 +364,6 @@ def check_choice(owner: object, name: str, known: Iterable[Any]) -> None:
         InvalidValueError: an unknown value.
     """
     choice(f"{type(owner).__name__}.{name}", getattr(owner, name), known)
-
-
-def _number(what: str, value: object, bounds: Bounds, remedy: str | None = None) -> float:
-    """As `number`, with what to do about anything else."""
-    plain = _as_float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
-    if not (math.isfinite(plain) and _within(plain, bounds)):
-        raise InvalidValueError(f"{what} must be {_described('a finite number', bounds)}", got=value, remedy=remedy)
-    return plain
 
 
 def _as_float(value: Real) -> float:

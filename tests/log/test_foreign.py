@@ -13,7 +13,8 @@ from mcap.writer import CompressionType, Writer
 
 from isiw.design import DesignSpace
 from isiw.errors import LogError
-from isiw.log.reader import MOST_LOSSES, SessionRecord, read_session
+from isiw.log.reader import SessionRecord, read_session
+from isiw.log.records import MOST_LOSSES
 from isiw.log.schema import MOST_TRIALS
 from isiw.log.topics import CHANNEL_IDS, encode
 from isiw.report import final_statement

@@ -14,6 +14,9 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.log.reader import read_session
 from isiw.server.driven import DrivenSession
+from isiw.server.refusals import Refusal
+from isiw.server.requests import AskRequest, CreateRequest, TellRequest
+from isiw.server.sessions import Sessions
 from isiw.session.journal import Journal
 from isiw.strategy.catalogue import make_strategy
 from isiw.text.found import TOO_FEW
@@ -278,6 +281,26 @@ def test_a_trial_that_was_logged_and_could_not_be_learnt_closes_its_session(
     refused(client.post(f"{session}/tell", json=outcome), 409, "NotOpen")
     done(client.post(f"{session}/resume"))
     assert done(client.post(f"{session}/tell", json=outcome))["mep_mv"] == 0.1
+
+
+def test_a_call_that_waited_for_one_that_broke_the_session_is_told_that_it_is_not_open(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refusing(*_: object) -> Never:
+        raise InvalidValueError("not to be learnt")
+
+    sessions = Sessions(tmp_path)
+    sessions.create(CreateRequest.model_validate(PLAN))
+    session = sessions.opened("P07")
+    with session.alone():
+        asked = session.ask(AskRequest())
+    monkeypatch.setattr("isiw.session.recorder.learn", refusing)
+    kinds = []
+    for _ in range(2):
+        with pytest.raises(Refusal) as caught, session.alone():
+            session.tell(TellRequest(trial=0, isi_ms=asked.isi_ms, mep_mv=0.1))
+        kinds.append((caught.value.status, caught.value.kind))
+    assert kinds == [(500, "InternalError"), (409, "NotOpen")]
 
 
 def test_a_session_that_cannot_be_closed_as_the_server_ends_is_told_and_keeps_no_other_open(

@@ -15,7 +15,7 @@ import isiw
 from isiw.checks import text, whole
 from isiw.errors import InvalidValueError, LogError
 from isiw.log.production import PRODUCTION_VERSION, Block, Production, ProductionHeader
-from isiw.log.reader import Records
+from isiw.log.records import Records
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter

@@ -153,7 +153,7 @@ def _title(record: SessionRecord) -> str:
     if record.is_silent:
         return "No MEP was seen"
     if not record.rests_on_data:
-        return f"Too little was measured ({record.pairs} pairs of stimuli count)"
+        return f"Too little was measured (pairs that count: {record.pairs})"
     if not record.estimates:
         return "No estimate"
     last = record.estimates[-1]

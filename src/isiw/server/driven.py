@@ -69,7 +69,7 @@ class DrivenSession:
                 raise
             self.closed = True
             self.recorder.__exit__(type(error), error, error.__traceback__)
-            if not concluded and not isinstance(error, LogError):  # not for anything that the client sent
+            if not concluded and not isinstance(error, Refusal | LogError):  # not for anything that the client sent
                 raise failed(error) from error
             raise
         finally:

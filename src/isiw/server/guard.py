@@ -112,8 +112,9 @@ class Guard:
         same = hmac.compare_digest(given.strip().encode("latin-1", "replace"), self._rules.token.encode())
         if kind.lower() != "bearer" or not same:
             raise Refusal(
-                401, "Unauthorized", "the token is missing or another one",
-                expected="the header Authorization: Bearer TOKEN", remedy="The server prints its token when it starts.",
+                401, "Unauthorized", "the request has no token, or not the server's",
+                expected="the header Authorization: Bearer TOKEN",
+                remedy="isiw serve prints its token when it starts, unless --token-file or ISIW_TOKEN gives it.",
             )  # fmt: skip
 
     async def _body(self, headers: Headers, receive: Receive) -> bytes:

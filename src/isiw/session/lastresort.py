@@ -46,7 +46,7 @@ def end_process(reason: str, log: LogWriter | None, code: int) -> Never:
         for step in steps:
             step.start()
         while any(step.is_alive() for step in steps) and time.monotonic() < end_s:
-            with suppress(KeyboardInterrupt):  # once more: there is an end to it already
+            with suppress(KeyboardInterrupt):  # Ctrl-C pressed again; the process is ending already
                 time.sleep(_GLANCE_S)
     finally:
         os._exit(code)

@@ -18,12 +18,10 @@ from isiw.models.particles.laws import check_laws, check_shares
 from isiw.models.particles.places import Place
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.models.shared.start import TAP_SPANS, Span, StartPrior
-from isiw.types import Conditioning, Reference
+from isiw.text.stimuli import STIMULI
+from isiw.types import Conditioning
 
 __all__ = ["ProfilePrior", "ShapeShares", "Width"]
-
-_EVENTS: Final[Mapping[Reference, str]] = MappingProxyType({"impact": "impact", "valve": "valve command"})
-"""What the events are called that ISIs count from."""
 
 
 @dataclass(frozen=True)
@@ -164,12 +162,13 @@ class ProfilePrior:
                 remedy="Learn a prior from sessions with this stimulus.",
             )
         if self.places and (learnt := self.places[0].reference) != space.reference:
+            origin = STIMULI[self.conditioning].origin
             raise InvalidValueError(
                 "the earlier sessions of the prior and the design space count ISIs from different events",
                 got=f"{space.reference} in the space",
                 expected=f"{learnt}, as in those sessions",
-                remedy=f'If the rig counts from the {_EVENTS[learnt]}, set reference = "{learnt}" in the space. If '
-                f"not, learn from sessions that count from the {_EVENTS[space.reference]}, or leave the prior out.",
+                remedy=f'If the rig counts from the {origin(learnt)}, set reference = "{learnt}" in the space. If '
+                f"not, learn from sessions that count from the {origin(space.reference)}, or leave the prior out.",
             )
         delay_ms = self.start.hit_delay_ms
         if others := [place.hit_delay_ms for place in self.places if not place.is_of_rig(delay_ms)]:

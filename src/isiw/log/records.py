@@ -1,0 +1,151 @@
+"""The records of a log by their kind, of whatever it is, and what of it makes no sense."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final, TypeVar
+
+from pydantic import ValidationError
+
+from isiw.errors import DamagedLogError, LogError
+from isiw.log.onsets import Onsets
+from isiw.log.production import Production, ProductionHeader
+from isiw.log.salvage import Message, Salvage
+from isiw.log.schema import AnyHeader, Event, Header, Intent, PulseOutcome, Record, Waveform
+from isiw.log.topics import decode
+from isiw.log.writer import CONFIGURATION
+from isiw.text.toml_files import parsed
+from isiw.trials import Channel, Trial
+
+__all__ = ["Records"]
+
+HeaderKind = TypeVar("HeaderKind", Header, ProductionHeader)
+
+MOST_CONFIGURATION: Final = 2**20
+"""Of a configuration as TOML [bytes]; the default's is 2 kB."""
+
+MOST_LOSSES: Final = 50
+"""Losses that are listed one by one."""
+
+
+@dataclass
+class Records:
+    """The records of a log by their kind, and what makes no sense.
+
+    Args:
+        salvaged: what was read from the log.
+        header: the last header.
+        history: all other records but waveforms, in order; of a trial that is told of twice, the first.
+        waveforms: the recorded channels, by trial and name.
+        losses: what was left out, a sentence each.
+        onsets: when each stimulus was about to be delivered.
+    """
+
+    salvaged: Salvage
+    header: AnyHeader | None = None
+    history: list[Record] = field(default_factory=list)
+    waveforms: dict[tuple[int, str], Channel] = field(default_factory=dict)
+    losses: list[str] = field(default_factory=list)
+    onsets: Onsets = field(default_factory=Onsets)
+    _trials: set[int] = field(default_factory=set)
+
+    @classmethod
+    def of(cls, salvaged: Salvage) -> Records:
+        """The records of a log.
+
+        Args:
+            salvaged: what was read from it.
+        """
+        records = cls(salvaged, losses=list(salvaged.losses))
+        for message in salvaged.messages:
+            records.take(message)
+        return records
+
+    @property
+    def told_losses(self) -> tuple[str, ...]:
+        """The losses, as many as somebody will read."""
+        left = len(self.losses) - MOST_LOSSES
+        listed = tuple(self.losses[:MOST_LOSSES])
+        return listed if left <= 0 else (*listed, f"{left} more losses are not listed.")
+
+    def header_of(self, kind: type[HeaderKind], newest: int) -> HeaderKind:
+        """The log's header, from its records or else from the configuration that is attached.
+
+        Args:
+            kind: of header.
+            newest: version that this isiw reads.
+
+        Raises:
+            LogError: the log is from a newer version.
+            DamagedLogError: the header cannot be read.
+        """
+        header = self.header if isinstance(self.header, kind) else None
+        if header is None or (self.losses and CONFIGURATION in self.salvaged.attachments):
+            header = _header_from_attachment(self.salvaged, kind)  # what is lost may have been the last header
+        return _checked_version(header, newest, self.salvaged.path)
+
+    def take(self, message: Message) -> None:
+        """Take one more record."""
+        try:
+            record = decode(message.topic, message.data)
+            if isinstance(record, Waveform):
+                self.waveforms[record.trial, message.topic.removeprefix("/")] = record.channel()
+        except ValueError as error:
+            self.losses.append(f"A record on {message.topic} makes no sense and is left out: {_first_line(error)}")
+            return
+        if isinstance(record, Header | ProductionHeader):
+            self.header = record
+        elif (trial := _concluded(record)) is not None and trial in self._trials:
+            self.losses.append(f"A second record of trial {trial} is left out.")
+        elif not isinstance(record, Waveform):
+            self.history.append(record)
+            self._note(record, message.log_time_ns)
+
+    def _note(self, record: Record, at_ns: int) -> None:
+        if (trial := _concluded(record)) is not None:
+            self._trials.add(trial)
+        elif isinstance(record, Intent):
+            self.onsets.take(record, at_ns)
+        elif isinstance(record, Event) and record.kind == "resume":
+            self.onsets.resumed()
+        elif isinstance(record, Event) and record.kind == "refused":
+            self.onsets.refused()
+
+
+def _concluded(record: Record) -> int | None:
+    """The number of the trial whose outcome a record is; None for any other record."""
+    if isinstance(record, Trial):
+        return record.index
+    return record.trial if isinstance(record, PulseOutcome | Production) else None
+
+
+def _first_line(error: ValueError) -> str:
+    """What is wrong with a record, without what pydantic says of where to read more."""
+    if isinstance(error, ValidationError):
+        first = error.errors(include_url=False, include_input=False)[0]
+        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    return str(error)
+
+
+def _header_from_attachment(salvaged: Salvage, kind: type[HeaderKind]) -> HeaderKind:
+    text = salvaged.attachments.get(CONFIGURATION, b"")[:MOST_CONFIGURATION]
+    try:
+        return kind.model_validate(parsed(text.decode()))
+    except (ValueError, RecursionError) as error:
+        raise DamagedLogError(
+            "the log's header is lost",
+            got=str(salvaged.path),
+            remedy="Its records may still be readable with any MCAP tool.",
+        ) from error
+
+
+def _checked_version(header: HeaderKind, newest: int, path: Path) -> HeaderKind:
+    if header.schema_version > newest:
+        raise LogError(
+            "the log was written by a newer isiw",
+            got=f"schema version {header.schema_version} in {path}",
+            expected=f"{newest} or older",
+            remedy="Upgrade isiw.",
+        )
+    return header
