@@ -44,13 +44,13 @@ from .devices.transports.folder import FolderDevice as FolderDevice
 from .devices.transports.line import LineDevice as LineDevice
 from .devices.transports.lsl import LslChannel as LslChannel
 from .devices.transports.lsl import LslDevice as LslDevice
+from .log.amending import exclude as exclude
+from .log.amending import include as include
 from .log.reader import read_session as read_session
 from .server.live.page import watch as watch
 from .session.loop import Session as Session
 from .session.opening import open_session as open_session
 from .session.recorder import Recorder as Recorder
-from .session.resume import exclude as exclude
-from .session.resume import include as include
 from .session.resume import resume as resume
 from .session.safeguards import Safeguards as Safeguards
 from .strategy.catalogue import list_settings as list_settings

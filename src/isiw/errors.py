@@ -26,6 +26,8 @@ Warnings, which are no errors:
 from __future__ import annotations
 
 import difflib
+import inspect
+import warnings
 from collections.abc import Iterable
 
 __all__ = [
@@ -47,6 +49,7 @@ __all__ = [
     "StudyError",
     "did_you_mean",
     "told",
+    "warn",
 ]
 
 
@@ -144,6 +147,19 @@ def told(error: BaseException) -> str:
         text = "(its message cannot be told)"
     whole = f"{type(error).__name__}: {text[:_LONGEST_TEXT]}"
     return whole.encode(errors="backslashreplace").decode()
+
+
+def warn(text: str, category: type[Warning]) -> None:
+    """Warn at the line that called isiw, however deep inside it the reason was found.
+
+    Args:
+        text: what is wrong, and what to do.
+        category: a warning of this module.
+    """
+    frame, level = inspect.currentframe(), 1
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == __package__:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, category, stacklevel=level)
 
 
 def did_you_mean(given: object, known: Iterable[object]) -> str:

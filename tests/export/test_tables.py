@@ -16,12 +16,12 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, LogError
 from isiw.export import export_logs
 from isiw.export.tables import session_facts
+from isiw.log.amending import exclude
 from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.reader import read_session
 from isiw.log.schema import StrategyRecipe
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
-from isiw.session.resume import exclude
 from isiw.visit import Visit
 from logs import cut_after
 from scripted import ScriptedDevice, scripted_strategy

@@ -155,7 +155,8 @@ def test_a_session_of_an_earlier_version_that_is_interrupted_again_goes_on_again
         raise InterruptedHereError(update)
 
     path = copy("06ce820-killed.mcap.part")
-    with pytest.warns(OtherVersionsWarning), pytest.raises(InterruptedHereError):
+    with pytest.warns(OtherVersionsWarning) as warned, pytest.raises(InterruptedHereError):
         isiw.resume(path, isiw.SimulatedDevice(person(path.name)), on_trial=interrupt).run()
+    assert {warning.filename for warning in warned} == {__file__}
     assert isiw.resume(path, isiw.SimulatedDevice(person(path.name))).run().decision.stop
     assert isiw.read_session(path).header.asks_from > 0

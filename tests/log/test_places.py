@@ -12,12 +12,12 @@ from typing import Any, Never
 import pytest
 
 from isiw.errors import LogError
+from isiw.log.amending import exclude
 from isiw.log.durable import Fingerprint, take_free_place
 from isiw.log.reader import read_session
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import Event, Header
 from isiw.log.writer import LogWriter
-from isiw.session.resume import exclude
 from log.written import write_trials
 
 

@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
+from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate
 from isiw.plots.session import save_session_plot, session_figure
 from isiw.session.loop import Session
-from isiw.session.resume import exclude
 from isiw.strategy.catalogue import make_strategy
 from isiw.trials import Measurement, Trial
 from isiw.window import Window

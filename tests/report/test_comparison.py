@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate
 from isiw.plots.comparison import comparison_figure
@@ -13,7 +14,6 @@ from isiw.report.compared import comparison_page
 from isiw.report.comparison import comparison_sentence, comparison_table
 from isiw.report.words import JUDGED_SINCE
 from isiw.session.loop import Session
-from isiw.session.resume import exclude
 from scripted import ScriptedDevice, scripted_strategy
 
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from isiw.errors import ConfigError, InvalidValueError
+from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
 from isiw.report.page import report_page, save_report
 from isiw.report.words import finding_sentences
-from isiw.session.resume import exclude
 from isiw.window import Window
 from logs import cut_after
 from report.sessions import HOSTILE, Page, pulsed, tapped

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Event, Intent, Record
 from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
 from isiw.session.loop import Session
-from isiw.session.resume import exclude
 from isiw.trials import Measurement, MistrialReason, Status, Trial
 from scripted import ScriptedDevice, scripted_strategy
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
+from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate, Event, Intent, StrategyRecipe
 from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, trial_rows, truth_sentence
 from isiw.session.loop import Session
-from isiw.session.resume import exclude
 from isiw.trials import Channel, Measurement, Status, Trial
 from isiw.window import Window
 from known import instance

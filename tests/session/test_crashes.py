@@ -14,9 +14,10 @@ from typing import Any
 import pytest
 
 from isiw.errors import LogError
+from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
 from isiw.session.loop import Session
-from isiw.session.resume import exclude, resume
+from isiw.session.resume import resume
 from scripted import ScriptedDevice, scripted_strategy
 from session.crashes import Ending, run_until
 

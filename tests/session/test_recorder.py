@@ -27,6 +27,7 @@ from isiw.errors import (
     LogError,
     StrategyError,
 )
+from isiw.log.amending import exclude
 from isiw.log.reader import read_session
 from isiw.log.schema import Estimate, Intent
 from isiw.log.writer import LogWriter
@@ -36,7 +37,7 @@ from isiw.session.journal import relearned
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.session.recorder import Recorder
-from isiw.session.resume import exclude, resume
+from isiw.session.resume import resume
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.trials import MistrialReason, Trial, TrialTable
@@ -141,8 +142,9 @@ def test_a_doubt_is_a_warning_and_an_event(log: Path) -> None:
     with open_session(scripted_strategy(9), log) as session:
         for mep_mv in (8.0, 6.0):
             session.tell(session.ask(), mep_mv)
-        with pytest.warns(ImplausibleDataWarning, match="in µV"):
+        with pytest.warns(ImplausibleDataWarning, match="in µV") as warned:
             session.tell(session.ask(), 12.0)
+    assert [warning.filename for warning in warned] == [__file__]
     assert [event.kind for event in read_session(log).events] == ["doubt"]
 
 
@@ -163,8 +165,9 @@ def test_three_mistrials_in_a_row_are_a_warning(log: Path) -> None:
             session.ask()
             session.mistrial(MistrialReason.NO_IMPACT)
         session.ask()
-        with pytest.warns(ImplausibleDataWarning, match="air supply"):
+        with pytest.warns(ImplausibleDataWarning, match="air supply") as warned:
             session.mistrial(MistrialReason.NO_IMPACT)
+    assert [warning.filename for warning in warned] == [__file__]
 
 
 def test_doubts_go_to_who_wants_them_in_place_of_a_warning(log: Path) -> None:

@@ -16,6 +16,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Readiness
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
+from isiw.log.amending import exclude
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, StrategyRecipe
@@ -23,7 +24,7 @@ from isiw.log.topics import decode
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
-from isiw.session.resume import exclude, resume
+from isiw.session.resume import resume
 from isiw.session.updates import SessionUpdate
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy

@@ -16,13 +16,14 @@ import isiw
 from forked import Forked
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError
+from isiw.log.amending import exclude, include
 from isiw.log.reader import read_session
 from isiw.log.schema import Estimate, Event, Intent
 from isiw.log.verdicts import LOOKED_AT
 from isiw.report import final_statement
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
-from isiw.session.resume import exclude, include, resume
+from isiw.session.resume import resume
 from isiw.session.safeguards import Safeguards
 from isiw.session.updates import SessionUpdate
 from isiw.strategy.catalogue import make_strategy

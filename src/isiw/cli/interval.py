@@ -9,6 +9,7 @@ import typer
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, errors_reported, exit_if_damaged, refuse_ignored, show
+from isiw.text.commands import command
 
 if TYPE_CHECKING:
     from isiw.interval import ProductionRecord
@@ -56,7 +57,7 @@ def interval(  # noqa: PLR0913, PLR0917 - an option each
 
 
 def _way_on(log: Path) -> str:
-    return f"isiw interval {log} --resume"
+    return command("interval", log, "--resume")
 
 
 def _end(record: ProductionRecord) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -15,6 +14,7 @@ import typer
 import isiw
 from isiw.cli import interval, logs, prior, serve, study, threshold
 from isiw.cli.console import NO_DEFAULT, NOT_OVER, Overwrite, errors_reported, exit_if_damaged, show, show_entry
+from isiw.text.commands import command
 
 if TYPE_CHECKING:
     from isiw.repeatability import TimingStudy
@@ -177,7 +177,7 @@ def new_rig(
     with errors_reported():
         for file in isiw.config.write_rig_template(folder):
             show(f"{file}")
-        show(f"It runs as it is, on made-up EMG: isiw run {shlex.quote(str(folder / 'session.toml'))}", style="bold")
+        show(f"It runs as it is, on made-up EMG: {command('run', folder / 'session.toml')}", style="bold")
 
 
 @app.command("show")
@@ -352,7 +352,7 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
         picture = isiw.plots.save_session_plot(record, _free_beside(result.log, ".png"), truth=truth)
         show(f"picture: {picture}")
     except OSError as error:
-        later = f"isiw plot {shlex.quote(str(result.log))}"
+        later = command("plot", result.log)
         show(f"The picture cannot be written ({error.strerror}). The log is complete; draw it later with: {later}")
     if not result.decision.stop:
         raise typer.Exit(NOT_OVER)

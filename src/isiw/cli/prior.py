@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +12,7 @@ from rich.progress import Progress
 import isiw
 from isiw.cli.console import NO_DEFAULT, Overwrite, counted, errors_reported, exit_if_damaged, show
 from isiw.log.outputs import check_output
+from isiw.text.commands import command
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord
@@ -48,7 +48,7 @@ def learn(
             lab = isiw.priors.learn(logs, again=again, damaged=damaged, seed=seed, on_done=note)
         isiw.priors.write_lab_prior(lab, output, overwrite=overwrite)
         _print(lab)
-        show(f"prior: {output}\nRun a session with it: isiw run --prior {shlex.quote(str(output))}")
+        show(f"prior: {output}\nRun a session with it: {command('run', '--prior', output)}")
         exit_if_damaged(losses)
 
 

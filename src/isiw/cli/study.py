@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 import isiw
 from isiw.cli.console import NO_DEFAULT, errors_reported, show
 from isiw.text import plain
+from isiw.text.commands import command
 
 if TYPE_CHECKING:
     from isiw.studies import Store, Unit
@@ -50,7 +51,7 @@ def run(
         folder = store.folder
         processes = (os.cpu_count() or 1) if workers is None else workers
         executor = studies.DaskCluster(scheduler) if scheduler else studies.Processes(processes)
-        kept = f"Interrupted. All that is finished is kept; go on with: isiw study run {folder}"
+        kept = f"Interrupted. All that is finished is kept; go on with: {command('study', 'run', folder)}"
         with errors_reported(kept), _bar(store.left(retry=retry)) as on_done:
             studies.conduct(store.study, folder, executor, retry=retry, on_done=on_done)
         _say_what_is_there(store)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +10,7 @@ from rich.console import Console
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, counted, errors_reported, exit_if_damaged, refuse_ignored, show
+from isiw.text.commands import command
 
 if TYPE_CHECKING:
     from isiw.session import ThresholdRecorder
@@ -102,7 +102,7 @@ def _begun(
 
 
 def _resuming(log: Path) -> str:
-    return f"isiw threshold {shlex.quote(str(log))} --resume"
+    return command("threshold", log, "--resume")
 
 
 def _run(recorder: ThresholdRecorder) -> None:

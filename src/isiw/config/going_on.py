@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Header
 from isiw.session.resume import limits_of_log
 from isiw.strategy.catalogue import make_strategy
+from isiw.text.commands import command
 
 __all__ = ["changes_on_resume", "differences_on_resume", "read_to_resume"]
 
@@ -40,7 +40,7 @@ def read_to_resume(log: Path, config: Path | None) -> SessionRecord:
             "the log and the configuration are swapped",
             got=f"{log} {config}",
             expected="the log first",
-            remedy=f"Type: {shlex.join(['isiw', 'resume', str(config), str(log)])}",
+            remedy=f"Type: {command('resume', config, log)}",
         ) from error
 
 
@@ -131,7 +131,7 @@ def _require_same_simulated(config: RunConfig, record: SessionRecord) -> None:
             "the configuration simulates another person",
             got=f"seed {config.seed}, {config.subject}",
             expected=f"seed {was.seed}, {was.subject}",
-            remedy=f"The log knows its simulated person: isiw resume {shlex.quote(str(record.path))}",
+            remedy=f"The log knows its simulated person: {command('resume', record.path)}",
         )
 
 

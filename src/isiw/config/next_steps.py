@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 
 from isiw.config.taught import learns_from_earlier
 from isiw.errors import LimitExceededError
 from isiw.log.schema import RUN_KEY
 from isiw.session.loop import Session
+from isiw.text.commands import command
 
 __all__ = ["after_end", "after_error"]
 
@@ -54,12 +54,12 @@ def after_end(session: Session, config: Path | None, *, delivered: bool) -> str 
 def _resume(session: Session, config: Path | None, *, named: bool) -> str:
     """The command that goes on; a simulated person is known from the log, so that the file need not be named."""
     files = [session.log_path, config] if named or RUN_KEY not in session.header.config else [session.log_path]
-    return shlex.join(["isiw", "resume", *map(str, filter(None, files))])
+    return command("resume", *filter(None, files))
 
 
 def _anew(session: Session, config: Path | None) -> str:
     """The command that begins a session of the same person, from what this one has found where its strategy can."""
     header = session.header
-    seed = ["--seed", str(header.seed)] if RUN_KEY in header.config else []
-    after = ["--after", str(session.log_path)] if learns_from_earlier(header.strategy.name) else []
-    return shlex.join(["isiw", "run", *([str(config)] if config else []), *seed, *after])
+    seed = ["--seed", header.seed] if RUN_KEY in header.config else []
+    after = ["--after", session.log_path] if learns_from_earlier(header.strategy.name) else []
+    return command("run", *([config] if config else []), *seed, *after)

@@ -13,7 +13,6 @@ Every key may be left out. Example:
 from __future__ import annotations
 
 import dataclasses
-import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self, get_args
@@ -37,6 +36,7 @@ from isiw.errors import ConfigError, did_you_mean
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import RUN_KEY
 from isiw.signals.limits import SignalLimits
+from isiw.text.commands import command
 from isiw.text.toml_files import checked, read_toml
 from isiw.visit import VisitProtocol
 
@@ -169,8 +169,8 @@ def config_of_log(record: SessionRecord) -> RunConfig:
         raise ConfigError(
             "the session was not run by isiw run with a simulated person, so its device is not known here",
             got=record.header.device.name,
-            remedy=f"Name the configuration that has your device, CONFIG: isiw resume {shlex.quote(str(record.path))} "
-            "CONFIG. From other software: isiw.resume(path, device).run(), or for a loop of your own "
+            remedy=f"Name the configuration that has your device, CONFIG: {command('resume', record.path, 'CONFIG')}. "
+            "From other software: isiw.resume(path, device).run(), or for a loop of your own "
             "isiw.open_session(strategy, path, resume=True).",
         )
     return _validated(record.header.config[RUN_KEY], str(record.path))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from isiw.errors import InvalidValueError, LogError
+from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.log.frames import trial_frame
 from isiw.log.onsets import Onset
 from isiw.log.records import Records
@@ -27,6 +27,7 @@ from isiw.log.schema import (
 from isiw.log.verdicts import VERDICTS, under_all
 from isiw.signals.doubts import is_silent
 from isiw.strategy.stopping import StopDecision
+from isiw.text.commands import command
 from isiw.text.found import lacking
 from isiw.trials import Channel, Stimulus, Trial, TrialTable
 
@@ -90,6 +91,20 @@ class SessionRecord:
         The columns are those of `isiw.log.frames.TRIAL_COLUMNS`.
         """
         return trial_frame(self.table, self.onsets, self.estimates)
+
+    def require_end(self) -> None:
+        """Raise where nobody knows how many stimuli were given.
+
+        Raises:
+            DamagedLogError: the log's end is missing.
+        """
+        if self.end_lost:
+            raise DamagedLogError(
+                "the log's end is missing, so nobody knows how many stimuli were given",
+                got=str(self.path),
+                remedy="Look at the stimulator's counter, and resume with the number N of pulses that isiw show does "
+                f"not list: {command('resume', '--lost-pulses', 'N', self.path)}, or isiw.resume(..., lost_pulses=N).",
+            )
 
     @property
     def rests_on_data(self) -> bool:
@@ -191,7 +206,7 @@ def read_salvaged(salvaged: Salvage) -> SessionRecord:
         raise LogError(
             "the log is of a motor threshold, not of a search for a window",
             got=str(record.path),
-            remedy=f"isiw threshold {record.path} --show says what was found.",
+            remedy=f"{command('threshold', record.path, '--show')} says what was found.",
         )
     return record
 
@@ -210,7 +225,7 @@ def read_any(salvaged: Salvage) -> SessionRecord:
         raise LogError(
             "the log is of an interval production task, not of a search for a window",
             got=str(salvaged.path),
-            remedy=f"isiw interval {salvaged.path} --show says what was produced.",
+            remedy=f"{command('interval', salvaged.path, '--show')} says what was produced.",
         )
     records = Records.of(salvaged)
     return SessionRecord(

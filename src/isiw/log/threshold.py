@@ -8,6 +8,7 @@ from isiw.errors import LogError
 from isiw.log.reader import SessionRecord, read_any
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import PulseOutcome
+from isiw.text.commands import command
 
 __all__ = ["outcomes", "pulses_given", "read_threshold", "read_threshold_salvaged"]
 
@@ -39,7 +40,7 @@ def read_threshold_salvaged(salvaged: Salvage) -> SessionRecord:
         raise LogError(
             "the log is of a search for a window, not of a motor threshold",
             got=str(record.path),
-            remedy=f"isiw show {record.path} says what was found.",
+            remedy=f"{command('show', record.path)} says what was found.",
         )
     return record
 

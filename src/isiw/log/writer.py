@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import shlex
 import shutil
 import threading
 import time
@@ -31,6 +30,7 @@ from isiw.log.locks import claimed, refuse_if_locked
 from isiw.log.salvage import Message, Salvage, holds, salvage_file
 from isiw.log.schema import RUN_KEY, AnyHeader, Header, Record
 from isiw.log.topics import CHANNEL_IDS, announcement, decode, encode, is_of_isiw, json_schema, topic_of
+from isiw.text.commands import command
 
 __all__ = ["CONFIGURATION", "LogWriter"]
 
@@ -303,19 +303,19 @@ def _way_on(existing: Path) -> str:
     except LogError:
         return "Choose another path; this is no log that can be continued."
     topics = {message.topic for message in found.messages}
-    name = shlex.quote(str(log_of(existing)))
+    name = log_of(existing)
     if "/production_header" in topics:
-        return f"Choose another path, or go on with it: isiw interval {name} --resume"
+        return f"Choose another path, or go on with it: {command('interval', name, '--resume')}"
     header = _header_of(found)
     if header is None:
         return "Choose another path; nothing of this log can be continued."
     if header.intensities is not None:
-        return f"Choose another path, or go on with it: isiw threshold {name} --resume"
+        return f"Choose another path, or go on with it: {command('threshold', name, '--resume')}"
     if RUN_KEY in header.config:
-        return f"Choose another path, or go on with it: isiw resume {name}"
+        return f"Choose another path, or go on with it: {command('resume', name)}"
     return (
-        f"Choose another path, or go on with it: isiw resume {name} CONFIG, where CONFIG names your device, or in your "
-        "own software isiw.resume(path, device).run() or isiw.open_session(strategy, path, resume=True)."
+        f"Choose another path, or go on with it: {command('resume', name, 'CONFIG')}, where CONFIG names your device, "
+        "or in your own software isiw.resume(path, device).run() or isiw.open_session(strategy, path, resume=True)."
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -14,6 +13,7 @@ from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.places import MOST_APART_MS
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
+from isiw.text.commands import command
 
 __all__ = [
     "recalled",
@@ -85,7 +85,7 @@ def require_whole(record: SessionRecord) -> None:
         raise DamagedLogError(
             "the log is damaged, so that what a person excluded may count as if nobody had",
             got=f"{record.path}: {' '.join(record.losses[:TOLD_LOSSES])}",
-            remedy=f"Leave it out; or, if what isiw show {shlex.quote(str(record.path))} lists is right, let it count "
+            remedy=f"Leave it out; or, if what {command('show', record.path)} lists is right, let it count "
             "all the same: damaged=True, or isiw prior learn --damaged.",
         )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import shlex
 from collections import Counter
 from pathlib import Path
 
@@ -24,6 +23,7 @@ from isiw.report.evidence import (
 from isiw.session.header import OWN_LOOP
 from isiw.session.progress import asked, outcome
 from isiw.strategy.catalogue import known_settings, list_strategies
+from isiw.text.commands import command
 from isiw.text.found import SURE, rules_out
 from isiw.window import MIN_EXCESS_MV, Window
 
@@ -101,13 +101,13 @@ def _resuming(record: SessionRecord, config: Path | None) -> str:
     if record.header.device.name == OWN_LOOP:
         lost = ", lost_pulses=N" if record.end_lost else ""
         return f'isiw.open_session(strategy, "{record.path}", resume=True{lost})'
-    lost = "--lost-pulses N " if record.end_lost else ""
-    command = f"isiw resume {lost}{shlex.quote(str(record.path))}"
+    words = ["resume", *(["--lost-pulses", "N"] if record.end_lost else []), record.path]
     if RUN_KEY in record.header.config:
-        return command
+        return command(*words)
     if config is not None:
-        return f"{command} {shlex.quote(str(config))}"
-    return f"{command} CONFIG, where CONFIG names your device, or in your own software isiw.resume(path, device).run()"
+        return command(*words, config)
+    by_hand = "where CONFIG names your device, or in your own software isiw.resume(path, device).run()"
+    return f"{command(*words, 'CONFIG')}, {by_hand}"
 
 
 def finding_sentences(record: SessionRecord) -> list[str]:
@@ -299,7 +299,7 @@ def _unstated_hit_delay(record: SessionRecord) -> str:
     said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms), which would have saved stimuli"
     if not any(name == "acceleration" for _, name in record.waveforms):
         return f"{said}."
-    return f"{said}; isiw timing {shlex.quote(str(record.path))} measures it."
+    return f"{said}; {command('timing', record.path)} measures it."
 
 
 def _expects_a_tap(record: SessionRecord) -> str:

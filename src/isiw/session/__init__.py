@@ -5,7 +5,7 @@ from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.session.progress import PROGRESS_HEADINGS, aligned, progress_row
 from isiw.session.recorder import Recorder
-from isiw.session.resume import exclude, include, resume
+from isiw.session.resume import resume
 from isiw.session.threshold import ThresholdRecorder, open_threshold, resume_threshold, search_of
 from isiw.session.threshold_loops import open_simulated, run_by_hand, run_simulated, simulated_person
 from isiw.session.updates import SessionResult, SessionUpdate
@@ -18,8 +18,6 @@ __all__ = [
     "SessionUpdate",
     "ThresholdRecorder",
     "aligned",
-    "exclude",
-    "include",
     "open_session",
     "open_simulated",
     "open_threshold",

@@ -19,8 +19,15 @@ from isiw.log.writer import LogWriter
 from isiw.session.believed import believed
 from isiw.session.header import OWN_LOOP, header_of, require_parts
 from isiw.session.recorder import Recorder
-from isiw.session.replay import replay, warn_where_differing
-from isiw.session.resume import ages_s, as_resumed, require_same_person, resumption, with_lost_pulses
+from isiw.session.replay import replay
+from isiw.session.resumption import (
+    ages_s,
+    as_resumed,
+    require_same_person,
+    resumption,
+    warn_where_differing,
+    with_lost_pulses,
+)
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.strategy import Strategy
 from isiw.visit import Visit, VisitProtocol

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import threading
-import warnings
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from types import TracebackType
@@ -13,7 +12,7 @@ from typing import Self
 from isiw.checks import number
 from isiw.devices.clock import ROUNDING_S, Clock
 from isiw.devices.protocol import Readiness
-from isiw.errors import ImplausibleDataWarning, InvalidValueError
+from isiw.errors import ImplausibleDataWarning, InvalidValueError, warn
 from isiw.log.schema import Event, Header
 from isiw.log.writer import LogWriter
 from isiw.session.believed import believed
@@ -276,4 +275,4 @@ class Recorder(Judging):
         if self._on_doubt is not None:
             self._on_doubt(text)
         else:
-            warnings.warn(text, ImplausibleDataWarning, stacklevel=3)
+            warn(text, ImplausibleDataWarning)

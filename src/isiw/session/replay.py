@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from isiw.devices.limits import Limits
-from isiw.errors import ConfigError, InvalidValueError, OtherVersionsWarning, StrategyError
+from isiw.errors import ConfigError, InvalidValueError, OtherVersionsWarning, StrategyError, warn
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent, StrategyRecipe
 from isiw.log.verdicts import VERDICTS, under
@@ -19,7 +17,7 @@ from isiw.strategy.strategy import Strategy
 from isiw.text import plain
 from isiw.trials import Trial, TrialTable
 
-__all__ = ["Replayed", "replay", "resumption_text", "strategy_of", "warn_where_differing"]
+__all__ = ["Replayed", "replay", "strategy_of", "versions_text"]
 
 _COMPARED_AT_EACH_END = 50
 
@@ -131,7 +129,7 @@ def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
         known[key] = value
     if unknown := sorted(settings.keys() - known.keys()):
         text = f"Settings of an earlier version are not known any more, and are as by default: {', '.join(unknown)}."
-        warnings.warn(text, OtherVersionsWarning, stacklevel=3)
+        warn(text, OtherVersionsWarning)
     return known
 
 
@@ -159,52 +157,17 @@ def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> 
         raise StrategyError(
             f"the strategy does not ask again what was asked in trial {intent.trial}",
             got=f"{asked_ms:g} ms",
-            expected=f"{intent.isi_ms} ms, as logged with {_versions_text(header)}",
+            expected=f"{intent.isi_ms} ms, as logged with {versions_text(header)}",
             remedy="Resume with the same strategy and on the same machine, or without verification: the logged trials "
             "are then told as they are.",
         )
 
 
-def _versions_text(header: Header) -> str:
-    logged = {"isiw": header.isiw_version, **header.versions}
-    return plain(", ".join(f"{name} {version}" for name, version in logged.items()))
-
-
-def warn_where_differing(replayed: Replayed, header: Header) -> None:
-    """Warn whoever resumes a session that other versions would have asked something else.
+def versions_text(header: Header) -> str:
+    """The versions that a session was logged with.
 
     Args:
-        replayed: the strategy that has learned the log.
         header: the log's.
     """
-    if replayed.differing:
-        warnings.warn(_differing_text(replayed, header), OtherVersionsWarning, stacklevel=3)
-
-
-def _differing_text(replayed: Replayed, header: Header) -> str:
-    return (
-        f"The session was logged with {_versions_text(header)}, log schema {header.schema_version}. With the versions "
-        f"installed here the strategy would have asked something else in {len(replayed.differing)} of "
-        f"{len(replayed.trials)} trials. The logged trials count as they were; asks from here on may differ from those "
-        "of an uninterrupted session."
-    )
-
-
-def resumption_text(record: SessionRecord, replayed: Replayed, limits: Limits) -> str:
-    """What the log says about a resumption.
-
-    Args:
-        record: the log.
-        replayed: the strategy that has learned it.
-        limits: those that hold from here on.
-    """
-    was_s, now_s = record.header.limits.min_iti_s, limits.min_iti_s
-    sentences = [f"Resumed after {len(replayed.trials)} trials."]
-    if replayed.differing:
-        sentences.append(_differing_text(replayed, record.header))
-    if replayed.unknown:
-        numbers = ", ".join(str(trial.index) for trial in replayed.unknown)
-        sentences.append(f"Outcome unknown: {numbers}.")
-    if was_s != now_s:
-        sentences.append(f"At least {now_s:g} s between two stimuli from here on; it was {was_s:g} s.")
-    return " ".join((*sentences, *record.losses))
+    logged = {"isiw": header.isiw_version, **header.versions}
+    return plain(", ".join(f"{name} {version}" for name, version in logged.items()))

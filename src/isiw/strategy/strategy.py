@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
@@ -16,7 +15,7 @@ from isiw.acquisition.batch import greedy_batch
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
-from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
+from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
 from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
 from isiw.signals.doubts import Doubts, doubt_of, doubt_of_isi, is_silent
 from isiw.signals.plausibility import require_plausible
@@ -257,7 +256,7 @@ class Strategy:
             doubt_of(self._meps_mv, self.detection_limit_mv, self._isis_ms),
         )
         if self._doubts.new is not None:
-            warnings.warn(self._doubts.new.text, ImplausibleDataWarning, stacklevel=2)
+            warn(self._doubts.new.text, ImplausibleDataWarning)
 
     def learn(
         self,

@@ -33,6 +33,7 @@ from isiw.log.durable import put
 from isiw.log.locks import claim
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Study, Unit, study_from, study_values
+from isiw.text.commands import command
 from isiw.text.toml_files import read_toml
 
 __all__ = ["Store", "begin_store", "open_store"]
@@ -183,9 +184,10 @@ def _same(store: Store, kept: Store) -> Store:
     before, now = study_values(kept.study), study_values(store.study)
     differing = [f"{name} was {before[name]!r}, now {now[name]!r}" for name in now if before[name] != now[name]]
     if differing:
+        going_on = command("study", "run", store.folder)
         raise StudyError(
             f"{store.folder} holds another study: {'; '.join(differing)}",
-            remedy=f"Choose another folder, or go on with the study that is there: isiw study run {store.folder}",
+            remedy=f"Choose another folder, or go on with the study that is there: {going_on}",
         )
     return store
 
