@@ -1,6 +1,6 @@
 """Strategies × cohorts × paired people → F1 by trial, coverage, false decisions and latency, the oracle beside them.
 
-    python benchmarks/acquisition.py --out benchmarks/results/acquisition
+    python -m benchmarks.acquisition --out benchmarks/results/acquisition
 
 writes a table (Markdown), its figures with versions, command and seeds (JSON), and a picture (PNG). Sessions run side
 by side, and are kept in a folder as they finish: the same command goes on where it was interrupted. Reported people
@@ -10,27 +10,23 @@ come from seed 10,000 on; seeds below 1,000 are for work.
 from __future__ import annotations
 
 import json
-import platform
-import shlex
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import pandas as pd
-import torch
 import typer
 from rich.progress import Progress
 
-import isiw
+from benchmarks.oracle import SPANS, simulate_oracle
+from benchmarks.provenance import facts_of
+from benchmarks.zero_trials import fixed_windows
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.metrics import trials_to_criterion
 from isiw.plots.study import save_study_plot
 from isiw.studies import Processes, Study, StudyStrategy, conduct, paired_sessions, run_study, summarise
 from isiw.subjects.cohorts import COHORTS
-from oracle import SPANS, simulate_oracle
-from zero_trials import fixed_windows
 
 MARKS = (0, 5, 10, 12, 15, 20, 25, 30, 40, 60, 80)
 CRITERIA = (0.8, 0.9, 0.95)
@@ -106,13 +102,6 @@ def reached(table: pd.DataFrame) -> pd.DataFrame:
         .rename_axis(KEYS[:2])
         .reset_index()
     )
-
-
-def facts_of(script: str, seed: int, people: int) -> dict[str, object]:
-    """What a run was."""
-    versions = {m.__name__: m.__version__ for m in (isiw, torch, np)} | {"python": platform.python_version()}
-    command = shlex.join(["python", script, *sys.argv[1:]])
-    return {"command": command, "versions": versions, "seed": seed, "people": people}
 
 
 def write(rows: pd.DataFrame, facts: dict[str, object], out: Path, fixed: pd.DataFrame | None = None) -> None:
@@ -230,7 +219,8 @@ def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
         if amplitude == 1.0:
             tables.append(run_oracle(replace(study, people=min(people, oracle_people)), workers, progress))
     fixed = fixed_windows(names, people, seed, study.space)
-    write(pd.concat(tables, ignore_index=True), facts_of("benchmarks/acquisition.py", seed, people), out, fixed)
+    facts = facts_of("acquisition", "torch", "numpy", seed=seed, people=people)
+    write(pd.concat(tables, ignore_index=True), facts, out, fixed)
     print(out.with_suffix(".md").read_text())
 
 

@@ -1,6 +1,6 @@
 """The same person another day: what a first session is worth for the second.
 
-    python benchmarks/another_day.py --people 200 --seed 100000 --out benchmarks/results/another_day
+    python -m benchmarks.another_day --people 200 --seed 100000 --out benchmarks/results/another_day
 
 People of `another-day` are measured on the first day with the default, and on the second day with what that session
 taught and, as a yardstick, with the built-in prior.
@@ -18,8 +18,8 @@ import torch
 import typer
 
 import isiw
-from acquisition import facts_of
-from earlier import logged_session, measured, write
+from benchmarks.earlier import logged_session, measured, write
+from benchmarks.provenance import facts_of
 from isiw.models.particles.prior import Prior
 from isiw.studies import SimulatedSession, simulate
 from isiw.subjects import cohort
@@ -86,7 +86,7 @@ def main(
     """Measure the same people on another day."""
     units = [Unit(person, seed, earlier_trials, trials) for person in range(people)]
     rows = measured(examine, units, workers, out)
-    write(summary(rows), facts_of("benchmarks/another_day.py", seed, people), out)
+    write(summary(rows), facts_of("another_day", "torch", "numpy", seed=seed, people=people), out)
 
 
 if __name__ == "__main__":

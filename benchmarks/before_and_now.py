@@ -1,13 +1,13 @@
 """The default of another version of isiw and of this one, on the same simulated people.
 
     git worktree add ../before e31d040
-    PYTHONPATH=../before/src python benchmarks/before_and_now.py run --out before
-    python benchmarks/before_and_now.py run --out now
-    python benchmarks/before_and_now.py compare before now --out benchmarks/results/before_and_now
-    PYTHONPATH=../before/src python benchmarks/before_and_now.py run --cohorts nonresponder --to-stopping --out before
-    python benchmarks/before_and_now.py run --cohorts nonresponder --to-stopping --out now
-    python benchmarks/before_and_now.py stops before now --out benchmarks/results/before_and_now_stops
-    python benchmarks/before_and_now.py speed ../before/src src > benchmarks/results/before_and_now_speed.md
+    PYTHONPATH=../before/src python -m benchmarks.before_and_now run --out before
+    python -m benchmarks.before_and_now run --out now
+    python -m benchmarks.before_and_now compare before now --out benchmarks/results/before_and_now
+    PYTHONPATH=../before/src python -m benchmarks.before_and_now run --cohorts nonresponder --to-stopping --out before
+    python -m benchmarks.before_and_now run --cohorts nonresponder --to-stopping --out now
+    python -m benchmarks.before_and_now stops before now --out benchmarks/results/before_and_now_stops
+    python -m benchmarks.before_and_now speed ../before/src src > benchmarks/results/before_and_now_speed.md
 
 `run` keeps one table a cohort, and goes on where it was interrupted; `compare` pairs the people of both, `stops` where
 the stopping rule of each ends; `speed` has both run the same sessions in turn. The hit delay is stated where a version
@@ -19,7 +19,6 @@ from __future__ import annotations
 import inspect
 import os
 import platform
-import shlex
 import subprocess
 import sys
 import time
@@ -30,6 +29,7 @@ import pandas as pd
 import torch
 import typer
 
+from benchmarks.provenance import command_of, made_with
 from isiw.studies import Processes, Study, StudyStrategy, conduct, run_unit
 
 MARKS = (5, 10, 15, 20, 25, 30, 40)
@@ -80,11 +80,11 @@ def stops(
 
 
 def _write(table: pd.DataFrame, now: Path, out: Path, how: str) -> None:
-    command = shlex.join(["python", "benchmarks/before_and_now.py", *sys.argv[1:]])
+    command = command_of("before_and_now")
     seeds = ", ".join(f"{seed:,}" for seed in pd.read_parquet(next(now.glob("*.parquet")))["seed"].unique())
     lines = [
         f"- command: `{command}`, after `run` with both versions; seed of the people {seeds}",
-        f"- python {platform.python_version()}, torch {torch.__version__}",
+        f"- {made_with('torch')}",
         f"- the hit delay is stated where it can be; {how}",
     ]
     text = table.to_markdown(index=False, floatfmt=".3f")
@@ -105,8 +105,8 @@ def speed(
         spent_s = {source: _lap_s(source, number) for source in order}
         rows.append({"seed": number, "before_s": spent_s[before], "now_s": spent_s[now]})
     table = pd.DataFrame(rows).assign(ratio=lambda t: t["before_s"] / t["now_s"])
-    print(f"- command: `{shlex.join(['python', 'benchmarks/before_and_now.py', *sys.argv[1:]])}`")
-    print(f"- python {platform.python_version()}, torch {torch.__version__}; {platform.machine()}, one thread")
+    print(f"- command: `{command_of('before_and_now')}`")
+    print(f"- {made_with('torch')}; {platform.machine()}, one thread")
     print("- processor time of 50 sessions of `recruitment` side by side, 30 trials each\n")
     print(table.to_markdown(index=False, floatfmt=".2f"))
 
@@ -114,7 +114,7 @@ def speed(
 def _lap_s(source: Path, seed: int) -> float:
     """Processor time of 50 sessions with the isiw in a folder [s]."""
     environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, __file__, "lap", str(seed)]
+    command = [sys.executable, "-m", "benchmarks.before_and_now", "lap", str(seed)]
     ended = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)  # noqa: S603 - this file
     return float(ended.stdout)
 

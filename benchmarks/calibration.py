@@ -1,6 +1,6 @@
 """Whether the posteriors are honest: simulation-based calibration, and coverage on people that no model has drawn.
 
-    python benchmarks/calibration.py --out benchmarks/results/calibration
+    python -m benchmarks.calibration --out benchmarks/results/calibration
 
 First, people of a model's own prior: each has MEPs at random ISIs of the valve space, by the model's own law; the ranks
 of the true edges among the posterior's samples must be uniform, 90 % intervals must hold 90 % of them, and the expected
@@ -12,14 +12,10 @@ from __future__ import annotations
 
 import argparse
 import functools
-import importlib.metadata
 import json
 import math
 import multiprocessing
 import os
-import platform
-import shlex
-import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -36,6 +32,7 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 from isiw.metrics import covers, edge_ranks, f1
 from isiw.models.parametric import ParametricModel
 from isiw.models.protocol import Observation, Posterior, PriorPerson, ResponseModel
@@ -175,11 +172,9 @@ def main() -> None:
     if chosen.people:
         cohorts = ("gaussian", "skewed", "plateau")
         parts.append(markdown(smooth_people("gp-straddle", cohorts, chosen.people, chosen.seed, chosen.workers)))
-    packages = ("isiw", "torch", "pyro-ppl", "gpytorch", "botorch", "numpy")
-    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
-    command = shlex.join(["python", "benchmarks/calibration.py", *sys.argv[1:]])
+    versions, command = made_with("torch", "pyro-ppl", "gpytorch", "botorch", "numpy"), command_of("calibration")
     drawn = f"seed {chosen.seed}, {chosen.replications} people of each model's own, {chosen.trials} trials"
-    facts = f"- command: `{command}`\n- {drawn}\n- python {platform.python_version()}, {versions}"
+    facts = f"- command: `{command}`\n- {drawn}\n- {versions}"
     text = "\n\n".join([facts, *parts])
     print(text)
     chosen.out.with_suffix(".md").write_text(f"{text}\n")

@@ -8,14 +8,13 @@ Sweeps are the tapping robot's, at 5 kHz, in pieces of 1 ms; every preset has it
 from __future__ import annotations
 
 import argparse
-import shlex
-import sys
 import time
 from dataclasses import dataclass
 
 import numpy as np
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 
 PRESETS = ("bench", "subject1", "subject2", "subject3", "subject4", "cushion")
 SWEEPS, PIECE = 2500, 5
@@ -66,8 +65,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sweeps", type=int, default=SWEEPS)
     sweeps = parser.parse_args().sweeps
-    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.impact_stream', *sys.argv[1:]])}`")
-    print(f"- isiw {isiw.__version__}, numpy {np.__version__}, seed {SEED}\n")
+    print(f"- command: `{command_of('impact_stream')}`")
+    print(f"- {made_with('numpy')}, seed {SEED}\n")
     print(
         "| preset | sweeps | same as in the whole sweep | delay [ms]: median | largest | 1 ms of samples takes [ms] |"
     )

@@ -12,9 +12,6 @@ from seed 10,000 on; seeds below 1,000 are for work.
 from __future__ import annotations
 
 import json
-import platform
-import shlex
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -24,12 +21,11 @@ from typing import Annotated, Any, Final
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-import torch
 import typer
 
-import isiw
 from benchmarks.inhibition_claims import all_claims, choices_of_curves
 from benchmarks.opposed_oracle import OpposedOracle
+from benchmarks.provenance import facts_of
 from isiw import DesignSpace, VisitProtocol, make_strategy
 from isiw.metrics import f1
 from isiw.subjects import RecruitmentResponse, SimulatedSubject, cohort
@@ -165,13 +161,6 @@ def picture(table: pd.DataFrame, curves: pd.DataFrame, example: SimulatedSubject
     figure.savefig(out.with_suffix(".png"), dpi=110)
 
 
-def facts_of(seed: int, people: int) -> dict[str, Any]:
-    """What the run was."""
-    versions = {m.__name__: m.__version__ for m in (isiw, torch, np)} | {"python": platform.python_version()}
-    command = shlex.join(["python", "-m", "benchmarks.inhibition", *sys.argv[1:]])
-    return {"command": command, "versions": versions, "seed": seed, "people": people}
-
-
 def main(
     people: Annotated[int, typer.Option(help="People a group.")] = 60,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 10_000,
@@ -188,7 +177,7 @@ def main(
     curves, example = choices_of_curves(SWEPT, seed), cohort(GROUPS[0], 4, seed)[3]
     tables = {"By trial": by_trial(rows), "Behind the oracle": behind_oracle(rows), "Curves": curves}
     claims = all_claims(SWEPT, seed, curves)
-    facts = facts_of(seed, people)
+    facts = facts_of("inhibition", "torch", "numpy", seed=seed, people=people)
     header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
     parts = [f"## {title}\n\n{part.to_markdown(index=False, floatfmt='.3f')}\n" for title, part in tables.items()]
     said = pd.DataFrame(claims).to_markdown(index=False)

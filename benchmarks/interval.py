@@ -10,11 +10,7 @@ Bayesian optimisation over runs, since the text seems to show one.
 
 from __future__ import annotations
 
-import importlib.metadata
 import json
-import platform
-import shlex
-import sys
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -29,6 +25,7 @@ from scipy.optimize import minimize
 import isiw
 from benchmarks.dissertation.claims import Claim, claims_as_json
 from benchmarks.interval_pictures import draw
+from benchmarks.provenance import facts_of
 from isiw.interval import Block, LightSearch, Producer, produce, score_pct, search_light
 
 SEED, FIT_SEED = 10_000, 0
@@ -365,10 +362,7 @@ def main(
 
 def write(out: Path, claims: list[Claim], readings: pd.DataFrame) -> None:
     """Write the claims as JSON and as a table."""
-    facts = {
-        "command": f"python -m benchmarks.interval {shlex.join(sys.argv[1:])}",
-        "versions": {"python": platform.python_version()}
-        | {name: importlib.metadata.version(name) for name in ("isiw", "numpy", "botorch", "torch")},
+    facts = facts_of("interval", "numpy", "botorch", "torch") | {
         "seeds": f"from {SEED}; fitted on {FIT_SEED}",
         "people": GROUPS * GROUP,
         "runs": RUNS,

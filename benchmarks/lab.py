@@ -1,8 +1,8 @@
 """The eleventh person of a lab: what ten sessions of its own people are worth.
 
-    python benchmarks/lab.py --labs 20 --seed 100000 --out benchmarks/results/lab
-    python benchmarks/lab.py --labs 20 --seed 100000 --stated --out benchmarks/results/lab_stated
-    python benchmarks/lab.py --labs 20 --misfits 0 --priors "told,windows known" --out benchmarks/results/lab_bound
+    python -m benchmarks.lab --labs 20 --seed 100000 --out benchmarks/results/lab
+    python -m benchmarks.lab --labs 20 --seed 100000 --stated --out benchmarks/results/lab_stated
+    python -m benchmarks.lab --labs 20 --misfits 0 --priors "told,windows known" --out benchmarks/results/lab_bound
 
 In each lab ten people are measured with the default, and a prior is learnt from their logs; then other people of the
 lab, and people who do not belong there, are measured with the built-in prior, with the learnt one, and with a prior
@@ -27,8 +27,8 @@ import torch
 import typer
 
 import isiw
-from acquisition import facts_of
-from earlier import logged_session, measured, write
+from benchmarks.earlier import logged_session, measured, write
+from benchmarks.provenance import facts_of
 from isiw.checks import choice
 from isiw.design import VALVE_SPACE
 from isiw.models.particles.laws import Floor, Muscle, NoiseShares
@@ -193,7 +193,7 @@ def main(  # noqa: PLR0913, PLR0917 - the options of the command line
     names = tuple(choice("the prior", name, PRIORS) for name in priors.split(","))
     units = [Unit(kind, s, people, misfits, trials, names, stated) for kind in kinds.split(",") for s in seeds]
     rows = measured(examine, units, workers, out)
-    write(summary(rows), facts_of("benchmarks/lab.py", seed, people), out)
+    write(summary(rows), facts_of("lab", "torch", "numpy", seed=seed, people=people), out)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """How long a strategy takes between two stimuli: ask and tell at 50 trials, on one core, beside plain BoTorch.
 
-    python benchmarks/latency.py > benchmarks/results/latency.md
+    python -m benchmarks.latency > benchmarks/results/latency.md
 
 Each strategy examines the same simulated people of the `recruitment` cohort in the valve space. Timed are the asks and
 tells of trials 46 to 55, each ask with the tell before it; the other trials are run but not counted. Before that the
@@ -11,12 +11,9 @@ default is timed through whole long sessions, and the memory told that the proce
 from __future__ import annotations
 
 import argparse
-import importlib.metadata
 import os
 import platform
 import resource
-import shlex
-import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -34,6 +31,7 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 from isiw.subjects.cohorts import cohort
 
 TIMED_TRIALS = range(46, 56)
@@ -118,10 +116,9 @@ def main() -> None:
     # What BoTorch has to say about the scaling of its inputs is not what is measured here.
     warnings.filterwarnings("ignore", module="botorch|gpytorch|linear_operator")
     names = arguments.strategies.split(",")
-    packages = ("isiw", "torch", "botorch", "gpytorch", "pyro-ppl", "scikit-learn", "numpy")
-    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
-    print(f"- command: `{shlex.join(['python', 'benchmarks/latency.py', *sys.argv[1:]])}`")
-    print(f"- python {platform.python_version()}, {versions}; {platform.machine()}, one thread\n")
+    versions = made_with("torch", "botorch", "gpytorch", "pyro-ppl", "scikit-learn", "numpy")
+    print(f"- command: `{command_of('latency')}`")
+    print(f"- {versions}; {platform.machine()}, one thread\n")
     through = range(1, arguments.through + 1)
     print(f"The default, {arguments.long_people} people, trials 1 to {arguments.through} [ms]\n")
     print("| | median | 99th percentile | largest |\n|---|---|---|---|")

@@ -1,7 +1,7 @@
 """What stands between the default and the oracle: the default again, told ever more about the people it meets.
 
-    python benchmarks/limits.py --out benchmarks/results/limits
-    python benchmarks/limits.py --cohorts steep,late,flat,weak --seed 100000 --out benchmarks/results/limits_off_map
+    python -m benchmarks.limits --out benchmarks/results/limits
+    python -m benchmarks.limits --cohorts steep,late,flat,weak --seed 100000 --out benchmarks/results/limits_off_map
 
 The oracle knows a person's response and that there is a window. Here the default's own model is given the cohort's
 laws as its prior, first with "no window" as probable as the default has it, then knowing that there is one. Uniform
@@ -18,7 +18,8 @@ import pandas as pd
 import typer
 from rich.progress import Progress
 
-from acquisition import MARKS, facts_of, run, run_oracle, write
+from benchmarks.acquisition import MARKS, run, run_oracle, write
+from benchmarks.provenance import facts_of
 from isiw.studies import Study, StudyStrategy
 
 # The laws of the cohorts, as one component a block; a number that is the same in everybody has a small SD.
@@ -95,7 +96,7 @@ def main(
         for name, study in studies(cohorts.split(","), plan | {"engine": "batched", "hit_delay": "stated"}).items():
             tables += [run(study, out.with_suffix(".parts") / name, workers, progress)]
             tables += [run_oracle(study, workers, progress)]
-    write(pd.concat(tables, ignore_index=True), facts_of("benchmarks/limits.py", seed, people), out)
+    write(pd.concat(tables, ignore_index=True), facts_of("limits", "torch", "numpy", seed=seed, people=people), out)
     print(out.with_suffix(".md").read_text())
 
 

@@ -11,10 +11,7 @@ It is the line that is tried, so the strategy costs next to nothing, and depends
 from __future__ import annotations
 
 import argparse
-import importlib.metadata
 import logging
-import platform
-import shlex
 import sys
 import tempfile
 import time
@@ -28,6 +25,7 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 from benchmarks.remembering import SPACE, answer, strategy
 from isiw.testing import PEER_COMMANDS, Lie, PulsePeer, check_ledger
 
@@ -101,9 +99,8 @@ def counted(record: isiw.SessionRecord) -> Counter[str]:
 
 def report(counts: Counter[str], lies: Counter[Lie], trials: int, first: int, spent_s: float) -> None:
     """Print the counts."""
-    versions = {name: importlib.metadata.version(name) for name in ("isiw", "mcap", "numpy", "torch")}
-    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.line_peer', *sys.argv[1:]])}`")
-    print(f"- python {platform.python_version()}, {', '.join(f'{name} {v}' for name, v in versions.items())}\n")
+    print(f"- command: `{command_of('line_peer')}`")
+    print(f"- {made_with('mcap', 'numpy', 'torch')}\n")
     print(
         f"{counts['sessions']:,} sessions of {trials} trials (seeds {first} to {first + counts['sessions'] - 1}) over "
         f"TCP on the loopback, run {counts['runs']:,} times in all, in {spent_s / 60:.1f} minutes: "

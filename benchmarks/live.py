@@ -12,8 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import platform
-import shlex
 import shutil
 import statistics
 import subprocess
@@ -27,12 +25,11 @@ from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import fastapi
-import uvicorn
 from mcap.reader import make_reader
 from playwright.sync_api import sync_playwright
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 
 SPACE = isiw.DesignSpace(0, 320, reference="impact")
 
@@ -217,9 +214,8 @@ def _ratio(ratios: list[float]) -> str:
 
 def _say_how(load: float) -> None:
     print("# The live page\n")
-    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.live', *sys.argv[1:]])}`")
-    libraries = f"fastapi {fastapi.__version__}, uvicorn {uvicorn.__version__}"
-    print(f"- isiw {isiw.__version__}, python {platform.python_version()}, {libraries}, one thread")
+    print(f"- command: `{command_of('live')}`")
+    print(f"- {made_with('fastapi', 'uvicorn')}, one thread")
     print(f"- {os.cpu_count()} cores that other programs shared; load average {load:.0f} before\n")
 
 

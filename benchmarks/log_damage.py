@@ -11,10 +11,6 @@ from __future__ import annotations
 
 import argparse
 import collections
-import importlib.metadata
-import platform
-import shlex
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -25,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 
 TRIALS = 20
 ALLOWED_S = 2.0
@@ -130,8 +127,8 @@ def main() -> None:
         found = list(faults(path, content, cases))
     ways = collections.Counter("cut" if case.bit is None else "flipped" for case in cases)
     wrong = collections.Counter(fault.wrong for fault in found)
-    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.log_damage', *sys.argv[1:]])}`")
-    print(f"- python {platform.python_version()}, mcap {importlib.metadata.version('mcap')}, seeds 0 (bits) and 7\n")
+    print(f"- command: `{command_of('log_damage')}`")
+    print(f"- {made_with('mcap')}, seeds 0 (bits) and 7\n")
     print(
         f"A log of {TRIALS} trials without waveforms, {len(content):,} bytes: cut at {ways['cut']:,} of them, and with "
         f"one random bit flipped in {ways['flipped']:,}.\n"

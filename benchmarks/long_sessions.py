@@ -10,9 +10,6 @@ resumed; it goes on identically where it asks what the log says it would ask nex
 from __future__ import annotations
 
 import argparse
-import platform
-import shlex
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -21,6 +18,7 @@ import numpy as np
 import torch
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 from isiw.strategy.stopping import Budget
 
 SPACE = isiw.DesignSpace(0, 200, reference="valve")
@@ -102,8 +100,8 @@ def main() -> None:
                 resumptions.append(f"| {name} | {trials:,} | {spent_s:.1f} | {'yes' if identical else 'NO'} |")
             near = [cost_ms[max(0, at - NEAR) : at] for at in AT if at <= arguments.most]
             costs.append(f"| {name} | {' | '.join(f'{np.median(part):.0f} ({part.mean():.0f})' for part in near)} |")
-    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.long_sessions', *sys.argv[1:]])}`")
-    print(f"- isiw {isiw.__version__}, python {platform.python_version()}, torch {torch.__version__}, one thread")
+    print(f"- command: `{command_of('long_sessions')}`")
+    print(f"- {made_with('torch')}, one thread")
     print("- seeds: 3 (strategy), 7 (person)\n")
     reached = [at for at in AT if at <= arguments.most]
     print(f"What a trial costs at trial … [ms of the processor]: median (mean) of the last {NEAR}\n")

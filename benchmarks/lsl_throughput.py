@@ -12,9 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
-import platform
-import shlex
-import sys
 import threading
 import time
 import uuid
@@ -25,6 +22,7 @@ import numpy as np
 import pylsl
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 
 CHUNK_S = 0.01
 UNITS = {"emg": "mV"} | {f"channel{number}": "V" for number in range(2, 9)}
@@ -110,8 +108,8 @@ def main() -> None:
         numbers, took_s, mixed = measure(device, arguments.seconds)
         spent_s = time.process_time() - spent_s
     span = int(numbers[-1] - numbers[0]) + 1
-    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.lsl_throughput', *sys.argv[1:]])}`")
-    print(f"- isiw {isiw.__version__}, python {platform.python_version()}, liblsl {pylsl.library_version() / 100:g},")
+    print(f"- command: `{command_of('lsl_throughput')}`")
+    print(f"- {made_with('pylsl')}, liblsl {pylsl.library_version() / 100:g},")
     print(
         f"  {len(UNITS)} channels at {arguments.rate_hz:g} Hz, two processes on one machine over its loopback network\n"
     )

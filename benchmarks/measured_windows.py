@@ -9,8 +9,6 @@ Each person is swept as in the text (4.2.1): every 5 ms, the mean of ten MEPs, t
 from __future__ import annotations
 
 import math
-import shlex
-import sys
 from typing import Annotated
 
 import numpy as np
@@ -18,6 +16,7 @@ import pandas as pd
 import typer
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 from benchmarks.reduction.readings import PEOPLE
 from benchmarks.reduction.recorded import RecordedSweep, record
 from isiw.design import VALVE_SPACE
@@ -110,8 +109,8 @@ def main(
     pairs = zip(MEASURED_KIM, people, strict=True)
     table = pd.DataFrame([row(n, text, subject, sweeps, seed) for n, (text, subject) in enumerate(pairs, 1)])
     print("# Measured windows of `kim11-measured`\n")
-    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.measured_windows', *sys.argv[1:]])}`")
-    print(f"- isiw {isiw.__version__}, numpy {np.__version__}; {sweeps} sweeps of each person, seed {seed}\n")
+    print(f"- command: `{command_of('measured_windows')}`")
+    print(f"- {made_with('numpy')}; {sweeps} sweeps of each person, seed {seed}\n")
     print("\n".join(f"- {sentence}" for sentence in verdicts(table)) + "\n")
     print(table.round(2).to_markdown(index=False))
     print(f"\n{NOTE}")

@@ -1,7 +1,7 @@
 """The default on people whom its prior was written for, and on people off the map.
 
-    python benchmarks/people.py --cohorts recruitment,gaussian,late --hit-delay stated --out benchmarks/results/people
-    python benchmarks/people.py --cohorts electrical --space impact --out benchmarks/results/people_electrical
+    python -m benchmarks.people --cohorts recruitment,gaussian,late --hit-delay stated --out benchmarks/results/people
+    python -m benchmarks.people --cohorts electrical --space impact --out benchmarks/results/people_electrical
 
 writes tables (Markdown) and their figures with versions, command and seeds (JSON): F1 and coverage by trial, what the
 stopping rule comes to, and how well the expected F1 foretells the actual one. Sessions are kept in a folder beside the
@@ -20,10 +20,11 @@ import pandas as pd
 import typer
 from rich.progress import Progress
 
-from acquisition import facts_of, run, run_oracle, space_of
+from benchmarks.acquisition import run, run_oracle, space_of
+from benchmarks.provenance import facts_of
+from benchmarks.zero_trials import without_any_trial
 from isiw.models.particles.prior import Prior
 from isiw.studies import Study, StudyStrategy
-from zero_trials import without_any_trial
 
 MARKS = (5, 10, 15, 20, 25, 30, 40, 50, 60, 80)
 TENTHS = 10
@@ -123,7 +124,7 @@ def main(
         "At the stopping rule": at_stopping(rows),
         "Expected F1": foretold(rows),
     }
-    facts = facts_of("benchmarks/people.py", seed, people)
+    facts = facts_of("people", "torch", "numpy", seed=seed, people=people)
     header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
     parts = [f"## {title}\n\n{part.to_markdown(floatfmt='.3f')}\n" for title, part in tables.items()]
     out.with_suffix(".md").write_text("\n".join([header, "", *parts]))

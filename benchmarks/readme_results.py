@@ -1,6 +1,6 @@
 """The results table and picture of the README, and its paragraph on the reproduction, from the results beside this.
 
-    python benchmarks/readme_results.py
+    python -m benchmarks.readme_results
 
 prints the table and the paragraph, to be put between the `results` and the `reproduction` marks of the README, and
 draws `docs/images/results.svg`.

@@ -1,6 +1,6 @@
 """Strategies on people whose MEPs were recorded.
 
-    python benchmarks/recorded.py --out benchmarks/results/recorded
+    python -m benchmarks.recorded --out benchmarks/results/recorded
 
 What facilitation does to recorded amplitudes is put together in five ways, and non-responders have theirs as well
 (`recorded_people.py`). What it writes is told as in `benchmarks/acquisition.py`.
@@ -15,10 +15,11 @@ import pandas as pd
 import typer
 from rich.progress import Progress
 
-from acquisition import MARKS, facts_of, write
+from benchmarks.acquisition import MARKS, write
+from benchmarks.provenance import facts_of
+from benchmarks.recorded_people import FOLDER, PEOPLE, RecordedSession
 from isiw.studies import Failure, Processes, SimulatedSession
 from isiw.studies.batch import simulate_batch
-from recorded_people import FOLDER, PEOPLE, RecordedSession
 
 
 def batches(
@@ -54,7 +55,7 @@ def main(
                 raise SystemExit(f"a batch failed: {result.error}\n{result.details}")
             tables.append(result)
             progress.advance(bar)
-    write(pd.concat(tables, ignore_index=True), facts_of("benchmarks/recorded.py", seed, people), out)
+    write(pd.concat(tables, ignore_index=True), facts_of("recorded", "torch", "numpy", seed=seed, people=people), out)
     print(out.with_suffix(".md").read_text())
 
 

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import argparse
 import os
-import platform
 import random
-import shlex
 import sys
 import tempfile
 import time
@@ -21,11 +19,10 @@ from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import fastapi
 import numpy as np
-import uvicorn
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 from benchmarks.server_tries import Served, fuzzed, killed, tried
 
 SPACE: dict[str, Any] = {"low_ms": 0, "high_ms": 320, "reference": "impact"}
@@ -172,9 +169,9 @@ def main() -> None:
     parser.add_argument("--number", type=int, default=None, help="of trials, requests, kills or examples")
     arguments = parser.parse_args()
     print("# The server\n")
-    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.server', *sys.argv[1:]])}`")
-    versions = f"python {platform.python_version()}, fastapi {fastapi.__version__}, uvicorn {uvicorn.__version__}"
-    print(f"- isiw {isiw.__version__}, {versions}, one thread, {os.cpu_count()} cores that other programs shared\n")
+    print(f"- command: `{command_of('server')}`")
+    versions = made_with("fastapi", "uvicorn")
+    print(f"- {versions}, one thread, {os.cpu_count()} cores that other programs shared\n")
     for name in arguments.parts:
         part, usual = PARTS[name]
         with tempfile.TemporaryDirectory() as folder:

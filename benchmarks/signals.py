@@ -1,13 +1,12 @@
 """How long the signals take: one sweep of 1 s with five channels at 5 kHz, and 1,000 of them in a batch, on one core.
 
-    OMP_NUM_THREADS=1 python benchmarks/signals.py > benchmarks/results/signals.txt
+    OMP_NUM_THREADS=1 python -m benchmarks.signals > benchmarks/results/signals.txt
 
 One sweep: all its events, and its judgement. A batch: all events, MEP amplitudes, onsets, and background EMG.
 """
 
 from __future__ import annotations
 
-import importlib.metadata
 import os
 import platform
 import statistics
@@ -20,6 +19,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 import isiw
+from benchmarks.provenance import made_with
 
 SWEEPS, REPEATS = 1000, 7
 RATE_HZ, ISI_MS = 5000.0, 60.0
@@ -65,8 +65,7 @@ def main() -> None:
         isiw.signals.mep_onsets(waves["emg"], RATE_HZ, pulses)
         isiw.signals.background_rms(waves["emg"], RATE_HZ, pulses, events.hit_ms)
 
-    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in ("isiw", "numpy", "scipy"))
-    print(f"python {platform.python_version()}, {versions}; {platform.machine()}, one thread")
+    print(f"{made_with('numpy', 'scipy')}; {platform.machine()}, one thread")
     print(f"channels: {', '.join(waves)}; {waves['emg'].shape[1]} samples at {RATE_HZ:g} Hz")
     for what, work, repeats, limit_s in (
         ("one sweep", one_sweep, 200, SWEEP_LIMIT_S),

@@ -10,7 +10,6 @@ session in which nothing is wrong, and one in which no pulse comes any more afte
 from __future__ import annotations
 
 import itertools
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal, get_args
@@ -19,6 +18,7 @@ import numpy as np
 import pandas as pd
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 from isiw.design import VALVE_SPACE
 from isiw.signals.doubts import stopped_after
 from isiw.types import FloatArray
@@ -93,8 +93,8 @@ def main() -> None:
     kinds = (Kind(*values) for values in itertools.product(COHORTS, get_args(Asked), LIMITS_MV))
     table = pd.DataFrame([measured(kind) for kind in kinds])
     intro = (
-        f"# A stimulator that stops firing\n\n`python -m benchmarks.silence`, seed {SEED}, isiw {isiw.__version__}, "
-        f"Python {sys.version.split()[0]}\n\n{PEOPLE} people of each kind, {TRIALS} trials; in the sessions that stop, "
+        f"# A stimulator that stops firing\n\n`{command_of('silence')}`, seed {SEED}, {made_with()}\n\n"
+        f"{PEOPLE} people of each kind, {TRIALS} trials; in the sessions that stop, "
         f"no pulse comes after the first {FIRED}.\nWhere few pulses are answered, silence may be chance.\n\n"
     )
     text = f"{intro}{table.to_markdown(index=False)}\n"

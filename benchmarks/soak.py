@@ -14,11 +14,8 @@ from __future__ import annotations
 
 import argparse
 import faulthandler
-import importlib.metadata
 import json
 import math
-import platform
-import shlex
 import sys
 import tempfile
 import time
@@ -31,6 +28,7 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 from benchmarks.remembering import SPACE, answer, strategy
 from isiw.testing import Fault, FaultyDevice, check_ledger
 
@@ -166,9 +164,8 @@ class Tally:
     def report(self, trials: int) -> None:
         """Print the counts."""
         counts = self.counts
-        versions = {name: importlib.metadata.version(name) for name in ("mcap", "numpy", "torch")}
-        print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.soak', *sys.argv[1:]])}`")
-        print(f"- python {platform.python_version()}, {', '.join(f'{name} {v}' for name, v in versions.items())}\n")
+        print(f"- command: `{command_of('soak')}`")
+        print(f"- {made_with('mcap', 'numpy', 'torch')}\n")
         print(
             f"{counts['sessions']:,} sessions of {trials} trials (seeds {self.first} to {self.next_seed - 1}, "
             f"{counts['named']:,} with a named strategy), run {counts['runs']:,} times in all: "

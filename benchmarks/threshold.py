@@ -8,9 +8,6 @@ Every person has a resting motor threshold of 30-80 % MSO and the recruitment cu
 
 from __future__ import annotations
 
-import platform
-import shlex
-import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
@@ -18,10 +15,10 @@ from typing import Annotated
 
 import numpy as np
 import pandas as pd
-import scipy
 import typer
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 from isiw.strategy.threshold import IntensityRange, ThresholdSearch, make_threshold_search
 from isiw.strategy.threshold.hotspot import BayesHotSpot, CoilPulse, WalkedHotSpot
 from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
@@ -168,8 +165,7 @@ def main(
     found = [row for cohort in ("recruitment", "hand") for row in spot_rows(cohort, spots, seed)]
     print(f"""# The resting motor threshold and the hot spot
 
-Command: `python -m benchmarks.threshold {shlex.join(sys.argv[1:])}`, seed {seed}, isiw {isiw.__version__}, Python
-{platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}.
+Command: `{command_of("threshold")}`, seed {seed}, {made_with("numpy", "scipy")}.
 
 {n} people of each cohort, range {SPACE}. Errors in % MSO, mean ± standard error. "± 2 % MSO" is the posterior's SD.
 

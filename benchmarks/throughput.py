@@ -1,7 +1,7 @@
 """How many sessions of 30 trials of the default strategy a study runs per second: one at a time, and side by side.
 
-    python benchmarks/throughput.py > benchmarks/results/throughput.md
-    python benchmarks/throughput.py --law 500 > benchmarks/results/batch_law.md
+    python -m benchmarks.throughput > benchmarks/results/throughput.md
+    python -m benchmarks.throughput --law 500 > benchmarks/results/batch_law.md
 
 The sessions are those of a study on the `recruitment` cohort in the valve space whose stopping rule is ignored and
 whose estimate is recorded after 10, 20 and 30 trials. Timed is from the first session handed out to the last one
@@ -12,10 +12,8 @@ well. With `--law` nothing is timed: the mean F1 of both engines is compared on 
 from __future__ import annotations
 
 import argparse
-import importlib.metadata
 import os
 import platform
-import shlex
 import sys
 import time
 from dataclasses import replace
@@ -25,6 +23,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import pandas as pd
 import torch
 
+from benchmarks.provenance import command_of, made_with
 from isiw.studies import Failure, Processes, Study, StudyStrategy, run_unit
 
 TRIALS = 30
@@ -100,9 +99,8 @@ def main() -> None:
         stopping="ignored",
         batch=arguments.batch,
     )
-    versions = {name: importlib.metadata.version(name) for name in ("isiw", "torch", "numpy", "joblib")}
-    print(f"- command: `{shlex.join(['python', 'benchmarks/throughput.py', *sys.argv[1:]])}`")
-    print(f"- python {platform.python_version()}, {', '.join(f'{name} {v}' for name, v in versions.items())}")
+    print(f"- command: `{command_of('throughput')}`")
+    print(f"- {made_with('torch', 'numpy', 'joblib')}")
     print(f"- {os.cpu_count()} cores, {platform.machine()}; one torch thread a worker\n")
     if arguments.law:
         print_law(plan, arguments.workers)

@@ -10,9 +10,6 @@ file with that version's `src` in PYTHONPATH.
 from __future__ import annotations
 
 import argparse
-import platform
-import shlex
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -21,6 +18,7 @@ import numpy as np
 import torch
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 from benchmarks.remembering import SPACE, answer, strategy
 
 
@@ -48,8 +46,8 @@ def main() -> None:
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory(dir=arguments.folder) as folder:
         spent_ms = 1e3 * trial_s(Path(folder), arguments.trials)
-    print(f"- command: `{shlex.join(['python', '-m', 'benchmarks.trial_cost', *sys.argv[1:]])}`")
-    print(f"- isiw {isiw.__version__}, python {platform.python_version()}, one thread\n")
+    print(f"- command: `{command_of('trial_cost')}`")
+    print(f"- {made_with()}, one thread\n")
     print("| trials | median, by the clock [ms] | median, of the processor [ms] |\n|---|---|---|")
     for part in np.array_split(np.arange(len(spent_ms)), 5):
         clock_ms, processor_ms = np.median(spent_ms[part], axis=0)

@@ -9,12 +9,8 @@ project's root. Reported people come from seed 10,000 on; seeds below 1,000 are 
 
 from __future__ import annotations
 
-import importlib.metadata
 import os
-import platform
-import shlex
 import shutil
-import sys
 import time
 from pathlib import Path
 from types import ModuleType
@@ -27,6 +23,7 @@ import pandas as pd
 import typer
 
 from benchmarks.dissertation.claims import claims_as_json
+from benchmarks.provenance import command_of, made_with
 from benchmarks.reduction import (
     before,
     comparison,
@@ -50,7 +47,7 @@ Measured = tuple[dict[str, pd.DataFrame], list[Any]]
 
 RESULTS = Path("benchmarks/results/trial_reduction")
 PARTS = (comparison, reading_table, pf_readings, headline, initial, particles, gaussians)
-VERSIONS = ("isiw", "numpy", "scipy", "torch", "scikit-learn", "statsmodels")
+VERSIONS = ("numpy", "scipy", "torch", "scikit-learn", "statsmodels")
 
 
 def measured(size: Size, seed: int, workers: Workers) -> Measured:
@@ -86,12 +83,11 @@ def report(found: Measured, facts: dict[str, Any], out: Path) -> None:
     write(sections, facts, out, opening, claims_as_json(claims))
 
 
-def facts_of(size: Size, seed: int, processes: int, took: str) -> dict[str, object]:
+def facts(size: Size, seed: int, processes: int, took: str) -> dict[str, object]:
     """What a run was; telling it again does not change it."""
-    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in VERSIONS)
     return {
-        "command": f"`{shlex.join(['python', '-m', 'benchmarks.trial_reduction', *sys.argv[1:]])}`",
-        "versions": f"python {platform.python_version()}, {versions}",
+        "command": f"`{command_of('trial_reduction')}`",
+        "versions": made_with(*VERSIONS),
         "seed": seed,
         "sessions": ", ".join(f"{name} {count}" for name, count in vars(size).items()),
         "took": f"{took} with {processes} process{'' if processes == 1 else 'es'}",
@@ -126,7 +122,7 @@ def run(size: Size, seed: int, processes: int, kept: Path, *, go_on: bool) -> No
         shutil.rmtree(folder, ignore_errors=True)
     found = measured(size, seed, Workers(processes, folder))
     took = f"{(time.monotonic() - began_s) / 60:.1f} minutes{' after an interruption' if go_on else ''}"
-    joblib.dump((found, facts_of(size, seed, processes, took)), kept)
+    joblib.dump((found, facts(size, seed, processes, took)), kept)
     shutil.rmtree(folder)
 
 

@@ -8,12 +8,8 @@ and a picture of the plane. It takes one to two minutes on one core.
 
 from __future__ import annotations
 
-import importlib.metadata
 import json
 import math
-import platform
-import shlex
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +20,7 @@ import pandas as pd
 import typer
 from matplotlib.figure import Figure
 
+from benchmarks.provenance import facts_of
 from benchmarks.vane_claims import FULL, claims_of
 from isiw import Rotor, Vane, repeatability
 from isiw.devices.robot.vane.actuator import Load, Supply
@@ -204,13 +201,6 @@ def draw(shares: FloatArray, delays: FloatArray, line: pd.DataFrame) -> Figure:
     return figure
 
 
-def facts_of_run() -> dict[str, Any]:
-    """Command, versions and seed."""
-    versions = {name: importlib.metadata.version(name) for name in ("isiw", "numpy", "scipy", "pandas")}
-    command = shlex.join(["python", "-m", "benchmarks.vane", *sys.argv[1:]])
-    return {"command": command, "versions": versions | {"python": platform.python_version()}, "seed": SEED}
-
-
 def main(out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("vane")) -> None:
     """Compare the simulated actuator with chapter 7."""
     found, sweep_s = plane()
@@ -223,7 +213,7 @@ def main(out: Annotated[Path, typer.Option(help="Path of the results, without su
         "Errors of the solver [%]": pd.DataFrame([accuracy()]),
         "Strokes over the full range [ms after 500 ms at rest]": study.event_table.reset_index(),
     }
-    facts = facts_of_run() | {"seconds for 20 x 20": round(sweep_s, 1)}
+    facts = facts_of("vane", "numpy", "scipy", "pandas", seed=SEED) | {"seconds for 20 x 20": round(sweep_s, 1)}
     names = ("row", "courses", "influences", "accuracy", "strokes")
     claims = claims_of(HEIGHTS_MM, DEPTHS_MM, shares, delays, dict(zip(names, tables.values(), strict=True)))
     write(out, facts, tables | {"Claim by claim": pd.DataFrame(claims)}, shares, delays)

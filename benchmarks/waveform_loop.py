@@ -1,7 +1,7 @@
 """Whether a closed loop on waveforms ends in windows as good as one on amplitudes.
 
-    python benchmarks/waveform_loop.py --reference impact > benchmarks/results/waveform_loop_impact.txt
-    python benchmarks/waveform_loop.py --reference valve > benchmarks/results/waveform_loop_valve.txt
+    python -m benchmarks.waveform_loop --reference impact > benchmarks/results/waveform_loop_impact.txt
+    python -m benchmarks.waveform_loop --reference valve > benchmarks/results/waveform_loop_valve.txt
 
 The same people of the `recruitment` cohort are examined twice by the default strategy, with the same seeds: once by a
 device that reports the amplitude itself, and once by the simulated tapping robot, with waveforms. Both are judged by
@@ -13,11 +13,9 @@ noise; their mean is one value of that person, so that the interval is about peo
 from __future__ import annotations
 
 import argparse
-import importlib.metadata
 import math
 import multiprocessing
 import os
-import platform
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -31,6 +29,7 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
+from benchmarks.provenance import made_with
 from isiw.devices.robot.mechanism import Event, Geometry, SensorNoise
 from isiw.devices.robot.tapper import Trigger
 from isiw.subjects.cohorts import cohort
@@ -172,8 +171,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=10_000, help="0–999 for work, reported figures from 10,000")
     parser.add_argument("--workers", type=int, default=1, help="processes")
     chosen = parser.parse_args()
-    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in ("isiw", "numpy", "torch"))
-    print(f"python {platform.python_version()}, {versions}")
+    print(made_with("numpy", "torch"))
     print(f"recruitment cohort, {chosen.people} people, {chosen.sessions} sessions each, seed {chosen.seed}, "
           f"{chosen.trials} stimuli at most")  # fmt: skip
     print(

@@ -1,6 +1,6 @@
 """What is reached without stimulating anybody: the default's answer before any trial, and the best fixed window.
 
-    python benchmarks/zero_trials.py > benchmarks/results/zero_trials.md
+    python -m benchmarks.zero_trials > benchmarks/results/zero_trials.md
 
 The fixed window is the one with the largest mean F1 on other people of the cohort, or no window at all. Neither of the
 two has learnt anything from the person: a method is worth what it reaches beyond them.
@@ -8,18 +8,15 @@ two has learnt anything from the person: a method is worth what it reaches beyon
 
 from __future__ import annotations
 
-import platform
-import shlex
-import sys
 from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
 import pandas as pd
-import torch
 import typer
 
 import isiw
+from benchmarks.provenance import command_of, made_with
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1, f1_of_masks
 from isiw.subjects.cohorts import COHORTS
@@ -107,9 +104,8 @@ def main(
 ) -> None:
     """Print mean F1 of both, by cohort, over 500 ms after the valve command."""
     table = without_any_trial(list(COHORTS), people, seed, VALVE_SPACE)
-    print(f"- command: `{shlex.join(['python', *sys.argv])}`")
-    versions = ", ".join(f"{module.__name__} {module.__version__}" for module in (isiw, torch, np))
-    print(f"- python {platform.python_version()}, {versions}; seed {seed}, and {OTHER_SEED} for the fixed windows")
+    print(f"- command: `{command_of('zero_trials')}`")
+    print(f"- {made_with('torch', 'numpy')}; seed {seed}, and {OTHER_SEED} for the fixed windows")
     print(f"- people: {people} per cohort; standard errors about .01 at most")
     print("- `kim11` has eleven people, so its fixed window was chosen on the same ones\n")
     print(table.to_markdown(index=False, floatfmt=".2f"))

@@ -11,8 +11,6 @@ after the last part that is done. Run it from the project's root.
 from __future__ import annotations
 
 import os
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -48,11 +46,10 @@ def main(
     """Make the gallery."""
     size = QUICK if quick else FULL
     folder = out or RESULTS / ("dissertation_quick" if quick else "dissertation")
-    command = shlex.join(["python", "-m", "benchmarks.dissertation", *sys.argv[1:]])
     for name in track(PARTS, "parts", console=Console(stderr=True)):
         path = folder / f"{name}.json"
         if again or not kept(path, size, seed):
-            keep(PARTS[name], path, size, seed, command)
+            keep(PARTS[name], path, size, seed)
     sources, missing = read_sources(folder, list(PARTS))
     for verdict, count in write_page(folder, sources, missing).most_common():
         print(f"{verdict}: {count}")

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import json
-import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from matplotlib.figure import Figure
 
 from benchmarks.dissertation.claims import REPRODUCED, Claim, claims_as_json
 from benchmarks.dissertation.size import Size
+from benchmarks.provenance import facts_of
 
 __all__ = ["Told", "keep", "kept", "verdict"]
 
-VERSIONS: Final = ("isiw", "numpy", "scipy", "torch", "scikit-learn", "matplotlib")
+VERSIONS: Final = ("numpy", "scipy", "torch", "scikit-learn", "matplotlib")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +59,7 @@ def kept(path: Path, size: Size, seed: int) -> bool:
     return bool(facts["size"] == asdict(size) and facts["seed"] == seed)
 
 
-def keep(tell: Callable[[Size, int], Told], path: Path, size: Size, seed: int, command: str) -> None:
+def keep(tell: Callable[[Size, int], Told], path: Path, size: Size, seed: int) -> None:
     """Run a part and keep its claims as JSON, with its pictures beside it.
 
     Args:
@@ -68,21 +67,15 @@ def keep(tell: Callable[[Size, int], Told], path: Path, size: Size, seed: int, c
         path: of the JSON file.
         size: how much is run.
         seed: the first seed.
-        command: what was typed.
     """
     began_s = time.monotonic()
     told = tell(size, seed)
     path.parent.mkdir(parents=True, exist_ok=True)
     names = {place: _save(picture, path, place) for place, picture in told.pictures.items()}
-    facts = _facts(size, seed, command) | {"minutes": round((time.monotonic() - began_s) / 60, 1)}
+    facts = facts_of("dissertation", *VERSIONS, seed=seed, size=asdict(size))
+    facts |= {"minutes": round((time.monotonic() - began_s) / 60, 1)}
     content = {"facts": facts, "note": told.note, "claims": claims_as_json(told.claims), "pictures": names}
     path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n")
-
-
-def _facts(size: Size, seed: int, command: str) -> dict[str, Any]:
-    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in VERSIONS)
-    python = f"python {platform.python_version()}"
-    return {"command": command, "versions": f"{python}, {versions}", "seed": seed, "size": asdict(size)}
 
 
 def _save(picture: Figure, path: Path, place: str) -> str:

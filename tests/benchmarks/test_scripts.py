@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-FOLDER = Path(__file__).parents[2] / "benchmarks"
+ROOT = Path(__file__).parents[2]
 SCRIPTS = {
     "limits": "--cohorts late --people 2 --trials 5",
     "people": "--cohorts gaussian --people 2 --trials 5",
@@ -18,8 +18,8 @@ SCRIPTS = {
 
 def run(name: str, arguments: list[str]) -> None:
     """Run a benchmark as from the command line."""
-    command = [sys.executable, str(FOLDER / f"{name}.py"), *arguments]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - a script of this repository
+    command = [sys.executable, "-m", f"benchmarks.{name}", *arguments]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S603 - a script of this repository
     assert ended.returncode == 0, ended.stderr
 
 
@@ -28,7 +28,7 @@ def run(name: str, arguments: list[str]) -> None:
 def test_a_benchmark_writes_its_table(name: str, tmp_path: Path) -> None:
     out = tmp_path / name
     run(name, [*SCRIPTS[name].split(), "--workers", "1", "--out", str(out)])
-    assert "- command: `python benchmarks/" in out.with_suffix(".md").read_text(encoding="utf-8")
+    assert "- command: `python -m benchmarks." in out.with_suffix(".md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ def told(_size: Size, seed: int) -> Told:
 
 def test_a_part_is_kept_with_its_claims_pictures_and_command(tmp_path: Path) -> None:
     path = tmp_path / "gallery" / "events.json"
-    keep(told, path, QUICK, 7, "python -m benchmarks.dissertation")
+    keep(told, path, QUICK, 7)
     assert [claim.ours for claim in read_claims(path)] == ["7"]
     content = json.loads(path.read_text())
     assert (path.parent / content["pictures"]["Fig. 3.8"]).exists()
@@ -34,7 +34,7 @@ def test_a_part_is_kept_with_its_claims_pictures_and_command(tmp_path: Path) -> 
 def test_only_a_part_of_the_same_size_and_seed_is_done(tmp_path: Path) -> None:
     path = tmp_path / "events.json"
     assert not kept(path, QUICK, 7)
-    keep(told, path, QUICK, 7, "c")
+    keep(told, path, QUICK, 7)
     assert kept(path, QUICK, 7)
     assert not kept(path, QUICK, 8)
     assert not kept(path, FULL, 7)
