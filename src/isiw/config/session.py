@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime as dt
 import itertools
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -20,7 +19,6 @@ from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import RUN_KEY
 from isiw.session.loop import Session
-from isiw.session.updates import SessionUpdate
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import SimulatedSubject
@@ -100,12 +98,11 @@ def require_device(config: RunConfig, path: Path) -> None:
         )
 
 
-def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | None = None) -> Session:
+def session_for(config: RunConfig) -> Session:
     """The session that a configuration describes, ready to run.
 
     Args:
         config: the configuration.
-        on_trial: called after each trial.
 
     Raises:
         ConfigError: no recordings, or no prior, where the configuration says, or recordings that would be ignored;
@@ -126,7 +123,6 @@ def session_for(config: RunConfig, on_trial: Callable[[SessionUpdate], None] | N
         make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),
         log=log,
         limits=limits_for(config),
-        on_trial=on_trial,
         subject=config.visit.subject or ("" if config.device else _code(config)),
         signals=config.signals,
         config={} if config.device else {RUN_KEY: _kept(config)},

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 from isiw.checks import check_numbers, check_wholes
-from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness, require_staged
+from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness, readiness_of, require_staged
 from isiw.errors import DeviceError, DeviceTimeoutError, StillArmedError, told
 from isiw.trials import Stimulus
 
@@ -212,7 +212,7 @@ class PunctualDevice:
         """
         if not isinstance(self._device, ReportsReadiness):
             return Readiness()
-        return self._within("readiness", self._device.readiness, self._deadlines.readiness_s)
+        return self._within("readiness", partial(readiness_of, self._device), self._deadlines.readiness_s)
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
         """Deliver one pair of stimuli.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from isiw.devices.protocol import Device, DeviceInfo, Readiness, ReportsReadiness, require_staged
+from isiw.devices.protocol import Device, DeviceInfo, Readiness, readiness_of, require_staged
 from isiw.trials import Measurement, Stimulus
 
 __all__ = ["DryRun"]
@@ -31,7 +31,7 @@ class DryRun:
 
     def readiness(self) -> Readiness:
         """What the real device says about its state."""
-        return self._device.readiness() if isinstance(self._device, ReportsReadiness) else Readiness()
+        return readiness_of(self._device)
 
     def stage(self) -> None:
         """Arm nothing."""

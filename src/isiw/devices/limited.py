@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 from isiw.devices.clock import ROUNDING_S, Clock, VirtualClock
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness, require_staged
+from isiw.devices.protocol import Answer, Device, DeviceInfo, readiness_of, require_staged
 from isiw.errors import DeviceError, LimitExceededError, NotDelivered
 from isiw.trials import Stimulus
 
@@ -119,23 +119,13 @@ class LimitedDevice:
             )
 
     def _check_state(self) -> None:
-        state = self._readiness()
+        state = readiness_of(self._device)
         if not state.ready:
             raise NotDelivered(
                 f"the device is not ready: {state.reason or 'it does not say why'}",
                 remedy="Nothing was delivered. Go on when it is ready.",
             )
         self._limits.require_state(state)
-
-    def _readiness(self) -> Readiness:
-        state: object = self._device.readiness() if isinstance(self._device, ReportsReadiness) else Readiness()
-        if not isinstance(state, Readiness):
-            raise DeviceError(
-                "readiness() did not return an isiw.Readiness",
-                got=state,
-                remedy='Return Readiness(), or Readiness(ready=False, reason="...").',
-            )
-        return state
 
     def describe(self) -> DeviceInfo:
         """What the guarded device is."""
@@ -145,7 +135,9 @@ class LimitedDevice:
         """Get ready and arm."""
         self._device.stage()
         if self._limits.intensity_pct_mso is None:
-            self._limits = dataclasses.replace(self._limits, intensity_pct_mso=self._readiness().intensity_pct_mso)
+            self._limits = dataclasses.replace(
+                self._limits, intensity_pct_mso=readiness_of(self._device).intensity_pct_mso
+            )
         self._staged = True
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:

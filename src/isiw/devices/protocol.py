@@ -7,11 +7,20 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, get_args, runtime_checkable
 
 from isiw.checks import check_choice, check_flags, check_numbers, check_texts, mean_and_sd, text
-from isiw.errors import InvalidValueError, NotDelivered
+from isiw.errors import DeviceError, InvalidValueError, NotDelivered
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Conditioning, Reference
 
-__all__ = ["Answer", "Device", "DeviceInfo", "HasMemory", "Readiness", "ReportsReadiness", "require_staged"]
+__all__ = [
+    "Answer",
+    "Device",
+    "DeviceInfo",
+    "HasMemory",
+    "Readiness",
+    "ReportsReadiness",
+    "readiness_of",
+    "require_staged",
+]
 
 Answer: TypeAlias = Sweep | Measurement
 """What came of a stimulus: waveforms, or the MEP as the device measured it."""
@@ -141,6 +150,25 @@ class HasMemory(Protocol):
 
     def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
         """Come into the state of having delivered these stimuli since the session's beginning."""
+
+
+def readiness_of(device: Device) -> Readiness:
+    """What a device says about its state; ready, where it cannot say.
+
+    Args:
+        device: the device.
+
+    Raises:
+        DeviceError: it says something else than a `Readiness`.
+    """
+    state: object = device.readiness() if isinstance(device, ReportsReadiness) else Readiness()
+    if not isinstance(state, Readiness):
+        raise DeviceError(
+            "readiness() did not return an isiw.Readiness",
+            got=state,
+            remedy='Return Readiness(), or Readiness(ready=False, reason="...").',
+        )
+    return state
 
 
 def require_staged(name: str, *, staged: bool) -> None:

@@ -1,4 +1,4 @@
-"""Devices that stimulate nobody: simulated people, recorded sweeps, recorded trials, a simulated robot."""
+"""A device that stimulates nobody, and what it stands for: a simulated person, or whatever answers stimuli."""
 
 from __future__ import annotations
 

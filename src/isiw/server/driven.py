@@ -68,7 +68,7 @@ class DrivenSession:
             if concluded and isinstance(error, _HARMLESS):
                 raise
             self.closed = True
-            self.recorder.__exit__(type(error), error, error.__traceback__)
+            self.recorder.fail(error)
             if not concluded and not isinstance(error, Refusal | LogError):  # not for anything that the client sent
                 raise failed(error) from error
             raise

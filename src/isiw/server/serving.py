@@ -144,7 +144,6 @@ def listening(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int)
 
     Raises:
         ConfigError: the port is taken, or the address is not this computer's.
-        InvalidValueError: the folder cannot be made.
     """
     family = socket.AF_INET6 if address.version == 6 else socket.AF_INET
     try:

@@ -178,8 +178,7 @@ class Interrupts:
         return self._disarmed >= self._handled
 
     @staticmethod
-    def _wait_until(holds: Callable[[], bool], at_most_s: float) -> bool:
+    def _wait_until(holds: Callable[[], bool], at_most_s: float) -> None:
         end_s = time.monotonic() + at_most_s
         while not holds() and time.monotonic() < end_s:
             time.sleep(_GLANCE_S)
-        return holds()

@@ -123,7 +123,7 @@ class Journal:
         self.event("note", checks.text("a note", text), trial)
         self.log.sync()
 
-    def judge(self, verdict: Callable[[TrialTable], Event]) -> Event:
+    def judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         """Put on disk what an operator says about a trial; from then on the strategy has to learn anew.
 
         Args:
@@ -138,7 +138,6 @@ class Journal:
                 self.excluded.append(event.trial)
             self.overruled = True
         self.log.sync()
-        return event
 
     def faults(self, faults: deque[str]) -> None:
         """Write what went wrong and was overcome, in whichever thread."""

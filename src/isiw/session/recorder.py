@@ -230,6 +230,19 @@ class Recorder(Judging):
             self._catch_up()
             return self.strategy.decision()
 
+    def fail(self, error: BaseException) -> None:
+        """Log what ended the session, and close the log.
+
+        Args:
+            error: what was raised.
+        """
+        try:
+            if self._journal.is_open:
+                self._journal.failure(error)
+                self._log.sync()
+        finally:
+            self.close()
+
     def close(self) -> None:
         """Close the log; calling it again is harmless."""
         self._open.close()
@@ -241,12 +254,10 @@ class Recorder(Judging):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        try:
-            if error is not None and self._journal.is_open:
-                self._journal.failure(error)
-                self._log.sync()
-        finally:
+        if error is None:
             self.close()
+        else:
+            self.fail(error)
 
     def _require_asked(self) -> Stimulus:
         if self.asked is None:

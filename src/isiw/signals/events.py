@@ -20,11 +20,11 @@ from isiw.types import ArrayLike, FloatArray
 
 __all__ = ["TapEvents", "detect_events", "first_rise", "load_cell_times", "sweep_events", "tap_artefact_times"]
 
-ONSET_SD = 3.0
+MOTION_SD = 3.0
 ARTEFACT_SEARCH_MS = (12.0, 30.0)  # four people: 18 to 23 ms after the impact, SD below 2 (Table 3.2)
 USUAL_ARTEFACT_MS = (12.0, 24.0)
 ARTEFACT_RISE_MS = 2.0
-PULSE_SPAN_MS = (-1.0, 2.0)
+ARTEFACT_SPAN_MS = (-1.0, 2.0)
 LATEST_MEP_MS = 50.0  # after the pulse, in hand muscles
 
 
@@ -141,7 +141,7 @@ def first_rise(waves: FloatArray, rate_hz: float, valve_ms: float) -> FloatArray
     level, noise = rest_level(waves, valve, rate_hz)
     risen = waves > level + HYSTERESIS_SD * noise
     risen[:, :valve] = False
-    return crossing_before(waves, level + ONSET_SD * noise, first_true(risen)) * 1000 / rate_hz
+    return crossing_before(waves, level + MOTION_SD * noise, first_true(risen)) * 1000 / rate_hz
 
 
 def _like(values: ArrayLike, waves: FloatArray, rate_hz: float, name: str) -> FloatArray:
@@ -175,10 +175,10 @@ def _descent_and_away(
     level, noise = rest_level(acceleration, round(valve_ms * rate_hz / 1000), rate_hz)
     columns = np.arange(acceleration.shape[-1])
     hit = np.where(np.isnan(hit_ms), -1, np.floor(hit_ms * rate_hz / 1000)).astype(np.int64)
-    descent = crossing_before(acceleration, level + ONSET_SD * noise, hit)
-    pushed = (acceleration < level - ONSET_SD * noise) & (columns > hit[:, None])
+    descent = crossing_before(acceleration, level + MOTION_SD * noise, hit)
+    pushed = (acceleration < level - MOTION_SD * noise) & (columns > hit[:, None])
     bottom = first_true(pushed)
-    risen = (acceleration > level + ONSET_SD * noise) & (columns > bottom[:, None]) & (bottom >= 0)[:, None]
+    risen = (acceleration > level + MOTION_SD * noise) & (columns > bottom[:, None]) & (bottom >= 0)[:, None]
     away = crossing_before(acceleration, level, np.where(hit >= 0, first_true(risen), -1))
     return descent * 1000 / rate_hz, away * 1000 / rate_hz
 
@@ -209,7 +209,7 @@ def tap_artefact_times(
     deviation = np.abs(waves - level)
     times = np.arange(waves.shape[-1]) * 1000 / rate_hz
     since_pulse = times - per_waveform(t_tms_ms, waves)[:, None]
-    deviation[(since_pulse >= PULSE_SPAN_MS[0]) & (since_pulse <= PULSE_SPAN_MS[1])] = 0.0
+    deviation[(since_pulse >= ARTEFACT_SPAN_MS[0]) & (since_pulse <= ARTEFACT_SPAN_MS[1])] = 0.0
     since_hit = times - per_waveform(hit_ms, waves)[:, None]
     first_ms, last_ms = USUAL_ARTEFACT_MS if even_as_mep else ARTEFACT_SEARCH_MS
     sought = (since_hit >= first_ms) & (since_hit <= last_ms)
@@ -223,5 +223,5 @@ def tap_artefact_times(
         before = (shown >= 0) & (per_waveform(t_tms_ms, waves) < per_waveform(hit_ms, waves))
         shown = np.where(before, np.where(surely, deviation, -1.0).argmax(axis=-1), shown)
         earliest = np.where(before, times[shown] - ARTEFACT_RISE_MS, earliest)
-    onset: FloatArray = np.maximum(crossing_before(deviation, ONSET_SD * noise, shown) * 1000 / rate_hz, earliest)
+    onset: FloatArray = np.maximum(crossing_before(deviation, MOTION_SD * noise, shown) * 1000 / rate_hz, earliest)
     return onset

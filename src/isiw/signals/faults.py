@@ -29,10 +29,12 @@ TOO_LOUD_UV, TOO_QUIET_UV = 400.0, 0.05
 DRIVEN_MS = 25.0
 """How long a hammer is driven before its impact, at least."""
 
-PULSE_SPAN_MS = (-2.0, 50.0)
+EVOKED_SPAN_MS = (-2.0, 50.0)
 """When the pulse and what it evokes are in the EMG [ms after the pulse]."""
 
-TAP_SPAN_MS = 60.0
+JOLT_MS = 60.0
+"""How long after an impact its jolt may be the steepest edge."""
+
 LATEST_HIT_MS = 300.0
 """From the valve command to the impact, in any rig that is believed in."""
 
@@ -167,11 +169,11 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
     if trial.t_tms_ms is None:
         return None
     steepest_ms = steepest_edge(emg)
-    spans = [(trial.t_tms_ms + PULSE_SPAN_MS[0], trial.t_tms_ms + PULSE_SPAN_MS[1])]
+    spans = [(trial.t_tms_ms + EVOKED_SPAN_MS[0], trial.t_tms_ms + EVOKED_SPAN_MS[1])]
     begins = [ms for ms in (trial.t_valve_ms, trial.t_hit_ms) if ms is not None]
     if begins:  # the valve switches on and off before the hit
         hit_ms = begins[0] + LATEST_HIT_MS if trial.t_hit_ms is None else trial.t_hit_ms
-        spans.append((begins[0] - 2.0, hit_ms + TAP_SPAN_MS))
+        spans.append((begins[0] - 2.0, hit_ms + JOLT_MS))
     if steepest_ms is None or any(first <= steepest_ms <= last for first, last in spans):
         return None
     return Fault(

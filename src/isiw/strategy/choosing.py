@@ -18,6 +18,7 @@ from isiw.models.protocol import Posterior, Tensor
 __all__ = ["Choice", "ChosenBy", "Cost", "best_choices", "candidate_isis", "evenly_spaced"]
 
 MAX_CANDIDATES = 101
+"""At most so many ISIs are scored, so that the cost of an ask does not grow with the range."""
 
 Cost = Callable[[Tensor], Tensor]
 """What each of some ISIs [ms] (shape (t,)) costs, in the unit of the scores, shape (t,)."""
@@ -44,15 +45,14 @@ class Choice:
     scores: Tensor | None = field(default=None, compare=False, repr=False)
 
 
-def candidate_isis(space: DesignSpace, max_candidates: int = MAX_CANDIDATES) -> Tensor:
-    """Evenly spaced ISIs of the design grid to score [ms], both ends included, shape (t,).
+def candidate_isis(space: DesignSpace) -> Tensor:
+    """Evenly spaced ISIs of the design grid to score [ms], both ends included, shape (t,); at most `MAX_CANDIDATES`.
 
     Args:
         space: the design space.
-        max_candidates: at most this many, so that the cost of an ask does not grow with the range.
     """
     grid = space.grid_ms
-    stride = max(1, math.ceil((len(grid) - 1) / (max_candidates - 1)))
+    stride = max(1, math.ceil((len(grid) - 1) / (MAX_CANDIDATES - 1)))
     picked = sorted({*range(0, len(grid), stride), len(grid) - 1})
     return torch.as_tensor(grid[picked], dtype=torch.float32)
 

@@ -170,18 +170,18 @@ class DaskCluster:
                 item, _, losses = held.pop(future.key)
                 if future.status == "error" and isinstance(future.exception(), dask.KilledWorker):
                     suspects.append(item)
-                elif not isinstance(result := _result_of(future), _Lost):
+                elif not isinstance(result := _result_of(future, client), _Lost):
                     yield item, result
-                elif _reached(client) and losses + 1 < self.attempts:
+                elif losses + 1 < self.attempts:
                     hand_out(item, losses + 1)
                 else:
                     yield item, Failure(f"Its result was lost on the cluster {self.attempts} times.")
             for item in suspects:
                 hand_out(item)
                 held.pop((future := next(running)).key)
-                result = _result_of(future)
-                lost = isinstance(result, _Lost) and _reached(client)
-                yield item, Failure("Its result was lost on the cluster.") if lost else result
+                result = _result_of(future, client)
+                lost = Failure("Its result was lost on the cluster.")
+                yield item, lost if isinstance(result, _Lost) else result
 
 
 class _HandedOut(NamedTuple, Generic[_Item]):
@@ -212,11 +212,10 @@ def _client(dask: Any, address: str) -> Any:
         ) from error
 
 
-def _reached(client: Any) -> bool:
-    """True; an error where the scheduler was lost, since then nothing more will come."""
+def _require_reached(client: Any) -> None:
+    """Raise where the scheduler was lost, since then nothing more will come."""
     if client.status != "running":
         raise StudyError("the Dask scheduler was lost", remedy="Run again: what is finished is kept.")
-    return True
 
 
 def _cancel(client: Any, held: Mapping[str, _HandedOut[Any]]) -> None:
@@ -224,12 +223,13 @@ def _cancel(client: Any, held: Mapping[str, _HandedOut[Any]]) -> None:
         client.cancel([each.future for each in held.values()])
 
 
-def _result_of(future: Any) -> Any:
+def _result_of(future: Any, client: Any) -> Any:
     """What a Dask future came to; what took its workers down is a failure."""
     try:
         error = future.exception()
         return future.result() if error is None else Failure(_line(error))
     except (asyncio.CancelledError, CancelledError):
+        _require_reached(client)
         return _Lost()
 
 

@@ -11,7 +11,7 @@ from isiw.devices.clock import Clock
 from isiw.devices.deadlines import PunctualDevice
 from isiw.devices.limits import Limits
 from isiw.devices.lock import driven
-from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness
+from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readiness_of
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered, StillArmedError, told
 from isiw.session.rig import Rig
 from isiw.session.safeguards import Safeguards
@@ -168,7 +168,7 @@ class _KeptDisarmed:
             self._device.stage()
 
     def readiness(self) -> Readiness:
-        return self._device.readiness() if isinstance(self._device, ReportsReadiness) else Readiness()
+        return readiness_of(self._device)
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
         try:

@@ -23,6 +23,9 @@ NEGLIGIBLE_NATS: Final = 9.0
 LEAST_CURVATURE: Final = 0.25
 """A standard normal prior has a curvature of 1; along a ridge that bends upwards the likelihood can take it away."""
 
+STEP: Final = 1e-4
+"""Of the differences that give a curvature, in standard normal latents."""
+
 STEP_LENGTHS: Final = torch.tensor([[1.0], [0.3], [0.05]], dtype=torch.double)
 SMALL_GAIN_NATS: Final = 0.1
 
@@ -79,14 +82,14 @@ def _gradient(log_density: LogDensity, points: Tensor) -> tuple[Tensor, Tensor]:
     return values.detach(), slopes.detach()
 
 
-def _curvatures(log_density: LogDensity, points: Tensor, step: float = 1e-4) -> tuple[Tensor, Tensor]:
+def _curvatures(log_density: LogDensity, points: Tensor) -> tuple[Tensor, Tensor]:
     """Log density and negative Hessian by central differences of the gradient, shapes (k,) and (k, d, d)."""
     k, d = points.shape
-    shifts = step * torch.eye(d, dtype=points.dtype)
+    shifts = STEP * torch.eye(d, dtype=points.dtype)
     around = torch.cat((points.unsqueeze(1) + shifts, points.unsqueeze(1) - shifts), dim=1)
     values, slopes = _gradient(log_density, around.flatten(0, 1))
     up, down = slopes.view(k, 2, d, d).unbind(1)
-    hessian = (down - up) / (2.0 * step)
+    hessian = (down - up) / (2.0 * STEP)
     known = hessian.isfinite().flatten(1).all(-1)[:, None, None]
     hessian = torch.where(known, hessian, torch.eye(d, dtype=points.dtype))
     # At a top the values around it are as good as its own.
