@@ -75,7 +75,8 @@ def decisions(rows: pd.DataFrame) -> pd.DataFrame:
     kinds = np.where(table["person"] % 2 == 0, "constant CV", "recruitment")
     table["noise"] = np.where(table["cohort"] == "nonresponder", kinds, "")
     table["false_window"] = table["reported_window"].where(~table["true_window"]).astype(float)
-    table["false_none"] = (~table["reported_window"]).where(table["true_window"]).astype(float)
+    none = table["answered"] & ~table["reported_window"]
+    table["false_none"] = none.where(table["true_window"]).astype(float)
     return table.groupby(keys)[["false_window", "false_none"]].mean().reset_index()
 
 

@@ -61,6 +61,12 @@ def test_f1_counts_grid_points_of_an_estimate_or_of_its_window() -> None:
     assert f1(WindowEstimate(0.1, None), truth, SPACE) == 0.0
 
 
+def test_a_method_without_an_answer_is_right_about_nobody() -> None:
+    assert f1(WindowEstimate(0.1, None), None, SPACE) == 1.0
+    assert f1(WindowEstimate(None, None), None, SPACE) == 0.0
+    assert f1(WindowEstimate(0.1, None, silent=True), None, SPACE) == 0.0
+
+
 def test_a_window_between_two_isis_of_the_space_is_one_still() -> None:
     coarse = DesignSpace(0, 100, step_ms=10)
     early, late = Window(32, 38), Window(82, 88)

@@ -32,11 +32,14 @@ def f1(estimate: WindowEstimate | Window | None, truth: Window | None, space: De
     """F1 of an estimated window against the truth on the space's grid.
 
     Args:
-        estimate: the estimate, or the reported window; None is "there is no window".
+        estimate: the estimate, or the reported window; None is "there is no window". An estimate that has no answer yet
+            has F1 0, whatever is true.
         truth: the true window; None where there is none.
         space: the design space whose grid counts. A window that lies between its ISIs counts as the nearest ones; what
             lies outside the space does not count.
     """
+    if isinstance(estimate, WindowEstimate) and not estimate.has_answer:
+        return 0.0
     window = estimate.window if isinstance(estimate, WindowEstimate) else estimate
     return float(f1_of_masks(_on_grid(window, space), _on_grid(truth, space)))
 

@@ -18,6 +18,7 @@ from isiw.text.stimuli import TAP, StimulusWords
 from isiw.types import FloatArray
 
 __all__ = [
+    "MOST_ISI_SD_MS",
     "RESPONSE_MV",
     "Channel",
     "Measurement",
@@ -28,6 +29,9 @@ __all__ = [
     "Trial",
     "TrialTable",
 ]
+
+MOST_ISI_SD_MS: Final = 50.0
+"""The largest SD of a realised ISI that can be learnt from [ms]: a window is hardly wider than two of them."""
 
 RESPONSE_MV: Final = 0.05
 """A larger MEP is a response where a motor threshold is sought [mV] [Rossini2015]."""
@@ -127,7 +131,8 @@ class Sweep:
         isi_sd_ms: SD of the realised ISI where the impact is not measured [ms].
 
     Raises:
-        InvalidValueError: channels that are none, a time that is not finite, or a negative SD.
+        InvalidValueError: channels that are none, a time that is not finite, or an SD that is negative or larger than
+            `MOST_ISI_SD_MS`.
     """
 
     channels: Mapping[str, Channel]
@@ -138,7 +143,7 @@ class Sweep:
 
     def __post_init__(self) -> None:
         check_numbers(self, "t_valve_ms", "t_tms_ms", "t_hit_ms", optional=True)
-        check_numbers(self, "isi_sd_ms", least=0)
+        check_numbers(self, "isi_sd_ms", least=0, most=MOST_ISI_SD_MS)
         for name, channel in self.channels.items():
             if not isinstance(channel, Channel):
                 raise InvalidValueError(
@@ -162,7 +167,8 @@ class Measurement:
         t_tms_ms: time of the magnetic pulse [ms], where known.
 
     Raises:
-        InvalidValueError: a value that is not finite, or an amplitude that no amplifier gives.
+        InvalidValueError: a value that is not finite, an amplitude that no amplifier gives, or an SD that is negative
+            or larger than `MOST_ISI_SD_MS`.
     """
 
     mep_mv: float
@@ -176,7 +182,7 @@ class Measurement:
     def __post_init__(self) -> None:
         check_numbers(self, "isi_ms", "t_valve_ms", "t_hit_ms", "t_tms_ms", optional=True)
         check_amplitude(self, "mep_mv")
-        check_numbers(self, "isi_sd_ms", least=0)
+        check_numbers(self, "isi_sd_ms", least=0, most=MOST_ISI_SD_MS)
         check_numbers(self, "background_rms_uv", least=0, optional=True)
 
 

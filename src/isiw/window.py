@@ -264,9 +264,15 @@ class WindowEstimate:
             return self.too_little
         start, end = self.interval(0.9) or ((None, None), (None, None))
         depressed = self.depressed, self.depressed_probability
-        nothing = nothing_found(self.probability, has_answer=self.probability is not None or self.grid_ms is not None)
+        nothing = nothing_found(self.probability, has_answer=self.has_answer)
         edges = (self.start_ms, *start), (self.end_ms, *end)
         return finding(self.probability, self.window, nothing, *edges, depressed)
+
+    @property
+    def has_answer(self) -> bool:
+        """Whether anything is said about a window; not where a method waits for more trials, nor without any MEP."""
+        says = self.window is not None or self.probability is not None or self.grid_ms is not None
+        return says and not self.silent
 
     @property
     def rests_on_data(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from isiw.priors import Difference, differences
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse
 from isiw.subjects.subject import SimulatedSubject
-from isiw.types import Reference
+from isiw.types import Conditioning, Reference
 from isiw.visit import Visit
 from known import instance, known
 from priors.logged import gaussian_person, write_log
@@ -95,6 +95,26 @@ def test_windows_on_rigs_with_nearly_the_same_hit_delay_or_after_the_impact_are_
     after_impact = [on_rig(records[0], 100.0, "impact"), on_rig(records[1], 250.0, "impact")]
     for pair in (near, after_impact, [records[0], near[1]]):
         assert differences(pair)[0].starts_later == 0.5
+
+
+def test_windows_after_a_tap_and_after_an_electrical_pulse_are_not_compared(tmp_path: Path) -> None:
+    tapped, pulsed = (
+        read_session(write_log(tmp_path / f"{first}.mcap", person(20.0), space=IMPACT_SPACE, conditioning=first))
+        for first in get_args(Conditioning)
+    )
+    difference = differences([tapped, pulsed])[0]
+    assert (difference.starts_later, difference.ends_later, difference.moved) == (None, None, None)
+    assert "different conditioning stimuli" in difference.obstacle
+
+
+def test_another_intensity_is_named_beside_a_difference(records: list[SessionRecord]) -> None:
+    at = [
+        replace(record, header=record.header.model_copy(update={"visit": Visit(intensity_pct_rmt=intensity)}))
+        for record, intensity in zip(records[:2], (90.0, 120.0), strict=True)
+    ]
+    difference = differences(at)[0]
+    assert difference.starts_later is not None
+    assert difference.obstacle.startswith("The sessions are of different intensities, 90 and 120 % of RMT")
 
 
 def in_range(record: SessionRecord, low_ms: float, high_ms: float) -> SessionRecord:

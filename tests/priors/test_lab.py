@@ -249,23 +249,41 @@ def test_a_session_is_recalled_with_what_its_strategy_was_told_of_rig_and_muscle
     assert recall.model.prior.muscle == "hand"
 
 
-def test_what_electrical_pulses_taught_is_for_electrical_pulses(logs: Any, tmp_path: Path) -> None:
+def test_what_electrical_pulses_taught_is_for_electrical_pulses(tmp_path: Path) -> None:
     pulsed = [
-        write_log(tmp_path / f"{k}.mcap", gaussian_person(k), subject=f"E{k}", trials=TRIALS, conditioning="electrical")
+        write_log(
+            tmp_path / f"{k}.mcap",
+            gaussian_person(k),
+            subject=f"E{k}",
+            trials=TRIALS,
+            conditioning="electrical",
+            space=IMPACT_SPACE,
+        )
         for k in range(2)
     ]
     prior = priors.load(priors.write_lab_prior(priors.learn(pulsed), tmp_path / "lab.toml"))
     assert prior.profile.conditioning == "electrical"
     assert prior.profile.widths == ProfilePrior(conditioning="electrical").widths
-    assert make_strategy(prior=prior, particles=50).estimate().probability is not None
+    assert make_strategy(space=IMPACT_SPACE, prior=prior, particles=50).estimate().probability is not None
     width_ms = priors.compared(priors.read_lab_prior(tmp_path / "lab.toml")).loc["width [ms]"]
     assert width_ms["built-in median"] < 40  # after an electrical pulse, not after a tap
     with pytest.raises(InvalidValueError, match="another conditioning stimulus"):
-        make_strategy(prior=prior, conditioning="tap", particles=50)
+        make_strategy(space=IMPACT_SPACE, prior=prior, conditioning="tap", particles=50)
+    tapped = write_log(tmp_path / "tapped.mcap", subject="T", trials=3, space=IMPACT_SPACE)
     with pytest.raises(LogError, match="different conditioning stimuli"):
-        priors.learn([*logs, *pulsed])
+        priors.learn([tapped, *pulsed])
     day, *_ = map(isiw.read_session, pulsed)
     assert {place.conditioning for place in priors.after(day).profile.places} == {"electrical"}
+
+
+def test_a_lab_learns_from_one_intensity(tmp_path: Path) -> None:
+    below, near, unsaid, above = (
+        write_log(tmp_path / f"{number}.mcap", subject=f"P{number}", trials=3, visit=Visit(intensity_pct_rmt=noted))
+        for number, noted in enumerate((90.0, 95.0, None, 120.0))
+    )
+    assert len(priors.learn([below, near, unsaid]).sessions) == 3
+    with pytest.raises(LogError, match=r"different intensities.*90 to 120 % of RMT"):
+        priors.learn([below, unsaid, above])
 
 
 def test_a_lab_learns_from_one_muscle_and_notes_which(tmp_path: Path) -> None:

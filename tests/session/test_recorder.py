@@ -138,6 +138,23 @@ def test_a_slip_is_refused_and_can_be_put_right(log: Path) -> None:
     assert len(read_session(log).table.told) == 1
 
 
+def test_a_pulse_before_the_impact_is_a_mistrial(log: Path) -> None:
+    with open_session(scripted_strategy(3, space=DesignSpace(0, 200)), log) as session:
+        session.ask()
+        with pytest.raises(InvalidValueError, match=r'came before the impact.*session.mistrial\("TMS before impact"\)'):
+            session.tell(-0.5, 0.02)
+        session.mistrial("TMS before impact")
+    assert [trial.reason for trial in read_session(log).table] == [MistrialReason.TMS_BEFORE_IMPACT]
+
+
+def test_an_isi_that_nobody_knows_is_not_learnt_from(log: Path) -> None:
+    with open_session(scripted_strategy(3), log) as session:
+        with pytest.raises(InvalidValueError, match=r"too uncertain to learn from.*at most 50 ms"):
+            session.tell(session.ask(), 0.02, isi_sd_ms=100.0)
+        session.tell(session.ask(), 0.02, isi_sd_ms=50.0)
+    assert len(read_session(log).table.told) == 1
+
+
 def test_a_doubt_is_a_warning_and_an_event(log: Path) -> None:
     with open_session(scripted_strategy(9), log) as session:
         for mep_mv in (8.0, 6.0):

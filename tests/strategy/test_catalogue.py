@@ -118,11 +118,11 @@ def test_the_hit_delay_and_the_muscle_have_keys_of_their_own() -> None:
 
 
 def test_a_strategy_that_was_told_of_electrical_pulses_is_made_again_from_its_recipe() -> None:
-    strategy = make_strategy(conditioning="electrical", muscle="hand", **FEW)
+    strategy = make_strategy(space=IMPACT_SPACE, conditioning="electrical", muscle="hand", **FEW)
     assert instance(ParticleModel, strategy.model).prior == Prior(
         ProfilePrior(conditioning="electrical"), muscle="hand"
     )
-    assert make_strategy(**strategy.recipe.settings).model == strategy.model
+    assert make_strategy(space=IMPACT_SPACE, **strategy.recipe.settings).model == strategy.model
 
 
 def test_only_a_strategy_that_can_use_what_is_known_is_told() -> None:

@@ -22,6 +22,10 @@ _OTHER_RIG = (
     "valve command, cannot be compared"
 )
 
+_OTHER_STIMULUS = "The sessions have different conditioning stimuli, so windows cannot be compared"
+
+_UNLIKE = "The sessions are of {}, which may be the reason of a difference"
+
 _APART = "The ranges of ISIs, {:g}–{:g} and {:g}–{:g} ms, have nothing in common, so windows cannot be compared"
 
 _Session: TypeAlias = tuple[SessionRecord, FloatArray | None]
@@ -41,7 +45,7 @@ class Difference:
         ends_later: the same of its end.
         moved: of the same person, how probable it is that the window moved, beyond the usual shift from day to day;
             None where it cannot be said.
-        obstacle: why something cannot be said.
+        obstacle: why something cannot be said, or says less than it seems to.
     """
 
     first: SessionRecord
@@ -58,8 +62,8 @@ def differences(records: Sequence[SessionRecord]) -> list[Difference]:
 
     Each session's trials are told to the particle model with the built-in prior, whatever strategy had asked for them,
     so that all are judged alike. Whether one person's window moved is judged in the order of the sessions' dates.
-    Nothing is said of windows from the valve command on rigs that state hit delays further apart than one rig's, and
-    edges are compared within the range of ISIs that the sessions have in common.
+    Nothing is said of windows after different conditioning stimuli, or from the valve command on rigs that state hit
+    delays further apart than one rig's. Edges are compared within the range of ISIs that the sessions have in common.
 
     Args:
         records: the sessions, at least two.
@@ -94,6 +98,8 @@ def _difference(first: _Session, second: _Session) -> Difference:
         return Difference(
             one, other, same, obstacle=f"There is probably no window, or too little was measured: {which}"
         )
+    if one.header.conditioning != other.header.conditioning:
+        return Difference(one, other, same, obstacle=_OTHER_STIMULUS)
     if (apart_ms := too_far_apart_ms((one, other))) is not None:
         return Difference(one, other, same, obstacle=_OTHER_RIG.format(*apart_ms))
     spaces = one.header.space, other.header.space
@@ -101,7 +107,8 @@ def _difference(first: _Session, second: _Session) -> Difference:
     if low_ms >= high_ms:
         ranges_ms = [edge_ms for space in spaces for edge_ms in (space.low_ms, space.high_ms)]
         return Difference(one, other, same, obstacle=_APART.format(*ranges_ms))
-    probability, obstacle = _moved(one, other) if same else (None, "")
+    unlike = one.header.visit.unlike(other.header.visit)
+    probability, obstacle = _moved(one, other) if same else (None, "" if unlike is None else _UNLIKE.format(unlike))
     # An edge beyond one session's range may lie within the other's: they are compared where both looked.
     seen_ms = one_ms.clip(low_ms, high_ms), other_ms.clip(low_ms, high_ms)
     starts, ends = (_later(*(edges_ms[:, edge] for edges_ms in seen_ms)) for edge in (0, 1))

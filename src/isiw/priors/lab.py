@@ -29,7 +29,7 @@ from isiw.priors.recall import (
     too_far_apart_ms,
 )
 from isiw.types import Conditioning, Reference
-from isiw.visit import different_muscles
+from isiw.visit import MOST_APART_PCT_RMT, different_muscles
 
 __all__ = ["LabPrior", "LearntSession", "learn", "share_of"]
 
@@ -42,6 +42,9 @@ LEAST_USUAL: Final = 0.1
 
 PEOPLE_FOR_HALF: Final = 2
 """From how many people on a lab's own law has half of the probability."""
+
+
+_EACH_KIND: Final = "Learn a prior from each kind of session."
 
 
 @dataclass(frozen=True)
@@ -159,7 +162,7 @@ def learn(
     Raises:
         LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person
             twice, or sessions that count ISIs from different events, or are of rigs with different hit delays or of
-            different conditioning stimuli or muscles, or of which some are simulated and others are not.
+            different conditioning stimuli, muscles or intensities, or of which some are simulated and others are not.
         DamagedLogError: a log is damaged.
         InvalidValueError: a seed that is no whole number from 0 on.
     """
@@ -211,8 +214,15 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
     }
     for differ, kind in kinds.items():
         if len(kind) > 1:
-            remedy = "Learn a prior from each kind of session."
-            raise LogError(f"the sessions {differ}", got=sorted(kind), remedy=remedy)
+            raise LogError(f"the sessions {differ}", got=sorted(kind), remedy=_EACH_KIND)
+    noted_pct_rmt = [r.header.visit.intensity_pct_rmt for r in records if r.header.visit.intensity_pct_rmt is not None]
+    if noted_pct_rmt and max(noted_pct_rmt) - min(noted_pct_rmt) > MOST_APART_PCT_RMT:
+        raise LogError(
+            "the sessions are of different intensities, and each has windows of its own",
+            got=f"{min(noted_pct_rmt):g} to {max(noted_pct_rmt):g} % of RMT",
+            expected=f"at most {MOST_APART_PCT_RMT:g} % of RMT apart",
+            remedy=_EACH_KIND,
+        )
     if (apart_ms := too_far_apart_ms(records)) is not None:
         raise LogError(
             "the sessions were run on rigs with different hit delays, so their windows cannot be compared",

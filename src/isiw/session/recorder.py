@@ -20,7 +20,7 @@ from isiw.session.journal import Journal, learn, relearned
 from isiw.session.judging import Judging
 from isiw.signals.doubts import doubt_of, doubt_of_isi, doubts_of
 from isiw.signals.faults import remedy_for
-from isiw.signals.plausibility import require_plausible
+from isiw.signals.plausibility import require_isi_sd, require_plausible
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
@@ -173,6 +173,7 @@ class Recorder(Judging):
         isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         asked = self._require_asked()
         require_plausible(isi_ms, mep_mv, asked.isi_ms, self.strategy.space)
+        require_isi_sd(isi_sd_ms)
         isi_ms = None if isi_ms is None else self.strategy.space.check_realised(isi_ms)
         if (isi_ms is None) != (asked.isi_ms is None):
             raise InvalidValueError(

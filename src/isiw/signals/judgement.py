@@ -26,7 +26,7 @@ from isiw.signals.mep import (
     background_rms,
     mep_amplitudes,
 )
-from isiw.signals.plausibility import implausible_amplitude
+from isiw.signals.plausibility import before_impact, implausible_amplitude
 from isiw.signals.units import ACCELERATION_UNITS, EMG_UNITS_MV, require_unit
 from isiw.signals.waveforms import MIN_REST_MS, is_recording
 from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
@@ -195,7 +195,7 @@ def wrong_isi(
         limits: may ask for less than the space's tolerance.
     """
     limits = limits or SignalLimits()
-    if space.reference == "impact" and isi_ms < 0 <= commanded_isi_ms:
+    if before_impact(isi_ms, commanded_isi_ms, space):
         return MistrialReason.TMS_BEFORE_IMPACT
     return MistrialReason.ISI_OFF if abs(isi_ms - commanded_isi_ms) > limits.tolerance_ms(space) else None
 

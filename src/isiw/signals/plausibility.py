@@ -9,15 +9,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+from isiw.checks import number
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.trials import MOST_ISI_SD_MS
 
 __all__ = [
     "Slip",
+    "before_impact",
     "implausible_amplitude",
     "implausible_scale",
     "off_by",
     "require_amplitude",
+    "require_isi_sd",
     "require_plausible",
 ]
 
@@ -101,7 +105,7 @@ def off_by(isi_ms: float, asked_ms: float, space: DesignSpace) -> bool:
 
 
 def require_plausible(isi_ms: float | None, mep_mv: float | None, asked_ms: float | None, space: DesignSpace) -> None:
-    """Refuse what cannot be true of one trial.
+    """Refuse what cannot be true of one trial, or is a mistrial.
 
     Args:
         isi_ms: the realised ISI [ms]; None for TMS alone.
@@ -110,12 +114,49 @@ def require_plausible(isi_ms: float | None, mep_mv: float | None, asked_ms: floa
         space: the design space.
 
     Raises:
-        InvalidValueError: swapped arguments, seconds for milliseconds, or an amplitude that no muscle gives.
+        InvalidValueError: swapped arguments, seconds for milliseconds, an amplitude that no muscle gives, or a pulse
+            that came before the impact.
     """
     if isi_ms is not None and asked_ms is not None and off_by(isi_ms, asked_ms, space):
         _require_in_place(isi_ms, mep_mv, asked_ms, space)
     if mep_mv is not None:
         require_amplitude(mep_mv)
+    if isi_ms is not None and before_impact(isi_ms, space.low_ms if asked_ms is None else asked_ms, space):
+        raise InvalidValueError(
+            "the magnetic pulse came before the impact, so the trial is a mistrial",
+            got=f"{isi_ms:g} ms",
+            remedy='Count it as one: session.mistrial("TMS before impact"), or strategy.count_mistrial(). If this '
+            "happens often, begin the design space at a larger ISI.",
+        )
+
+
+def before_impact(isi_ms: float, commanded_isi_ms: float, space: DesignSpace) -> bool:
+    """Whether a pulse came before the impact that it should have followed; such a trial is a mistrial.
+
+    Args:
+        isi_ms: the realised ISI [ms].
+        commanded_isi_ms: the one that was asked [ms].
+        space: says which event ISIs count from.
+    """
+    return space.reference == "impact" and isi_ms < 0 <= commanded_isi_ms
+
+
+def require_isi_sd(isi_sd_ms: float) -> None:
+    """Refuse an ISI that is known too vaguely to learn from: the models' three nodes do not stand for so wide a spread.
+
+    Args:
+        isi_sd_ms: SD of the realised ISI [ms].
+
+    Raises:
+        InvalidValueError: it is larger than `MOST_ISI_SD_MS`, negative or not finite.
+    """
+    if number("isi_sd_ms", isi_sd_ms, least=0) > MOST_ISI_SD_MS:
+        raise InvalidValueError(
+            "the realised ISI is too uncertain to learn from",
+            got=f"an SD of {isi_sd_ms:g} ms",
+            expected=f"at most {MOST_ISI_SD_MS:g} ms",
+            remedy="Measure the impact; or count the trial as a mistrial.",
+        )
 
 
 def _require_in_place(isi_ms: float, mep_mv: float | None, asked_ms: float, space: DesignSpace) -> None:

@@ -18,7 +18,7 @@ from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
 from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
 from isiw.signals.doubts import Doubts, doubt_of, doubt_of_isi, is_silent
-from isiw.signals.plausibility import require_plausible
+from isiw.signals.plausibility import require_isi_sd, require_plausible
 from isiw.strategy.choosing import Choice, Cost, evenly_spaced
 from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision, StoppingRule
@@ -250,6 +250,7 @@ class Strategy:
         plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
         asked_ms = None if self._choice is None else self._choice.isi_ms
         require_plausible(plain_ms, plain_mv, asked_ms, self.space)
+        require_isi_sd(isi_sd_ms)
         self.learn(isi_ms, mep_mv, response=response, isi_sd_ms=isi_sd_ms)
         self._doubts = self._doubts.after(
             doubt_of_isi(plain_ms, asked_ms, self.space),

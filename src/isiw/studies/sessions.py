@@ -172,12 +172,13 @@ def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
 
     Returns:
         One row a mark of each session: strategy (its label), cohort, person, seed, trial (the mark); how many pairs had
-        been delivered by then, mistrials among them; F1; whether there is and was reported a window, its edges [ms],
-        its probability, the expected F1, whether the 90 % intervals cover start and end (NaN where there are none); how
-        many asks were fallbacks and how many fits failed (NaN where a batch cannot say whose); after how many pairs the
-        stopping rule fired (NaN where it has not), why, whether that was before the budget was used up (NaN where the
-        rule is ignored), and F1 and coverage at that moment, named `stop_f1` and so on; the time that the last ask and
-        the last tell took for each person [ms]. After the end of a session its last estimate stays.
+        been delivered by then, mistrials among them; F1; whether there is a window, whether the method had an answer
+        yet, whether it reported a window, its edges [ms], its probability, the expected F1, whether the 90 % intervals
+        cover start and end (NaN where there are none); how many asks were fallbacks and how many fits failed (NaN where
+        a batch cannot say whose); after how many pairs the stopping rule fired (NaN where it has not), why, whether
+        that was before the budget was used up (NaN where the rule is ignored), and F1 and coverage at that moment,
+        named `stop_f1` and so on; the time that the last ask and the last tell took for each person [ms]. After the end
+        of a session its last estimate stays.
 
     Raises:
         StudyError: a person's realised ISIs are hardly ever near enough to the commanded ones.
@@ -342,6 +343,7 @@ def _judged(estimate: Reported, truth: Window | None, space: DesignSpace) -> dic
     return {
         "f1": f1(estimate, truth, space),
         "true_window": truth is not None,
+        "answered": posterior is None or posterior.has_answer,
         "reported_window": reported is not None,
         "start_ms": math.nan if reported is None else reported.start_ms,
         "end_ms": math.nan if reported is None else reported.end_ms,

@@ -40,7 +40,11 @@ def _means(rows: pd.DataFrame) -> pd.DataFrame:
         "end_delivered": rows["stop_trial"].mask(going_on & ~ignored, rows["delivered"]),
         "end_f1": rows["stop_f1"].mask(going_on & ~ignored, rows["f1"]),
     }
-    groups = rows.assign(**at_end).groupby(_GROUP)
+    answered = (
+        rows["answered"].fillna(value=True) if "answered" in rows else True
+    )  # studies from before the column have none
+    none = ~rows["reported_window"].astype(bool) & answered
+    groups = rows.assign(**at_end, called_none=none.astype(float)).groupby(_GROUP)
     return pd.DataFrame(
         {
             "people": groups.size(),
@@ -48,7 +52,7 @@ def _means(rows: pd.DataFrame) -> pd.DataFrame:
             "f1_se": groups["f1"].sem(),
             "start_coverage": groups["start_covered"].mean(),
             "end_coverage": groups["end_covered"].mean(),
-            "called_none": 1.0 - groups["reported_window"].mean(),
+            "called_none": groups["called_none"].mean(),
             "delivered": groups["delivered"].mean(),
             "stop_trial": groups["stop_trial"].mean(),
             "stop_f1": groups["stop_f1"].mean(),

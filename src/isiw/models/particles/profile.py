@@ -148,12 +148,20 @@ class ProfilePrior:
         return replace(self, start=self.start.as_usual(kept), widths=(usual, *less))
 
     def require_space(self, space: DesignSpace) -> None:
-        """Check that the places mean something in a space.
+        """Check that the conditioning stimulus and the places mean something in a space.
 
         Raises:
-            InvalidValueError: they count from another event than the space, or are of a rig with another hit delay, or
-                of another conditioning stimulus.
+            InvalidValueError: ISIs count from a valve command that the conditioning stimulus does not have; or the
+                places count from another event than the space, or are of a rig with another hit delay, or of another
+                conditioning stimulus.
         """
+        if self.conditioning == "electrical" and space.reference == "valve":
+            raise InvalidValueError(
+                "ISIs after an electrical pulse count from the pulse, and there is no valve command",
+                got=f'reference "{space.reference}"',
+                expected='reference "impact", which is the pulse here',
+                remedy='Make the space with isiw.DesignSpace(0, 100), or set reference = "impact" under [space].',
+            )
         if any(place.conditioning != self.conditioning for place in self.places):
             raise InvalidValueError(
                 "the prior was learnt with another conditioning stimulus, so its windows say nothing here",
