@@ -142,7 +142,8 @@ class VisitProtocol:
         longest_s = min_iti_s if self.iti_s is None else self.iti_s[1]
         if self.block_trials is not None and self.rest_s <= longest_s:
             raise InvalidValueError(
-                "the protocol's rest is no longer than the longest interval between two trials, so there is none",
+                "the protocol's rest is no longer than the longest interval between two trials, so it would have no "
+                "effect",
                 got=f"rest_s {self.rest_s:g}, longest interval {longest_s:g}",
                 expected=f"rest_s above {longest_s:g}",
                 remedy="Set a longer rest_s [s], or leave out block_trials and rest_s.",

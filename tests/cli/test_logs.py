@@ -38,7 +38,7 @@ def test_export_replaces_nothing(isiw: Command, log: Path) -> None:
 
 def test_export_says_who_is_who_once(isiw: Command, log: Path) -> None:
     result = isiw("export", log, "out", "--pseudonymise")
-    assert "P07 is now 001\nWho is who is kept nowhere else.\n" in result.output
+    assert "P07 is now 001\nKeep this list if you need it: it is stored nowhere.\n" in result.output
     assert "P07" not in Path("out/sessions.csv").read_text("utf-8")
 
 

@@ -68,7 +68,7 @@ def test_a_session_goes_on_within_the_limits_that_the_configuration_says_now(isi
     hot = isiw("resume", "s.mcap", begun)
     assert hot.exit_code == 1
     assert "no temperature" in hot.output
-    assert f"The limits stand under [limits] in {begun}" in hot.output
+    assert f"The limits are under [limits] in {begun}" in hot.output
     assert hot.stdout.endswith(f"The log is kept; go on with: isiw resume s.mcap {begun}\n")
     assert len(read_session("s.mcap").trials) == 3
     changed(begun, "\nmax_coil_c = 40.0", "")
@@ -203,7 +203,7 @@ def test_a_refusal_before_the_first_trial_says_how_to_go_on_and_one_before_the_l
     refused = isiw("run", "session.toml", "--log", "s.mcap")
     assert refused.exit_code == 1
     assert "The log is kept; go on with: isiw resume s.mcap session.toml" in refused.output
-    assert "limit (before the first trial): " in isiw("show", "s.mcap").output
+    assert "limit (no trial): " in isiw("show", "s.mcap").output
 
 
 def test_a_rig_that_stimulates_is_checked_only_when_somebody_says_so(isiw: Command, tmp_path: Path) -> None:

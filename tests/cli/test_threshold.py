@@ -59,7 +59,7 @@ def test_by_hand_what_is_typed_is_logged_and_nothing_beyond_the_limit_is_asked(t
     assert result.exit_code == 0, result.output
     assert "set 61 % MSO" not in result.output
     assert "set 60 % MSO" in result.output
-    assert "The range ends too low, at 60 %" in result.output
+    assert "(this range ends at 60 % MSO)" in result.output
     again = run(log, *options)
     assert again.exit_code == 1
     assert "--resume" in again.output

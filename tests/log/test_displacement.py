@@ -139,7 +139,7 @@ def test_a_log_that_cannot_be_renamed_says_where_it_is(
 ) -> None:
     for way in ("hardlink_to", "rename"):
         monkeypatch.setattr(Path, way, no_rename)
-    with pytest.raises(LogError, match=r"cannot be given its name.*s\.mcap\.part"):
+    with pytest.raises(LogError, match=r"the finished log cannot be renamed.*s\.mcap\.part"):
         log.close()
     assert read_session(path).finished
     assert len(read_session(path).table) == 5

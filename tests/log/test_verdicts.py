@@ -17,7 +17,7 @@ def a_mistrial(mep_mv: float, reason: MistrialReason = MistrialReason.IMPLAUSIBL
 @pytest.mark.parametrize(
     ("mep_mv", "reason", "why"),
     [
-        (194.0, MistrialReason.IMPLAUSIBLE, r"194 mV is more than any muscle gives.*Is it in µV\?.*asked again"),
+        (194.0, MistrialReason.IMPLAUSIBLE, r"194 mV is more than any muscle gives.*Is it in µV\?.*remains a mistrial"),
         (194.0, MistrialReason.BACKGROUND_ACTIVITY, "194 mV is more than any muscle gives"),
         (0.0001, MistrialReason.IMPLAUSIBLE, "less than any amplifier's noise"),
         (0.0, MistrialReason.IMPLAUSIBLE, "its EMG does not move in the MEP window"),

@@ -46,7 +46,7 @@ def test_what_was_synced_can_be_read_while_the_session_runs(tmp_path: Path, head
 @pytest.mark.parametrize("name", ["s.mcap", "s.mcap.part"])
 def test_an_existing_log_is_never_overwritten(tmp_path: Path, header: Header, name: str) -> None:
     (tmp_path / name).write_bytes(b"precious")
-    with pytest.raises(LogError, match=r"never overwritten.*no log that can be continued"):
+    with pytest.raises(LogError, match=r"never overwritten.*not a log that can be continued"):
         LogWriter.create(tmp_path / "s.mcap", header)
     assert (tmp_path / name).read_bytes() == b"precious"
 

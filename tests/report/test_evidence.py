@@ -64,7 +64,7 @@ def test_larger_meps_too_few_of_them_and_no_window_contradict_nothing(
 
 def test_a_window_with_hardly_a_trial_outside_has_nothing_to_be_compared_with() -> None:
     told = trials([1.0, 1.1, 0.9, 1.0, 1.0], [1.0])
-    assert "1 of 6 pairs are outside, and 0 pulses were TMS alone" in str(no_comparison(WINDOW, told))
+    assert "1 of 6 pairs are outside, and the number of pulses of TMS alone was 0" in str(no_comparison(WINDOW, told))
     alone = [Trial(6 + k, Status.ACCEPTED, None, mep_mv=0.02) for k in range(3)]
     assert no_comparison(WINDOW, [*told, *alone]) is None
     assert no_comparison(None, told) is None
@@ -94,7 +94,7 @@ def test_amplitudes_that_are_all_zero_are_doubted_and_find_nothing(tmp_path: Pat
     with isiw.open_session(scripted_strategy(12), tmp_path / "zeros.mcap") as session:
         for _ in range(9):
             session.tell(session.ask(), 0.0)
-        with pytest.warns(UserWarning, match="None of the first 10 pulses gave an MEP"):
+        with pytest.warns(UserWarning, match="None of the first 10 pulses evoked an MEP"):
             session.tell(session.ask(), 0.0)
         for _ in range(2):
             session.tell(session.ask(), 0.0)

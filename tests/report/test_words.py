@@ -176,12 +176,12 @@ def run_by(record: SessionRecord, name: str, *, delay_ms: tuple[float, float] | 
 
 
 def test_a_hit_delay_that_nobody_stated_is_said_to_have_cost_stimuli(record: SessionRecord) -> None:
-    said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms), which would have saved stimuli"
+    said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms); stating it usually saves stimuli."
     unstated = run_by(record, "default", delay_ms=None)
-    assert f"{said}." in final_statement(unstated)
+    assert said in final_statement(unstated)
     wave = Channel(np.zeros(10), 1000.0, "m/s^2")
     with_sensor = replace(unstated, waveforms={(0, "acceleration"): wave}, path=Path("a lab/s.mcap"))
-    assert f"{said}; isiw timing 'a lab/s.mcap' measures it." in final_statement(with_sensor)
+    assert f"{said} isiw timing 'a lab/s.mcap' measures it." in final_statement(with_sensor)
 
 
 def test_a_hit_delay_that_only_the_device_was_told_is_said_to_have_cost_stimuli(record: SessionRecord) -> None:
@@ -266,7 +266,9 @@ def test_where_no_estimate_can_be_read_it_is_said_what_was_given_and_what_is_los
 
 def test_a_log_of_which_a_header_is_left_says_how_many_pulses_it_asks_for(record: SessionRecord) -> None:
     cut = type(record)(record.path, record.header, (), {}, ("It was cut off.",), False, end_lost=True)
-    assert final_statement(cut).startswith("No trial can be read, and the log is damaged. The log's end is missing;")
+    assert final_statement(cut).startswith(
+        "No trial can be read, and the log is damaged. The end of the log is missing."
+    )
     assert "--lost-pulses" in final_statement(cut)
 
 

@@ -130,7 +130,7 @@ def test_others_may_ask_only_with_tls(tmp_path: Path) -> None:
             ServerSettings(tmp_path, host)
     with pytest.raises(ConfigError, match="belong together"):
         ServerSettings(tmp_path, certificate=tmp_path / "c.pem")
-    with pytest.raises(ConfigError, match="no address"):
+    with pytest.raises(ConfigError, match="not an IP address"):
         ServerSettings(tmp_path, "lab.example")
     with pytest.raises(InvalidValueError, match="port"):
         ServerSettings(tmp_path, port=70_000)

@@ -63,7 +63,7 @@ def tense(stimulus: Stimulus) -> Measurement:
 def test_three_mistrials_in_a_row_pause_the_session_and_resuming_gives_three_more(log: Path) -> None:
     result = Session(ScriptedDevice(tense), scripted_strategy(20), log=log).run()
     assert len(result.trials) == 3
-    assert result.decision.reason.startswith("The session is paused: 3 trials in a row were rejected")
+    assert result.decision.reason.startswith("The session is paused: Something was wrong in 3 trials in a row")
     assert "isiw resume" in final_statement(read_session(log))
     assert len(resume(log, ScriptedDevice(tense), scripted_strategy(20)).run().trials) == 6
     relaxed = resume(log, ScriptedDevice(), scripted_strategy(20)).run()
@@ -185,4 +185,4 @@ def test_a_fault_of_trials_that_count_is_shown_once() -> None:
     lost = Trial(0, Status.MISTRIAL, 40.0, MistrialReason.ISI_OFF, isi_ms=90.0)
     for _ in range(3):
         watch = watch.after(lost, Measurement(0.1, 90.0))
-    assert "3 trials in a row were rejected" in (watch.reason or "")
+    assert "Something was wrong in 3 trials in a row" in (watch.reason or "")

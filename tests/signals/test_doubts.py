@@ -49,7 +49,7 @@ def test_pulses_that_give_no_mep_any_more_are_doubted(isis_ms: list[float | None
     doubt = doubt_of(FALLEN_SILENT_MV, None, isis_ms)
     assert doubt is not None
     assert doubt.kind is DoubtKind.STOPPED
-    assert "None of the last 10 pulses gave an MEP" in doubt.text
+    assert "None of the last 10 pulses evoked an MEP" in doubt.text
     assert doubt_of(FALLEN_SILENT_MV[:-1], None, isis_ms[:-1]) is None
     assert doubt_of(FALLEN_SILENT_MV, 0.05, isis_ms) is None  # most pulses evoke less than this limit
 

@@ -145,7 +145,7 @@ class Broken:
     ],
 )
 def test_the_suite_finds_a_broken_model(fault: str, promise: str) -> None:
-    with pytest.raises(AssertionError, match=f"broken promise: .*{promise}"):
+    with pytest.raises(AssertionError, match=f"check failed. Required: .*{promise}"):
         check_model(lambda: Broken(fault), VALVE_SPACE, order_tolerance_ms=20.0)
 
 

@@ -36,7 +36,7 @@ INTERRUPTED = 130  # what shells report for Ctrl-C
 
 NO_DEFAULT: dict[str, Any] = {"show_default": False}
 
-Overwrite = Annotated[bool, typer.Option(help="Replace a file that is there; a log never is.")]
+Overwrite = Annotated[bool, typer.Option(help="Replace an existing file (never a log).")]
 
 
 def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:

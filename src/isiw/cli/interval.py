@@ -32,8 +32,8 @@ def interval(  # noqa: PLR0913, PLR0917 - an option each
             help="Only this feedback: 1 score bar, 2 light, 3 produced time, 4 absolute error; may be repeated."
         ),
     ] = None,
-    trials: Annotated[int | None, typer.Option(help="In each mode; by default 200.", **NO_DEFAULT)] = None,
-    subject: Annotated[str | None, typer.Option(help="Who produces the intervals.", **NO_DEFAULT)] = None,
+    trials: Annotated[int | None, typer.Option(help="Trials in each mode; by default 200.", **NO_DEFAULT)] = None,
+    subject: Annotated[str | None, typer.Option(help="The person's code, for the log.", **NO_DEFAULT)] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the lights; default 0.", **NO_DEFAULT)] = None,
     rest_s: Annotated[float, typer.Option(help="Seconds of rest between two modes.")] = 120.0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with this log.")] = False,  # noqa: FBT002 - a flag

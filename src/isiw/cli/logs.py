@@ -26,13 +26,16 @@ def export(
         bool, typer.Option("--pseudonymise", help="Replace codes and dates, leave out notes; see docs/export.md.")
     ] = False,
 ) -> None:
-    """Export sessions as tables or as BIDS; of a damaged log what it has. Exit code 3 where anything is lacking."""
+    """Export sessions as tables or as BIDS.
+
+    A damaged log is exported as far as it can be read; the exit code is 3 if anything is missing.
+    """
     with errors_reported("Interrupted: nothing was written."):
         exported = isiw.export.export_logs(source, folder, to, pseudonymise=pseudonymise)
         for subject, pseudonym in exported.pseudonyms.items():
             show(f"{subject} is now {pseudonym}")
         if exported.pseudonyms:
-            show("Who is who is kept nowhere else.")
+            show("Keep this list if you need it: it is stored nowhere.")
         what = f"{counted(exported.sessions, 'session')} with {counted(exported.trials, 'trial')}"
         show(f"{what}: {exported.folder}", style="bold")
         exit_if_damaged(exported.lacking)

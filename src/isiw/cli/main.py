@@ -35,10 +35,10 @@ app.add_typer(serve.app)
 app.add_typer(logs.app)
 app.add_typer(interval.app)
 app.add_typer(threshold.app)
-new = typer.Typer(help="Write a starting point of your own.", no_args_is_help=True)
+new = typer.Typer(help="Write a template for your own rig.", no_args_is_help=True)
 app.add_typer(new, name="new")
 
-_INTERRUPTED = "Interrupted: the device is stopped and the log is closed."
+_INTERRUPTED = "Interrupted: the device is disarmed and the log is closed."
 
 Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
 Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **NO_DEFAULT)]
@@ -120,12 +120,12 @@ def resume(
     data: Data = None,
     lost_pulses: Annotated[
         int | None,
-        typer.Option(help="If the end of the log is missing: how many pulses it lacks.", **NO_DEFAULT),
+        typer.Option(help="If the end of the log is missing: how many delivered pulses are not in it.", **NO_DEFAULT),
     ] = None,
     verify: Annotated[bool, typer.Option(help="Check that the strategy chooses the same ISIs as in the log.")] = True,  # noqa: FBT002 - a flag of the command line
     live: Live = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
-    """Go on with a session that was interrupted: in its space and with its strategy, within the limits of CONFIG."""
+    """Continue an interrupted session, with its own ISI range and strategy, within the limits in CONFIG."""
     with errors_reported():
         record = isiw.config.read_to_resume(log, config)
         settings = isiw.config.load_config(config) if config else isiw.config.config_of_log(record)
@@ -147,7 +147,7 @@ def check(
 
     The limits of CONFIG hold, as in a session.
     """
-    with errors_reported("Interrupted: the device is stopped."):
+    with errors_reported("Interrupted: the device is disarmed."):
         settings = isiw.config.load_config(config)
         isiw.config.require_device(settings, config)
         device, space = isiw.config.device_for(settings), settings.space.design()
@@ -166,12 +166,12 @@ def check(
         except AssertionError as broken:
             show(f"{broken}", style="red", stderr=True)
             raise typer.Exit(1) from broken
-        show("The device keeps what isiw asks of it.", style="bold")
+        show("The device passed the check.", style="bold")
 
 
 @new.command("rig")
 def new_rig(
-    folder: Annotated[Path, typer.Argument(help="Where to; by default here.")] = Path(),
+    folder: Annotated[Path, typer.Argument(help="The folder to write to; by default the current one.")] = Path(),
 ) -> None:
     """Write a commented starting point for your own rig: device, configuration and test."""
     with errors_reported():
@@ -191,7 +191,7 @@ def show_log(log: Log) -> None:
         for row in (isiw.report.TRIAL_HEADINGS, *isiw.report.trial_rows(record)):
             show(isiw.session.aligned(row))
         for event in record.events:
-            when = "before the first trial" if event.trial is None else f"trial {event.trial}"
+            when = "no trial" if event.trial is None else f"trial {event.trial}"
             show(f"{event.kind} ({when}): {event.text}")
         show(isiw.report.final_statement(record), style="bold")
         exit_if_damaged(record.losses)
@@ -259,7 +259,7 @@ def include(
 
 @app.command()
 def strategies(
-    name: Annotated[str | None, typer.Argument(help="List what can be set about this one.", **NO_DEFAULT)] = None,
+    name: Annotated[str | None, typer.Argument(help="A strategy's name: list its settings.", **NO_DEFAULT)] = None,
 ) -> None:
     """List the named strategies and what each does, or the settings of one."""
     if name is None:

@@ -28,7 +28,7 @@ LabFile = Annotated[Path, typer.Argument(help="A lab's prior (TOML).", **NO_DEFA
 @app.command()
 def learn(
     logs: Annotated[list[Path], typer.Argument(help="The logs of sessions, one a person.", **NO_DEFAULT)],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Where to: .toml")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The file to write (.toml).")],
     again: Annotated[bool, typer.Option(help="Count a second session of the same person as another person.")] = False,  # noqa: FBT002 - a flag
     damaged: Annotated[bool, typer.Option("--damaged", help="Learn what is left of damaged logs.")] = False,  # noqa: FBT002 - a flag
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 0,
@@ -58,7 +58,7 @@ def show_prior(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag
 ) -> None:
-    """Say what a lab's people are like, beside what is believed of people in general."""
+    """Show what a lab's people are like, compared with the built-in prior."""
     with errors_reported():
         lab = isiw.priors.read_lab_prior(source)
         _print(lab)

@@ -20,18 +20,21 @@ TOKEN = "ISIW_TOKEN"  # noqa: S105 - the variable's name
 
 @app.command()
 def serve(
-    folder: Annotated[Path, typer.Argument(help="Where the logs are; made where it is missing.", **NO_DEFAULT)],
+    folder: Annotated[Path, typer.Argument(help="The folder for the logs; created if missing.", **NO_DEFAULT)],
     host: Annotated[str, typer.Option(help="The address to listen on; any but 127.0.0.1 needs TLS.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="The port; 0 for any that is free.")] = 8473,
     token_file: Annotated[
         Path | None,
-        typer.Option(help=f"The token's file; by default {TOKEN} in the environment, or a random token.", **NO_DEFAULT),
+        typer.Option(
+            help=f"A file with the token; by default the token is {TOKEN} from the environment, or a random one.",
+            **NO_DEFAULT,
+        ),
     ] = None,
     certificate: Annotated[Path | None, typer.Option(help="A TLS certificate (PEM).", **NO_DEFAULT)] = None,
     key: Annotated[Path | None, typer.Option(help="Its key (PEM).", **NO_DEFAULT)] = None,
 ) -> None:
     """Serve sessions over HTTP to MATLAB, LabVIEW or any other software of this computer."""
-    with errors_reported("The server has ended; its sessions go on once they are resumed."):
+    with errors_reported("The server has ended; its sessions can be resumed."):
         given = _token(token_file) if token_file else os.environ.get(TOKEN)
         settings = isiw.server.ServerSettings(
             folder, host, port, certificate=certificate, key=key, **({} if given is None else {"token": given})
@@ -49,5 +52,5 @@ def _token(file: Path) -> str:
         return file.read_text(encoding="utf-8").strip()
     except UnicodeDecodeError as error:
         raise isiw.errors.ConfigError(
-            "the token's file is no text", got=str(file), remedy="Write the token into a file of its own."
+            "the token file is not text", got=str(file), remedy="Write the token into a file of its own."
         ) from error

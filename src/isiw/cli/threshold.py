@@ -24,7 +24,7 @@ app = typer.Typer()
 def threshold(  # noqa: PLR0913, PLR0917 - an option each
     log: Annotated[Path, typer.Argument(help="The log: a new file, unless --resume or --show is given.", **NO_DEFAULT)],
     by_hand: Annotated[  # noqa: FBT002 - a flag
-        bool, typer.Option("--by-hand", help="A real person: you set the stimulator, and type what came of it.")
+        bool, typer.Option("--by-hand", help="A real person: you set the stimulator, and type each result.")
     ] = False,
     high: Annotated[
         float | None,
@@ -38,7 +38,7 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
         str | None, typer.Option(help="bayes, maximum-likelihood or five-of-ten; default bayes.", **NO_DEFAULT)
     ] = None,
     max_pulses: Annotated[
-        int | None, typer.Option(help="Most pulses, lost ones included; default 100.", **NO_DEFAULT)
+        int | None, typer.Option(help="Largest number of pulses, including lost ones; default 100.", **NO_DEFAULT)
     ] = None,
     min_iti_s: Annotated[
         float | None, typer.Option(help="Shortest time between two pulses, in seconds; default 5.", **NO_DEFAULT)

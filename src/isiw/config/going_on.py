@@ -131,7 +131,8 @@ def _require_same_simulated(config: RunConfig, record: SessionRecord) -> None:
             "the configuration simulates another person",
             got=f"seed {config.seed}, {config.subject}",
             expected=f"seed {was.seed}, {was.subject}",
-            remedy=f"The log knows its simulated person: {command('resume', record.path)}",
+            remedy="Leave the configuration out; the simulated person's settings are in the log: "
+            f"{command('resume', record.path)}",
         )
 
 

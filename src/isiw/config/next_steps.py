@@ -24,7 +24,7 @@ def after_error(session: Session, config: Path | None, error: BaseException | No
     """
     limited = config is not None and isinstance(error, LimitExceededError)
     lines = (
-        [f"The limits stand under [limits] in {config}; they are read anew when the session is resumed."]
+        [f"The limits are under [limits] in {config}; they are read again when the session is resumed."]
         if limited
         else []
     )

@@ -196,9 +196,10 @@ class PunctualDevice:
         with self._stopping:  # else a `stop` that comes meanwhile would take the device for disarmed
             if _abandoned.busy(self._device):
                 raise DeviceError(
-                    "the device is not armed: what was given up is still busy, and could yet fire",
+                    "the device was not armed: an earlier call, for which isiw no longer waits, is still running and "
+                    "could still fire",
                     got=self._name,
-                    remedy="See to the device and try again; or end this process, and go on with the session's log.",
+                    remedy="Check the device and try again; or end this process and resume the session from its log.",
                 )
             self._staged, self._stopped, self._disarmed = True, False, False
             call = self._begun(self._device.stage)
@@ -309,10 +310,12 @@ class PunctualDevice:
         if call.kept(deadline_s):
             return call.result()
         error = DeviceTimeoutError(
-            f"the device was given up: {name} took too long",
+            f"the device did not answer in time: {name}",
             got=self._name if name != "describe" else None,
             expected=f"an answer within {deadline_s:g} s",
-            remedy="It is disarmed. See to it, then go on with the session's log.",
+            remedy="The device was disarmed. Check it, then resume the session from its log."
+            if name != "describe"
+            else "Nothing was armed by this session. Check the device, then start again.",
         )
         if name != "describe":
             self._stop_after(error)

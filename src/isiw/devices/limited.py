@@ -110,12 +110,13 @@ class LimitedDevice:
                 "the next stimulus comes too early",
                 got=f"{wait_s:.3f} s before its time",
                 expected=f"at least {self._limits.min_iti_s:g} s between stimuli, and the rests of the limits",
-                remedy="Nothing was delivered. Sleep for wait_s() first.",
+                remedy="This stimulus was not delivered. Sleep for wait_s() first.",
             )
         self._check_state()
         if self._dead_man is not None and self._dead_man() is not True:
             raise LimitExceededError(
-                "the dead man's switch is not held", remedy="Nothing was delivered. Resume the session when it is."
+                "the dead man's switch is not held",
+                remedy="This stimulus was not delivered. Resume the session when the switch is held.",
             )
 
     def _check_state(self) -> None:
@@ -123,7 +124,7 @@ class LimitedDevice:
         if not state.ready:
             raise NotDelivered(
                 f"the device is not ready: {state.reason or 'it does not say why'}",
-                remedy="Nothing was delivered. Go on when it is ready.",
+                remedy="This stimulus was not delivered. Go on when the device is ready.",
             )
         self._limits.require_state(state)
 

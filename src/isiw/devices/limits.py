@@ -103,7 +103,7 @@ class Limits:
         interval_s("Limits.min_iti_s", self.min_iti_s)
         if self.max_block_pulses is not None and self.rest_s <= self.min_iti_s:
             raise InvalidValueError(
-                "the rest of the limits is no longer than the interval between two stimuli, so there is none",
+                "the rest of the limits is no longer than the interval between two stimuli, so it would have no effect",
                 got=f"rest_s {self.rest_s:g}, min_iti_s {self.min_iti_s:g}",
                 expected=f"rest_s above {self.min_iti_s:g}",
                 remedy="Set a longer rest_s [s], or leave out max_block_pulses and rest_s.",
@@ -111,7 +111,7 @@ class Limits:
         # At the shortest interval n stimuli take so long that the next one comes when the first is n intervals old.
         if self.max_period_pulses is not None and self.period_s <= self.max_period_pulses * self.min_iti_s:
             raise InvalidValueError(
-                "the period of the limits limits nothing, as the interval alone lets no more stimuli into it",
+                "the period limit has no effect: at the shortest interval no more than max_period_pulses fit into it",
                 got=f"period_s {self.period_s:g}, max_period_pulses {self.max_period_pulses}, "
                 f"min_iti_s {self.min_iti_s:g}",
                 expected=f"period_s above {self.max_period_pulses * self.min_iti_s:g}",
@@ -130,7 +130,7 @@ class Limits:
         if delivered >= self.max_pulses:
             raise LimitExceededError(
                 f"the limit of {self.max_pulses} pulses is reached",
-                remedy="Nothing was delivered. For more pulses raise max_pulses in the limits.",
+                remedy="This stimulus was not delivered. For more pulses raise max_pulses in the limits.",
             )
 
     def require_isi(self, isi_ms: float) -> None:
@@ -144,14 +144,16 @@ class Limits:
                 "the ISI is beyond the limits",
                 got=isi_ms,
                 expected=f"{self.low_ms:g} to {self.high_ms:g} ms",
-                remedy="Nothing was delivered. Give the limits the whole range of the design space.",
+                remedy="This stimulus was not delivered. Narrow the design space to the limits; widen the limits only "
+                "if your ethics approval allows it.",
             )
         if self.step_ms is not None and self._off_grid_ms(isi_ms) > _GRID_TOLERANCE_MS:
             raise LimitExceededError(
                 "the ISI is not on the grid of the limits",
                 got=isi_ms,
                 expected=f"{self.low_ms:g} ms and steps of {self.step_ms:g} ms",
-                remedy="Nothing was delivered. Give the limits the grid of the design space.",
+                remedy="This stimulus was not delivered. Use the same low_ms and step_ms in the design space and in "
+                "the limits.",
             )
 
     def _off_grid_ms(self, isi_ms: float) -> float:
@@ -170,7 +172,7 @@ class Limits:
                 "the coil is too hot, or its temperature is not known",
                 got="no temperature" if coil_c is None else f"{coil_c:g} °C",
                 expected=f"at most {self.max_coil_c:g} °C",
-                remedy=f"Nothing was delivered. {way_on}, then resume the session.",
+                remedy=f"This stimulus was not delivered. {way_on}, then resume the session.",
             )
         if self.intensity_pct_mso is not None and intensity != self.intensity_pct_mso:
             reporting = "Let the device's readiness() report intensity_pct_mso"
@@ -178,7 +180,7 @@ class Limits:
                 "the intensity is not the session's, or is not known",
                 got="no intensity" if intensity is None else f"{intensity:g} % MSO",
                 expected=f"{self.intensity_pct_mso:g} % MSO",
-                remedy="Nothing was delivered. "
+                remedy="This stimulus was not delivered. "
                 f"{reporting if intensity is None else 'Set the intensity back'}, then resume the session.",
             )
 

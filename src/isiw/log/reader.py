@@ -279,5 +279,5 @@ def require_records(records: Iterable[object]) -> None:
     for record in records:
         if not isinstance(record, SessionRecord):
             raise InvalidValueError(
-                "this is no record of a session", got=record, remedy="Read the log first: isiw.read_session(path)."
+                "this is not a session record", got=record, remedy="Read the log first: isiw.read_session(path)."
             )

@@ -25,7 +25,7 @@ VERDICTS: Final[dict[EventKind, Callable[[Trial], Trial]]] = {
 LOOKED_AT: Final = "Rejected by the operator after looking at the MEP."
 """The reason of an exclusion that rejects an MEP."""
 
-_KEPT: Final = "Its waveforms, where there are any, stay in the log; the ISI is asked again."
+_KEPT: Final = "It remains a mistrial; its waveforms, if any, stay in the log."
 
 
 def under(trial: Trial, event: Event) -> Trial:
@@ -130,7 +130,7 @@ def _placed(trial: Trial, space: DesignSpace) -> bool:
 def _require(verb: str, number: int, possible: list[int], which: str) -> None:
     if number not in possible:
         raise InvalidValueError(
-            f"there is no such trial to {verb}",
+            f"cannot {verb} this trial",
             got=number,
-            expected=f"one {which}: {', '.join(map(str, possible)) or 'there is none'}",
+            expected=f"a trial {which}: {', '.join(map(str, possible)) or 'none'}",
         )

@@ -230,7 +230,7 @@ class LogWriter:
             self._file.flush()
             self._save_if_displaced()
             with disk_errors(
-                self._file.path, "the log cannot be given its name", f"It is complete, at {self._file.path}."
+                self._file.path, "the finished log cannot be renamed", f"It is complete, at {self._file.path}."
             ):
                 self._take_its_name()
         finally:
@@ -301,7 +301,7 @@ def _way_on(existing: Path) -> str:
     try:
         found = salvage_file(existing)
     except LogError:
-        return "Choose another path; this is no log that can be continued."
+        return "Choose another path; this is not a log that can be continued."
     topics = {message.topic for message in found.messages}
     name = log_of(existing)
     if "/production_header" in topics:

@@ -99,7 +99,7 @@ def after(
     """
     _require_days_of_one_person(records)
     if not isinstance(prior, Prior | None):
-        raise InvalidValueError("this is no prior", got=prior, expected="what isiw.priors.load(path) reads")
+        raise InvalidValueError("this is not a prior", got=prior, expected="what isiw.priors.load(path) reads")
     prior, law = prior or Prior(), law or DayToDay()
     for record in records if not damaged else ():
         require_whole(record)

@@ -28,7 +28,7 @@ OF_REST = 8.0
 
 ENOUGH_TO_STAND_OUT = 10
 
-_LOOK = "Did the stimulator fire, was the EMG recorded, was the intensity enough?"
+_LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high enough?"
 
 
 def nothing_estimated(record: SessionRecord) -> str:
@@ -143,7 +143,8 @@ def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:
     pairs = len(outside) + len(inside)
     return (
         f"Hardly anything shows how large MEPs are without enhancement: {len(outside)} of {pairs} pairs are outside, "
-        f"and {alone} pulses were TMS alone. Give TMS alone, or a wider range of ISIs."
+        f"and the number of pulses of TMS alone was {alone}. In the next session add TMS alone (in a configuration: "
+        "[protocol] tms_alone), or widen the range of ISIs."
     )
 
 

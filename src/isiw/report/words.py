@@ -84,7 +84,8 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
         ]
     if record.end_lost:
         sentences.append(
-            f"The log's end is missing; go on with the number of pulses that the stimulator counted besides: {way_on}"
+            "The end of the log is missing. Find out, with the stimulator's counter, the number N of pulses that isiw "
+            f"show does not list; then go on with: {way_on}"
         )
     elif last is not None and not last.stop:
         sentences.append(f"The session is not over; go on with: {way_on}")
@@ -96,7 +97,7 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
 def _resuming(record: SessionRecord, config: Path | None) -> str:
     """What goes on with a session: a command, or the call that a loop of the lab's own was begun with."""
     if SERVED_KEY in record.header.config:
-        lost = ", with lost_pulses in its body" if record.end_lost else ""
+        lost = ", with N as lost_pulses in its body" if record.end_lost else ""
         return f"POST /sessions/{log_of(record.path).stem}/resume to isiw serve{lost}"
     if record.header.device.name == OWN_LOOP:
         lost = ", lost_pulses=N" if record.end_lost else ""
@@ -295,11 +296,12 @@ def _unstated_hit_delay(record: SessionRecord) -> str:
         return ""
     if (stated_ms := header.device.hit_delay_ms) is not None:
         call = f"make_strategy(..., hit_delay_ms=({stated_ms[0]:g}, {stated_ms[1]:g}))"
-        return f"The strategy was not told the device's hit delay, which would have saved stimuli: {call}."
-    said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms), which would have saved stimuli"
+        said = "The strategy was not told the device's hit delay; telling it usually saves stimuli."
+        return f"{said} Next time: {call}."
+    said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms); stating it usually saves stimuli."
     if not any(name == "acceleration" for _, name in record.waveforms):
-        return f"{said}."
-    return f"{said}; {command('timing', record.path)} measures it."
+        return said
+    return f"{said} {command('timing', record.path)} measures it."
 
 
 def _expects_a_tap(record: SessionRecord) -> str:

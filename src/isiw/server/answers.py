@@ -113,7 +113,7 @@ class TrialAnswer(OkAnswer):
     mep_mv: float | None = None
     stop: bool
     stop_reason: str
-    doubts: list[str] = Field(default_factory=list, description="What looks like a slip, or like a rig in trouble.")
+    doubts: list[str] = Field(default_factory=list, description="What looks like a wrong unit or a fault of the rig.")
 
     @classmethod
     def of(cls, trial: Trial, decision: StopDecision, doubts: list[str]) -> Self:

@@ -130,7 +130,7 @@ class DrivenSession:
                 429,
                 "TooEarly",
                 f"the next stimulus is allowed in {wait_s:.1f} s",
-                remedy="Wait so long and send it again. Nothing was asked for.",
+                remedy="Wait that long and send the request again. Nothing was asked for.",
                 retry_s=wait_s,
             )
 
@@ -146,8 +146,8 @@ class DrivenSession:
             raise Refusal(
                 409,
                 "TrialOpen",
-                f"trial {asked.trial} is TMS alone, and what was told of it was refused",
-                remedy="Tell its outcome, or make it a mistrial.",
+                f"trial {asked.trial} is TMS alone, and its outcome was refused",
+                remedy="Tell a valid outcome, or make it a mistrial.",
             )
         if asked is not None and request.trial is None:
             raise Refusal(

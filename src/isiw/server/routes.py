@@ -58,7 +58,7 @@ def _errors(*statuses: int) -> dict[int | str, dict[str, Any]]:
 def _status_of_errors(
     errors: Annotated[
         Literal["200"] | None,
-        Query(description="Answer errors with status 200, for clients that cannot read the words of others."),
+        Query(description="Answer errors with status 200, for clients that cannot read the body of an error status."),
     ] = None,
 ) -> None:
     """Document `errors`; it is read where an error is answered."""

@@ -79,7 +79,7 @@ class ServerSettings:
             return ipaddress.ip_address("127.0.0.1" if self.host == "localhost" else self.host)
         except ValueError as error:
             raise ConfigError(
-                "the host is no address", got=self.host, expected="an IP address of this computer, or localhost"
+                "the host is not an IP address", got=self.host, expected="an IP address of this computer, or localhost"
             ) from error
 
     def rules(self) -> Rules:

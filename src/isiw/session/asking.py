@@ -60,7 +60,7 @@ class Asking:
             if number not in {None, self._number}:
                 raise InvalidValueError(
                     "the session has paused again since", got=number, expected=f"pause {self._number}",
-                    remedy="Look why it pauses now, and answer that.",
+                    remedy="Read why it is paused now, then answer that pause.",
                 )  # fmt: skip
             self._answer = goes_on
 

@@ -117,4 +117,4 @@ class Delivery:
 
 def _late_text(answer: Answer) -> str:
     what = f"{answer.mep_mv:g} mV" if isinstance(answer, Measurement) else "a sweep"
-    return f"An answer came after the deadline: {what}. It is not told."
+    return f"An answer came after the deadline: {what}. It is in the log, but is not used."

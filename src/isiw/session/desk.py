@@ -97,7 +97,10 @@ class Desk:
         self.screen.say(f"{reason} The device is disarmed. r goes on, q ends the session, which can be resumed later.")
         if self.shown is not None and self.shown != (last := self._session.trials[-1].index):
             self.shown = last
-            self.screen.say(f"Trial {last} was delivered; its row comes when the session goes on. x, a and j mean it.")
+            self.screen.say(
+                f"Trial {last} was delivered; its row appears when the session goes on. x, a and j now act on "
+                f"trial {last}."
+            )
         if self._note is not None:
             self.screen.say("First finish the note with Enter, or drop it with Esc.")
         return self._asking.wait(lambda: self._left_alone)

@@ -76,8 +76,8 @@ class Journal:
         if self._log is None:
             raise InvalidValueError(
                 "the session is not running, so nothing can be added to its log",
-                remedy="Do it while run() is busy, from on_trial or another thread. In a log at rest, isiw.exclude and "
-                "isiw.include judge trials.",
+                remedy="Do it while run() is busy, from on_trial or another thread. When no session is writing the "
+                "log, use isiw.exclude and isiw.include.",
             )
         return self._log
 

@@ -177,7 +177,7 @@ class Recorder(Judging):
         isi_ms = None if isi_ms is None else self.strategy.space.check_realised(isi_ms)
         if (isi_ms is None) != (asked.isi_ms is None):
             raise InvalidValueError(
-                "the outcome is another kind of trial than the one that was asked",
+                "the outcome is not of the kind of trial that was asked for",
                 got=isi_ms,
                 expected=f"the outcome of {'TMS alone' if asked.isi_ms is None else f'{asked.isi_ms:g} ms'}",
                 remedy="Tell that first, or call mistrial().",
@@ -212,7 +212,8 @@ class Recorder(Judging):
             self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known))
         lost = len(list(itertools.takewhile(lambda trial: trial.reason is not None, reversed(self.trials.trials))))
         if lost == self._limits.max_consecutive_mistrials:
-            self._warn(f"{lost} trials in a row were lost: {known}. {remedy_for(known)}")
+            mistrials = "1 mistrial" if lost == 1 else f"{lost} mistrials in a row, the last one"
+            self._warn(f"{mistrials}: {known}. {remedy_for(known)}")
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         with self._lock:

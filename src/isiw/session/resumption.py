@@ -62,16 +62,16 @@ def require_as_real(info: DeviceInfo, was: DeviceInfo) -> None:
             "the session was run with a real device, and cannot go on with a simulated one",
             got=info.name,
             expected=f"a real one, as {was.name} was",
-            remedy="Describe the device with DeviceInfo(..., simulated=False), which makes the session wait between "
-            "trials in real time.",
+            remedy="If this device is the real rig, set simulated = false (in its settings or DeviceInfo). If it is a "
+            "simulation, start a new session with it.",
         )
     if was.simulated and not info.simulated:
         raise DeviceError(
-            "the session was run with a simulated device, and its limits and trials are no person's",
+            "the session was run with a simulated device, so its trials are not from a person",
             got=info.name,
             expected=f"a simulated one, as {was.name} was",
-            remedy="Start a session of its own: isiw.Session(device, strategy, log=NEW_PATH), or "
-            "isiw.open_session(strategy, log=NEW_PATH).",
+            remedy="Start a new session: isiw run CONFIG, or in Python isiw.Session(device, strategy, log=NEW_PATH), "
+            "or isiw.open_session(strategy, log=NEW_PATH).",
         )
 
 

@@ -206,7 +206,7 @@ def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtoc
     assumed = strategy.recipe.settings.get("conditioning", info.conditioning)
     if info.conditioning not in {"tap", assumed}:  # a tap is also what a device says that states nothing
         raise DeviceError(
-            "the device gives another conditioning stimulus than the strategy expects, so windows would be missed",
+            "the device's conditioning stimulus is not the one that the strategy expects, so windows would be missed",
             got=info.conditioning,
             expected=assumed,
             remedy=f'Make the strategy with the device\'s: make_strategy(..., conditioning="{info.conditioning}").',

@@ -13,7 +13,7 @@ from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limited import require_real_time
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
-from isiw.errors import DamagedLogError, InvalidValueError, told
+from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError, told
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import salvage
@@ -204,7 +204,7 @@ class ThresholdRecorder:
             LogError: the log cannot be written, or is no longer at its path; deliver nothing.
         """
         if self._asked is None:
-            self._limits.require_left(self.given)
+            self._require_left()
             intensity = self.search.ask()
             self._clock.sleep_s(self._limits.earliest_s(self._times_s, self._made_s) - self._clock.now_s())
             now_s = self._clock.now_s()
@@ -267,7 +267,11 @@ class ThresholdRecorder:
         """
         counting = [outcome.trial for outcome in self.outcomes if not outcome.reason]
         if trial not in counting:
-            raise InvalidValueError("there is no such pulse to exclude", got=trial, expected=f"one of {counting}")
+            raise InvalidValueError(
+                "cannot exclude this pulse",
+                got=trial,
+                expected=f"a pulse that counts: {', '.join(map(str, counting)) or 'none'}",
+            )
         self._log.append(Event(kind="exclusion", trial=trial, text=_a_reason(reason)))
         self._outcomes[trial] = self._outcomes[trial].model_copy(update={"reason": reason})
         self._learn()
@@ -295,6 +299,13 @@ class ThresholdRecorder:
                 self._log.append(Event(kind="fault", text=told(error)))
         finally:
             self.close()
+
+    def _require_left(self) -> None:
+        if self.given >= self._limits.max_pulses:
+            raise LimitExceededError(
+                f"the limit of {self._limits.max_pulses} pulses is reached, so no further pulse is asked for",
+                remedy="For more pulses begin a new log with a larger --max-pulses (max_pulses in Python).",
+            )
 
     def _require_asked(self) -> float:
         if self._asked is None:

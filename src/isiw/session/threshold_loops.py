@@ -23,9 +23,9 @@ _SIMULATED = "isiw_threshold"
 """The name under which a log keeps who is simulated."""
 
 ANSWERS: Final = (
-    "After each pulse type the MEP's amplitude in mV (0.08, or 80 uV), y or n where you only saw whether there was one "
-    "above 50 uV, x where the pulse was lost, u to take the last answer back. Instead of giving a pulse "
-    "type q to end here and go on later: it then counts as not given."
+    "After each pulse type the MEP's amplitude in mV (0.08, or 80 uV); y or n if you only saw on the screen whether it "
+    "was above 50 uV; x if the pulse cannot be used; u to take the last answer back. To stop here and resume later, "
+    "type q without giving the pulse: it then counts as not given."
 )
 
 _LAST_WORD: Final = "Enter ends, u takes the last answer back: "
@@ -195,14 +195,20 @@ def amplitude_of(typed: str) -> float:
     """
     found = _AMPLITUDE.fullmatch(text("an amplitude", typed).strip())
     if found is None:
-        raise InvalidValueError("this is no answer", got=typed, expected="an amplitude in mV, or y, n, x, u or q")
+        raise InvalidValueError(
+            "this is not a valid answer", got=typed, expected="an amplitude in mV, or y, n, x, u or q"
+        )
     if _THOUSANDS.search(found[1]) and (found[2] or "mv").lower() != "mv":
         raise InvalidValueError(
-            "the separator may be that of thousands", got=typed, remedy="Type it without a separator, as in 1200 uV."
+            "it is not clear whether the separator is a decimal or a thousands separator",
+            got=typed,
+            remedy="Type it without a separator, as in 1200 uV.",
         )
     value, unit = float(found[1].replace(",", ".")), (found[2] or "").lower()
     if unit == "" and value > SURELY_MV:
         raise InvalidValueError(
-            "so large an amplitude needs its unit", got=typed, remedy=f"Type {value:g} uV, or {value:g} mV if it is so."
+            f"an amplitude above {SURELY_MV:g} needs its unit",
+            got=typed,
+            remedy=f"Type {value:g} uV or {value:g} mV.",
         )
     return value if unit in {"", "mv"} else value / 1000

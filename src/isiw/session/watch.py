@@ -9,7 +9,7 @@ from typing import Final
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer
 from isiw.signals.doubts import Doubts, doubt_of, doubts_of
-from isiw.signals.faults import likely_fault, remedy_for, too_early_by_chance
+from isiw.signals.faults import Fault, likely_fault, remedy_for, too_early_by_chance
 from isiw.signals.limits import SignalLimits
 from isiw.trials import MistrialReason, Trial, TrialTable
 
@@ -82,14 +82,20 @@ class Watch:
             learned = replace(before, in_a_row=0, reason=None)
         else:
             count = self.in_a_row + 1
-            said = f"{count} trials in a row were rejected: {fault}" if trial.reason else f"{fault}"
-            reason = said if count >= self.max_in_a_row else None
-            learned = replace(before, in_a_row=count, reason=reason)
+            learned = replace(
+                before, in_a_row=count, reason=_said(fault, count) if count >= self.max_in_a_row else None
+            )
         if trial.commanded_isi_ms is not None:  # a control trial says nothing about an ISI
             learned = replace(learned, early_ms=None, early=0)
         if trial.mep_mv is None or not trial.told:
             return learned
         return _with_amplitude(learned, trial.mep_mv, trial.isi_ms)
+
+
+def _said(fault: Fault, count: int) -> str:
+    if count == 1:
+        return f"Something was wrong in the last trial: {fault}"
+    return f"Something was wrong in {count} trials in a row, in the last one: {fault}"
 
 
 def _with_amplitude(watch: Watch, mep_mv: float, isi_ms: float | None) -> Watch:

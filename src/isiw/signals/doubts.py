@@ -49,7 +49,7 @@ class DoubtKind(StrEnum):
     ISI_OFF = "ISI far from the one asked"
     EQUAL = "equal amplitudes"
     SILENT = "no MEP at all"
-    STOPPED = "no MEP any more"
+    STOPPED = "no more MEPs"
     SMALL = "small amplitudes"
     LARGE = "large amplitudes"
     JUMP = "a jump of the scale"
@@ -119,14 +119,14 @@ def doubt_of(
         return alike
     seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
     if len(meps_mv) >= SILENT_FROM_THE_START and is_silent(meps_mv, detection_limit_mv):
-        text = f"None of the first {len(meps_mv)} pulses gave an MEP: every amplitude is 0."
-        ask = "Does the stimulator fire, is the EMG recorded, is the intensity enough?"
+        text = f"None of the first {len(meps_mv)} pulses evoked an MEP: every amplitude is 0."
+        ask = "Does the stimulator fire? Is the EMG recorded? Is the intensity high enough?"
         return Doubt(DoubtKind.SILENT, f"{text} {ask}")
     knows = bool(isis_ms) and not _zeros_are_usual(detection_limit_mv)
     first = stopped_after(isis_ms, [mep_mv > 0 for mep_mv in meps_mv]) if knows else None
     if first is not None:
-        text = f"None of the last {len(meps_mv) - first} pulses gave an MEP, though earlier ones did."
-        return Doubt(DoubtKind.STOPPED, f"{text} Does the stimulator still fire, is the coil in its place?")
+        text = f"None of the last {len(meps_mv) - first} pulses evoked an MEP, though earlier ones did."
+        return Doubt(DoubtKind.STOPPED, f"{text} Does the stimulator still fire? Is the coil still in place?")
     return _doubt_of_scale(seen[:-IN_A_ROW], seen[-IN_A_ROW:]) if len(seen) >= IN_A_ROW else None
 
 

@@ -61,8 +61,10 @@ _REMEDIES: Mapping[MistrialReason, str] = MappingProxyType(
     {
         MistrialReason.NO_IMPACT: "Check the air supply, the valve, and the accelerometer on the hammer.",
         MistrialReason.NO_PULSE: "Check that the stimulator is charged and armed, and that its trigger is recorded.",
-        MistrialReason.TMS_BEFORE_IMPACT: "Check the hit delay that the rig reckons with, and the sampling rate.",
-        MistrialReason.BACKGROUND_ACTIVITY: "Let the person relax the muscle; check electrodes, ground and mains hum.",
+        MistrialReason.TMS_BEFORE_IMPACT: "Check the hit delay that the rig assumes, and the sampling rate.",
+        MistrialReason.BACKGROUND_ACTIVITY: (
+            "Ask the person to relax the muscle; check the electrodes and the ground, and look for mains hum."
+        ),
         MistrialReason.SATURATION: "Lower the amplifier's gain, or keep cables away from the coil.",
         MistrialReason.MISSING_CHANNEL: (
             "Check that the EMG is recorded, and not blanked, from 50 ms before to 50 ms after the pulse."
@@ -116,9 +118,7 @@ def _fault_of_sweep(sweep: Sweep, trial: Trial) -> Fault | None:
     if not is_recording(emg.values):
         return Fault("the EMG is a flat line", "Is the amplifier on, and its cable plugged in?")
     if not of_one_length(sweep):
-        return Fault(
-            "EMG and acceleration do not last equally long", "Check the sampling rates that the channels are given."
-        )
+        return Fault("EMG and acceleration differ in duration", "Check the sampling rates that the channels are given.")
     found = _fault_of_hammer(sweep, emg, acceleration) or _fault_of_start(sweep, trial)
     if trial.reason is not None and found is not None:
         return found
@@ -177,8 +177,8 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
     if steepest_ms is None or any(first <= steepest_ms <= last for first, last in spans):
         return None
     return Fault(
-        f"the steepest edge of the EMG is at {steepest_ms:.0f} ms, and the pulse at {trial.t_tms_ms:.0f} ms as the "
-        "device says",
+        f"the steepest edge of the EMG is at {steepest_ms:.0f} ms, but the device reports the pulse at "
+        f"{trial.t_tms_ms:.0f} ms",
         "Is that edge the pulse's? Then check the sampling rate, and that all times are on the sweep's own clock.",
     )
 

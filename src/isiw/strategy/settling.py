@@ -102,8 +102,8 @@ class SweptPast:
         """Decide whether to stop."""
         window, swept_ms = progress.estimate.window, progress.estimate.grid_ms
         if window is None or swept_ms is None:
-            return StopDecision(stop=False, reason="The sweep has met no window yet.")
-        behind = f"it has come {swept_ms[-1] - window.end_ms:.0f} ms behind the window's end"
+            return StopDecision(stop=False, reason="The scan of ISIs has found no window yet.")
+        behind = f"it is {swept_ms[-1] - window.end_ms:.0f} ms past the window's end"
         if swept_ms[-1] - window.end_ms >= self.quiet_ms:
-            return StopDecision(stop=True, reason=f"The sweep has passed the window: {behind}.")
-        return StopDecision(stop=False, reason=f"The sweep has not passed the window: {behind}.")
+            return StopDecision(stop=True, reason=f"The scan of ISIs has passed the window: {behind}.")
+        return StopDecision(stop=False, reason=f"The scan of ISIs has not passed the window: {behind}.")

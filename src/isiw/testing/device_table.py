@@ -66,7 +66,7 @@ def device_table(info: DeviceInfo, deliveries: Sequence[Delivery], limits: Signa
             ("amplitudes in it", _amplitudes(trials)),
             ("pulse artefact", _artefacts(deliveries)),
             ("units", ", ".join(f"{name} in {unit}" for name, unit in info.channels.items()) or "MEP in mV"),
-            ("time a trial", f"{max(delivery.took_s for delivery in deliveries):.2g} s at most"),
+            ("time per trial", f"{max(delivery.took_s for delivery in deliveries):.2g} s at most"),
             ("judged", ", ".join(f"{trial.reason or 'accepted'}" for trial in trials)),
         )
     )
@@ -89,7 +89,7 @@ def _impacts(deliveries: Sequence[Delivery]) -> str:
         and "acceleration" in delivery.answer.channels
     ]
     if not measured:
-        return "told by the device, or not needed"
+        return "given by the device, or not needed"
     return f"{sum(delivery.trial.t_hit_ms is not None for delivery in measured)} of {len(measured)}"
 
 

@@ -137,7 +137,7 @@ class Guarded:
             answer = self._rig.deliver(stimulus, timeout_s)
         except DeviceTimeoutError as error:
             if (spent_s := time.monotonic() - began_s) > timeout_s:
-                seen = f"nothing after {spent_s:.3g} s, when it was given up and disarmed"
+                seen = f"nothing after {spent_s:.3g} s, when it timed out and was disarmed"
                 raise broken(_in_time(timeout_s), seen) from error
             raise
         self._delivered += 1

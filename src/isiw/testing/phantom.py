@@ -36,8 +36,8 @@ def artefact_in_window(deliveries: Sequence[Delivery], signals: SignalLimits) ->
             mep_mv, rest_mv = min(shown)
             sizes = f"{1e3 * mep_mv:.3g} µV in the MEP window, where the EMG before has {1e3 * rest_mv:.2g} µV"
             return (
-                f"a phantom has no muscle, and {what} has {sizes}: an artefact of the stimulator lies in it. "
-                "Is the pulse's time right?"
+                f"a phantom has no muscle, and {what} has {sizes}: a stimulator artefact lies in the MEP window. "
+                "Is the reported time of the pulse right?"
             )
     return None
 

@@ -49,7 +49,7 @@ def broken(promise: str, seen: str) -> AssertionError:
         promise: what must hold, as a clause.
         seen: what was found instead; empty where there is nothing to add.
     """
-    return AssertionError(f"broken promise: it is required that {promise}{f'; seen: {seen}' if seen else ''}")
+    return AssertionError(f"check failed. Required: {promise}{f'; found: {seen}' if seen else ''}")
 
 
 def usual_trials(space: DesignSpace) -> Trials:

@@ -108,8 +108,8 @@ def test_nothing_is_delivered_while_samples_are_late_or_ahead(now_s: float, word
 
 def test_nothing_is_delivered_while_a_stream_is_lost_or_silent() -> None:
     inlet = FakeInlet()
-    with pytest.raises(NotDelivered, match=r"the stream emg has fallen silent.*Nothing was delivered"):
+    with pytest.raises(NotDelivered, match=r"the stream emg has fallen silent.*This stimulus was not delivered"):
         stream(inlet).require_live(lambda: 0.0, 0.5)
     inlet.lost = True
-    with pytest.raises(NotDelivered, match=r"the stream emg is lost.*Nothing was delivered"):
+    with pytest.raises(NotDelivered, match=r"the stream emg is lost.*This stimulus was not delivered"):
         stream(inlet).require_live(lambda: 0.0, 0.5)

@@ -24,7 +24,7 @@ def test_a_range_that_cannot_be_is_refused(low: float, high: float, step: float)
 
 @pytest.mark.parametrize("intensity", [19.0, 81.0, 50.5])
 def test_what_is_beyond_the_range_or_off_its_grid_is_not_delivered(intensity: float) -> None:
-    with pytest.raises(LimitExceededError, match="Nothing was delivered"):
+    with pytest.raises(LimitExceededError, match="Ask for an intensity within the range"):
         SPACE.require(intensity)
 
 
@@ -49,7 +49,7 @@ def test_an_outcome_that_cannot_be_is_refused(*, mep_mv: float | None, response:
 def test_an_estimate_is_told_in_words() -> None:
     assert str(ThresholdEstimate(52.04)) == "Resting motor threshold: 52.0 % MSO."
     assert "90 % interval 50.0–54.0" in str(ThresholdEstimate(52.0, 50.0, 54.0))
-    assert str(ThresholdEstimate(None, reason="Why.")) == "No resting motor threshold. Why."
+    assert str(ThresholdEstimate(None, reason="Why.")) == "No threshold can be stated. Why."
 
 
 def test_an_estimate_beyond_the_range_has_no_number() -> None:

@@ -22,7 +22,7 @@ METHODS = list(list_threshold_methods())
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(("answer", "advice"), [(True, "begins too high, at 30 %"), (False, "ends too low, at 70 %")])
+@pytest.mark.parametrize(("answer", "advice"), [(True, "begins at 30 % MSO"), (False, "ends at 70 % MSO")])
 def test_answers_of_one_kind_never_give_a_number(*, method: str, answer: bool, advice: str) -> None:
     search = make_threshold_search(method, SPACE)
     while not search.decision().stop:
@@ -35,7 +35,7 @@ def test_answers_of_one_kind_never_give_a_number(*, method: str, answer: bool, a
 
 def test_before_the_first_pulse_there_is_no_number() -> None:
     search = make_threshold_search("bayes", SPACE)
-    assert str(search.estimate()) == "No resting motor threshold. Nothing was told yet."
+    assert str(search.estimate()) == "No threshold can be stated. Nothing was told yet."
     assert not search.decision().stop
 
 
@@ -62,7 +62,7 @@ def test_hum_at_one_intensity_gives_no_number_and_ends_with_the_budget() -> None
     assert {pulse.responded for pulse in search.pulses} == {True, False}
     assert search.estimate().threshold_pct_mso is None
     assert search.estimate().reason == search.decision().reason
-    assert "At 55 % MSO some pulses were answered and some not" in search.decision().reason
+    assert "At 55 % MSO some pulses evoked an MEP and some did not" in search.decision().reason
     assert "budget of 40 pulses is used up" in search.decision().reason
     assert "hum or an artefact" in search.decision().reason
 
@@ -83,7 +83,7 @@ def test_answered_pulses_must_be_larger_than_the_others() -> None:
         search.tell(44, 0.04)
         search.tell(45, 0.059)
     assert search.estimate().threshold_pct_mso is None
-    assert "59 µV in the median, is hardly larger than the rest, 40 µV" in search.decision().reason
+    assert "(median 59 µV) are hardly larger than the others (median 40 µV)" in search.decision().reason
     assert "hum or an artefact" in search.decision().reason
     for _ in range(7):
         search.tell(45, 0.07)
@@ -101,7 +101,7 @@ def test_answers_of_one_kind_end_with_the_budget(mep_mv: float) -> None:
 def test_the_budget_of_maximum_likelihood_holds_where_nothing_was_answered_yet() -> None:
     search = ended(make_threshold_search("maximum-likelihood", SPACE, pulses=3), lambda: 0.01)
     assert len(search.pulses) == 3
-    assert "No pulse was answered, up to " in search.decision().reason
+    assert "No pulse evoked an MEP, up to " in search.decision().reason
 
 
 @pytest.mark.parametrize("method", ["bayes", "maximum-likelihood"])
@@ -123,7 +123,7 @@ def test_a_mixture_at_the_end_of_the_range_still_ends_the_search() -> None:
     for number in range(9):
         low.tell(40, response=number % 2 == 0)
     assert low.decision().stop
-    assert "begins too high" in low.decision().reason
+    assert "begin a new search lower" in low.decision().reason
     high = make_threshold_search("bayes", IntensityRange(20, 40))
     for number in range(10):
         high.tell(40, response=number == 5)

@@ -237,7 +237,9 @@ class Exchange:
             kind = NotDelivered if (said, request.verb) == ("refused", Verb.DELIVER) else DeviceError
             raise kind(f"{self._name} {said} to {request.verb}: {reply.text('reason') or 'it does not say why'}")
         if said != _WANTED[request.verb]:
-            raise reply.broken(f"the answer to {request.verb} is another", got=said, expected=_WANTED[request.verb])
+            raise reply.broken(
+                f"the answer does not match the request to {request.verb}", got=said, expected=_WANTED[request.verb]
+            )
         if request.verb is Verb.DISARM:
             self._disarmed = max(self._disarmed, request.number)
         return reply

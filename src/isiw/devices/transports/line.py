@@ -264,7 +264,7 @@ class LineDevice:
                 if tried == _MOST_TRIES or given_up() or time.monotonic() >= end_s:
                     raise DeviceError(
                         f"the instrument does not confirm that it is disarmed: {error}",
-                        remedy="Whether it is armed is not known. See to it.",
+                        remedy="It may still be armed. Switch it off or open the interlock, then check the connection.",
                     ) from error
             else:
                 return
@@ -307,4 +307,7 @@ def _outcome_unknown() -> Iterator[None]:
     except Exception as error:
         if isinstance(error, DeviceError) and not isinstance(error, NotDelivered | LimitExceededError):
             raise
-        raise DeviceError(f"the stimulus was given, and its outcome is not known: {told(error)}") from error
+        raise DeviceError(
+            "the command to fire was sent, so the stimulus may have been given; its outcome is not known: "
+            f"{told(error)}"
+        ) from error

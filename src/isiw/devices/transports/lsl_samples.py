@@ -113,14 +113,16 @@ class SampleStream:
             begun_s = float(self._stamps_s[0]) + self._correction_s
             self._await(begun_s + history_s, time.monotonic() + history_s + LATE_S)
         except DeviceError as error:
-            raise NotDelivered(error.what, remedy="Nothing was delivered. Start it again, then resume.") from error
+            remedy = "This stimulus was not delivered. Start the stream again, then resume."
+            raise NotDelivered(error.what, remedy=remedy) from error
         age_s = clock() - self._newest_s
         if abs(age_s) > LATE_S:
             raise NotDelivered(
                 f"the samples of {self._name} are {'late' if age_s > 0 else 'ahead of time'}",
                 got=f"{abs(age_s):.3g} s",
                 expected=f"at most {LATE_S:g} s",
-                remedy="Nothing was delivered. Check the load of both computers, the network, and the sender's clock.",
+                remedy="This stimulus was not delivered. Check the load of both computers, the network, and the "
+                "sender's clock.",
             )
 
     def cut(self, start_s: float, end_s: float, until_s: float) -> tuple[float, FloatArray]:

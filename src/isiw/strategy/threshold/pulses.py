@@ -108,7 +108,7 @@ class IntensityRange:
                 "the intensity is beyond the limits, or not on their grid",
                 got=intensity_pct_mso,
                 expected=str(self),
-                remedy="Nothing was delivered. Ask for an intensity of the range.",
+                remedy="Ask for an intensity within the range.",
             )
 
 
@@ -166,7 +166,7 @@ class ThresholdEstimate:
 
     def __str__(self) -> str:
         if self.threshold_pct_mso is None:
-            return f"No resting motor threshold. {self.reason}"
+            return f"No threshold can be stated. {self.reason}"
         told = f"Resting motor threshold: {self.threshold_pct_mso:.1f} % MSO"
         if self.low_pct_mso is None or self.high_pct_mso is None:
             return f"{told}."
@@ -235,11 +235,17 @@ def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | 
     end = space.low_pct_mso if answered else space.high_pct_mso
     at_end = sum(abs(pulse.intensity_pct_mso - end) <= NEAR_THE_END_PCT_MSO for pulse in pulses)
     if answered:
-        seen = f"Every pulse was answered, down to {min(pulse.intensity_pct_mso for pulse in pulses):g} % MSO."
-        advice = f"The range begins too high, at {end:g} %. Or is the muscle not at rest, or the EMG not quiet?"
+        seen = f"Every pulse evoked an MEP, down to {min(pulse.intensity_pct_mso for pulse in pulses):g} % MSO."
+        advice = (
+            f"Begin a new search at a lower intensity (this range begins at {end:g} % MSO). Or is the muscle not at "
+            "rest, or the EMG not quiet?"
+        )
     else:
-        seen = f"No pulse was answered, up to {max(pulse.intensity_pct_mso for pulse in pulses):g} % MSO."
-        advice = f"The range ends too low, at {end:g} %. Or is the coil off the hot spot, or the amplifier off?"
+        seen = f"No pulse evoked an MEP, up to {max(pulse.intensity_pct_mso for pulse in pulses):g} % MSO."
+        advice = (
+            "Is the coil on the hot spot, and the amplifier on? If so, and if it is safe for this person, begin a new "
+            f"search with a higher maximum (this range ends at {end:g} % MSO)."
+        )
     return StopDecision(at_end >= ENOUGH_AT_THE_END, f"{seen} {advice}" if at_end >= ENOUGH_AT_THE_END else seen)
 
 
@@ -254,8 +260,8 @@ def not_growing(pulses: Sequence[Pulse]) -> str | None:
     if answered > missed:
         return None
     if answered == missed:
-        return f"At {missed:g} % MSO some pulses were answered and some not, and none was answered above it."
-    return f"Pulses were answered up to {answered:g} % MSO, but not from {missed:g} % MSO on."
+        return f"At {missed:g} % MSO some pulses evoked an MEP and some did not, and none above it did."
+    return f"Pulses evoked MEPs up to {answered:g} % MSO, but not from {missed:g} % MSO on."
 
 
 def hardly_larger(pulses: Sequence[Pulse]) -> str | None:
@@ -271,5 +277,7 @@ def hardly_larger(pulses: Sequence[Pulse]) -> str | None:
     answered, missed = float(np.median(answered_mv)), float(np.median(missed_mv))
     if answered > LEAST_RATIO * missed:
         return None
-    medians = f"{1e3 * answered:.0f} µV in the median, is hardly larger than the rest, {1e3 * missed:.0f} µV"
-    return f"What counts as an MEP, {medians}."
+    return (
+        f"The amplitudes that count as MEPs (median {1e3 * answered:.0f} µV) are hardly larger than the others "
+        f"(median {1e3 * missed:.0f} µV)."
+    )

@@ -71,25 +71,29 @@ class FiveOfTen:
             return self._upwards(short, space)
         if enough == space.low_pct_mso:
             return enough, StopDecision(
-                stop=True, reason=f"{enough:g} % MSO suffices, and the range has no less: it begins too high."
+                stop=True,
+                reason=f"{enough:g} % MSO is high enough (at least {self.enough} of {self.of} pulses evoke an MEP), "
+                "and it is the lowest intensity of the range: begin a new search lower.",
             )
         if short is None:
             return space.snap(enough - max(self.large_step_pct_mso, space.step_pct_mso)), _on(
-                f"{enough:g} % MSO suffices."
+                f"{enough:g} % MSO is high enough."
             )
         if enough - short > 1.5 * space.step_pct_mso:
-            return space.snap(enough - space.step_pct_mso), _on(f"It is between {short:g} and {enough:g} % MSO.")
-        return enough, StopDecision(stop=True, reason=f"{enough:g} % MSO suffices, and {short:g} % MSO does not.")
+            return space.snap(enough - space.step_pct_mso), _on(
+                f"The threshold is between {short:g} and {enough:g} % MSO."
+            )
+        return enough, StopDecision(stop=True, reason=f"{enough:g} % MSO is high enough, and {short:g} % MSO is not.")
 
     def _upwards(self, short: float | None, space: IntensityRange) -> tuple[float, StopDecision]:
         if short is None:
-            return space.snap(self.start_pct_mso), _on("No intensity suffices yet.")
+            return space.snap(self.start_pct_mso), _on("No intensity tested so far is high enough.")
         if short == space.high_pct_mso:
             return short, StopDecision(
-                stop=True, reason=f"{short:g} % MSO does not suffice, and the range has no more: it ends too low."
+                stop=True, reason=f"{short:g} % MSO, the highest intensity of the range, is not high enough."
             )
         return space.snap(short + max(self.large_step_pct_mso, space.step_pct_mso)), _on(
-            f"{short:g} % MSO does not suffice."
+            f"{short:g} % MSO is not high enough."
         )
 
 
