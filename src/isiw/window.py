@@ -190,8 +190,8 @@ class WindowEstimate:
         hypothesis_names: what the hypotheses are called.
         expected_f1: posterior mean of the F1 of the reported decision.
         best_isi: the ISI of the largest expected MEP.
-        largest_excluded: an enhancement that, with 90 % probability, is larger than the largest at any ISI of the space;
-            its shift is that of the window's peak, wherever it lies.
+        largest_excluded: an enhancement that, with 90 % probability, is larger than the largest at any ISI of the
+            space; its shift is that of the window's peak, wherever it lies.
         unusual: how probable it is that parts of this person are of another law than the usual one, by their names.
         pairs: how many pairs of stimuli it rests on; None where that is not known.
         silent: whether no trial that it rests on showed an MEP, so that nothing is known about a window.
