@@ -287,9 +287,27 @@ def test_the_intensity_at_staging_is_locked_also_when_it_is_staged_again(
     device.state = Readiness(intensity_pct_mso=60.0)
     limited.stop()
     limited.stage()
+    clock.sleep_s(limited.wait_s())
     with pytest.raises(LimitExceededError, match=r"60 % MSO.*55 % MSO"):
         limited.deliver(Stimulus(0, 10), 1.0)
     assert inner.delivered == []
+
+
+def test_an_intensity_is_the_same_up_to_what_a_conversion_loses(inner: ScriptedDevice, clock: VirtualClock) -> None:
+    device, limited = reporting(inner, clock, Readiness(intensity_pct_mso=55.0))
+    device.state = Readiness(intensity_pct_mso=55.000001)
+    limited.deliver(Stimulus(0, 10), 1.0)
+    assert len(inner.delivered) == 1
+
+
+def test_a_whole_interval_passes_after_each_arming(inner: ScriptedDevice, clock: VirtualClock) -> None:
+    _, limited = reporting(inner, clock, Readiness())
+    limited.deliver(Stimulus(0, 10), 1.0)
+    clock.sleep_s(60.0)
+    limited.stop()
+    assert limited.wait_s() == 0.0
+    limited.stage()
+    assert limited.wait_s() == LIMITS.min_iti_s
 
 
 def test_a_device_that_is_stopped_while_it_is_checked_delivers_nothing(

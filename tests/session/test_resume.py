@@ -572,3 +572,13 @@ def test_excluding_a_trial_of_a_damaged_log_says_in_the_log_what_was_lost(interr
     interrupted.write_bytes(whole)
     exclude(interrupted, 0, "sneezed")
     assert "fails its checksum" in next(e.text for e in read_session(interrupted).events if "checksum" in e.text)
+
+
+def test_a_session_that_is_over_arms_nothing_when_it_is_resumed(tmp_path: Path) -> None:
+    log = tmp_path / "s.mcap"
+    Session(ScriptedDevice(), scripted_strategy(2), log=log).run()
+    device = ScriptedDevice()
+    result = resume(log, device, scripted_strategy(2)).run()
+    assert result.decision.stop
+    assert device.calls == []
+    assert read_session(log).finished

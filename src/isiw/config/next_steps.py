@@ -16,12 +16,17 @@ __all__ = ["after_end", "after_error"]
 def after_error(session: Session, config: Path | None, error: BaseException | None, *, delivered: bool) -> list[str]:
     """How to go on with a session that an error has ended, in lines; the command comes last.
 
+    A session that was over when the error came, as where the device could not be let go of, has nothing to go on with.
+
     Args:
         session: the session.
         config: the configuration that it was run with; None where there was none.
         error: what ended it.
         delivered: whether it had delivered anything since it was begun or resumed.
     """
+    if session.strategy.decision().stop:
+        seen = command("show", session.log_path)
+        return [f"The session is over, and its log is complete. See what was found with: {seen}"]
     limited = config is not None and isinstance(error, LimitExceededError)
     lines = (
         [f"The limits are under [limits] in {config}; they are read again when the session is resumed."]

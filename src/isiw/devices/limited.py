@@ -71,7 +71,7 @@ class LimitedDevice:
         self._delivered = delivered
         now_s = clock.now_s()
         self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
-        self._made_s = now_s
+        self._since_s = now_s
         self._staged = False
         self._one_at_a_time = threading.Lock()
 
@@ -87,12 +87,12 @@ class LimitedDevice:
 
     @property
     def last_s(self) -> float:
-        """When the last delivery ended, by the clock [s]; before the first one, when this device was made."""
-        return self._times_s[-1] if self._times_s else self._made_s
+        """When the last delivery ended, by the clock [s]; before the first one, when this device was armed."""
+        return self._times_s[-1] if self._times_s else self._since_s
 
     def wait_s(self) -> float:
         """How long until the interval, the rest and the period allow the next delivery [s]."""
-        return max(0.0, self._limits.earliest_s(self._times_s, self._made_s) - self._clock.now_s())
+        return max(0.0, self._limits.earliest_s(self._times_s, self._since_s) - self._clock.now_s())
 
     def check(self, stimulus: Stimulus) -> None:
         """Raise where this stimulus must not be delivered now.
@@ -133,8 +133,9 @@ class LimitedDevice:
         return self._info
 
     def stage(self) -> None:
-        """Get ready and arm."""
+        """Get ready and arm; the next stimulus comes a whole interval later at the earliest."""
         self._device.stage()
+        self._since_s = self._clock.now_s()
         if self._limits.intensity_pct_mso is None:
             self._limits = dataclasses.replace(
                 self._limits, intensity_pct_mso=readiness_of(self._device).intensity_pct_mso

@@ -16,6 +16,7 @@ from isiw.visit import interval_s
 __all__ = ["Limits"]
 
 _GRID_TOLERANCE_MS = 1e-6
+_SAME_PCT_MSO = 0.01
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ class Limits:
                 expected=f"at most {self.max_coil_c:g} °C",
                 remedy=f"This stimulus was not delivered. {way_on}, then resume the session.",
             )
-        if self.intensity_pct_mso is not None and intensity != self.intensity_pct_mso:
+        if self.intensity_pct_mso is not None and not self._is_own(intensity):
             reporting = "Let the device's readiness() report intensity_pct_mso"
             raise LimitExceededError(
                 "the intensity is not the session's, or is not known",
@@ -183,6 +184,11 @@ class Limits:
                 remedy="This stimulus was not delivered. "
                 f"{reporting if intensity is None else 'Set the intensity back'}, then resume the session.",
             )
+
+    def _is_own(self, intensity_pct_mso: float | None) -> bool:
+        """Whether an intensity is the one to deliver at, up to what a conversion on the way may lose."""
+        own = self.intensity_pct_mso
+        return own is not None and intensity_pct_mso is not None and abs(intensity_pct_mso - own) <= _SAME_PCT_MSO
 
     def earliest_s(self, times_s: Sequence[float], since_s: float) -> float:
         """When the next stimulus may come at the earliest [s].

@@ -222,9 +222,12 @@ class Session(Judging):
             self._rig.log, log.on_append = log, self._followers.logged
             try:
                 self._log_beginning()
-                with self._operated(keys=keys), self._rig.armed(len(self.trials), earlier_s):
-                    self._log_locked_limits()
-                    decision = self._loop()
+                self._rig.begin(len(self.trials), earlier_s)
+                decision = self._steps.at_the_end()  # of a session that was resumed; it need not be armed for nothing
+                if decision is None:
+                    with self._operated(keys=keys), self._rig.armed():
+                        self._log_locked_limits()
+                        decision = self._loop()
                 self._journal.faults(self._rig.faults)
             except BaseException as error:
                 self._journal.faults(self._rig.faults)

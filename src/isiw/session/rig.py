@@ -99,15 +99,18 @@ class Rig:
         with driven(self._raw, self.info), self.interrupts:
             yield
 
-    @contextmanager
-    def armed(self, delivered: int, earlier_s: Sequence[float]) -> Iterator[None]:
-        """Within, the device is staged; behind it, it is disarmed and let go of, whatever happened.
+    def begin(self, delivered: int, earlier_s: Sequence[float]) -> None:
+        """Count what was delivered before, for the limits.
 
         Args:
             delivered: deliveries of this session so far.
             earlier_s: how long ago each earlier delivery was to the same person [s].
         """
         self._limited = self._anew(delivered, earlier_s)
+
+    @contextmanager
+    def armed(self) -> Iterator[None]:
+        """Within, the device is staged; behind it, it is disarmed and let go of, whatever happened."""
         try:
             self.stage()
             yield

@@ -66,12 +66,15 @@ class Steps:
             self._learn_anew()
         if self._journal.unconcluded is not None:
             return self._concluded(self._journal.unconcluded)
+        if (decision := self.at_the_end()) is None:
+            self._one_trial()
+        return decision
+
+    def at_the_end(self) -> StopDecision | None:
+        """The decision to stop, by the strategy or the limits; None where there is a stimulus to deliver."""
         if (decision := self._freely(self.strategy.decision)).stop:
             return decision
-        if not self._rig.pulses_left:
-            return self._stop_at_limit()
-        self._one_trial()
-        return None
+        return None if self._rig.pulses_left else self._stop_at_limit()
 
     def _learn_anew(self) -> None:
         """Learn all trials as they count since one of them was judged anew."""

@@ -75,7 +75,8 @@ class Guarded:
         """
         self._kept.now = kept_disarmed
         now_s = self._pace.clock.now_s()
-        with self._rig.armed(self._delivered, [now_s - given_s for given_s in self._pace.given_s]):
+        self._rig.begin(self._delivered, [now_s - given_s for given_s in self._pace.given_s])
+        with self._rig.armed():
             yield
 
     def disarm(self) -> None:

@@ -1,0 +1,27 @@
+"""What to type next: after a session that an error has ended."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from isiw.config import after_error
+from isiw.session.loop import Session
+from scripted import ScriptedDevice, scripted_strategy
+
+
+def test_a_session_that_was_over_when_its_device_failed_is_not_to_be_resumed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unstage() -> None:
+        raise OSError("port gone")
+
+    device = ScriptedDevice()
+    monkeypatch.setattr(device, "unstage", unstage)
+    session = Session(device, scripted_strategy(2), log=tmp_path / "s.mcap")
+    with pytest.raises(OSError, match="port gone") as failed:
+        session.run()
+    (line,) = after_error(session, None, failed.value, delivered=True)
+    assert line.startswith("The session is over, and its log is complete.")
+    assert line.endswith(f"isiw show {tmp_path / 's.mcap'}")
