@@ -1,4 +1,4 @@
-"""The default on people whom its prior was written for, and on people off the map.
+"""The default on people whom its prior was written for, and on unusual people.
 
     python -m benchmarks.people --cohorts recruitment,gaussian,late --hit-delay stated --out benchmarks/results/people
     python -m benchmarks.people --cohorts electrical --space impact --out benchmarks/results/people_electrical

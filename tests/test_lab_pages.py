@@ -71,9 +71,9 @@ def test_the_example_of_functions_runs(
     assert "The budget of 6 stimuli is used up." in capsys.readouterr().out
 
 
-def test_what_has_not_met_the_hardware_says_so() -> None:
-    sketch = (PAGES / "callback.md").read_text("utf-8").partition("## With a DAQ card, as text")[2]
-    assert "untested: it has never met the\nhardware" in sketch
+def test_what_has_not_run_on_hardware_says_so() -> None:
+    sketch = (PAGES / "callback.md").read_text("utf-8").partition("## With a DAQ card: an untested sketch")[2]
+    assert "untested: it has not been run on\nhardware" in sketch
     assert "```python" not in sketch
 
 

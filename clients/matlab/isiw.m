@@ -91,7 +91,7 @@ classdef isiw < handle
     end
 
     function exclude(this, trial, reason)
-      % A trial shall not count; nothing is erased.
+      % Exclude a trial; nothing is erased.
       this.take(this.post(this.path('exclude'), {'trial', number(trial), 'reason', char(reason)}));
     end
 

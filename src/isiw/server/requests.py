@@ -126,7 +126,7 @@ class NoteRequest(_Request):
 
 
 class ExcludeRequest(_Request):
-    """Which trial shall not count, and why."""
+    """Which trial should not count, and why."""
 
     trial: TrialNumber
     reason: Text = ""
