@@ -385,7 +385,7 @@ class _PlayerAlone:
 def _judged(estimate: Reported, truth: Window | None, space: DesignSpace) -> dict[str, Any]:
     posterior = estimate if isinstance(estimate, WindowEstimate) else None
     reported = posterior.window if posterior is not None else estimate
-    covered = None if posterior is None or truth is None else covers(posterior, truth, space)
+    covered = None if posterior is None else covers(posterior, truth, space)
     return {
         "f1": f1(estimate, truth, space),
         "true_window": truth is not None,
