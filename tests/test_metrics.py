@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
 from isiw.metrics import covers, edge_error_ms, edge_ranks, f1, f1_of_masks, trials_to_criterion, true_edges_ms
 from isiw.types import ArrayLike
 from isiw.window import Window, WindowEstimate
@@ -23,6 +26,9 @@ masks = st.lists(st.booleans(), min_size=12, max_size=12).map(np.array)
 
 def estimate_of(edges_ms: ArrayLike) -> WindowEstimate:
     return WindowEstimate(1.0, None, edge_samples_ms=np.array(edges_ms))
+
+
+TRUTH, ESTIMATE = Window(10, 20), estimate_of([[10.0, 20.0]])
 
 
 @given(masks, masks)
@@ -111,6 +117,30 @@ def test_an_edge_beyond_the_range_is_covered_by_an_infinite_interval_only() -> N
 
 def test_an_estimate_without_intervals_is_not_judged() -> None:
     assert covers(WindowEstimate(None, Window(10, 20)), Window(10, 20), SPACE) is None
+    assert covers(estimate_of([[10.0, 20.0]]), None, SPACE) is None
+
+
+@pytest.mark.parametrize(
+    ("measure", "of", "message"),
+    [
+        (
+            f1,
+            (TRUTH, ESTIMATE, SPACE),
+            "the true window .* got 'WindowEstimate'; expected Window or None. The",
+        ),
+        (f1, (SPACE, ESTIMATE, TRUTH), "the estimate .* got 'DesignSpace'; expected WindowEstimate or Window or None"),
+        (f1, (ESTIMATE, TRUTH, None), "a design space is needed"),
+        (covers, (TRUTH, ESTIMATE, SPACE), "the estimate .* got 'Window'; expected WindowEstimate. The estimate"),
+        (covers, (ESTIMATE, (10, 20), SPACE), "the true window .* got 'tuple'"),
+        (edge_error_ms, (TRUTH, ESTIMATE), "the true window .* got 'WindowEstimate'"),
+        (edge_ranks, (ESTIMATE, None, SPACE, np.random.default_rng(0)), "the true window .* got 'NoneType'"),
+    ],
+)
+def test_arguments_in_another_order_are_told_with_the_right_one(
+    measure: Callable[..., object], of: tuple[Any, ...], message: str
+) -> None:
+    with pytest.raises(InvalidValueError, match=message):
+        measure(*of)
 
 
 def test_intervals_of_a_calibrated_posterior_cover_at_their_level() -> None:

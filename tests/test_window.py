@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -135,6 +136,12 @@ def test_an_excess_that_is_not_finite_is_an_error_and_not_the_absence_of_a_windo
         window_from_excess([0, 1], excess_mv, baseline_mv)
 
 
+@pytest.mark.parametrize("excess_mv", [[0.1], [0.1, 0.2, 0.3], [[0.1, 0.2]], 0.1])
+def test_each_isi_has_one_excess(excess_mv: Any) -> None:
+    with pytest.raises(InvalidValueError, match=r"each ISI needs one value; got '\d values for 2 ISIs'"):
+        window_from_excess([0, 1], excess_mv, 0.01)
+
+
 @pytest.mark.parametrize("probability", [-0.01, 1.01, math.nan])
 def test_a_probability_outside_0_to_1_is_refused(probability: float) -> None:
     with pytest.raises(InvalidValueError, match="from 0 to 1"):
@@ -190,6 +197,7 @@ def test_an_estimate_is_printed_without_what_it_does_not_have() -> None:
     no_window = WindowEstimate(0.2, None, 10.0, 40.0, edge_samples_ms=np.array([[10.0, 40.0]]))
     assert str(no_window) == "Undecided (probability of a window: 0.20)"
     assert str(replace(no_window, probability=0.03)) == "No window (probability of a window: 0.03)"
+    assert str(replace(no_window, probability=0.9)) == "Window not reported (probability of a window: 0.90)"
 
 
 def test_the_robust_interval_is_the_hull_over_probable_hypotheses() -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from types import NoneType
 
 import numpy as np
 
-from isiw.design import DesignSpace
+from isiw.design import DesignSpace, require_space
+from isiw.errors import InvalidValueError
 from isiw.types import ArrayLike, BoolArray, FloatArray
 from isiw.window import Interval, Window, WindowEstimate
 
@@ -37,11 +39,28 @@ def f1(estimate: WindowEstimate | Window | None, truth: Window | None, space: De
         truth: the true window; None where there is none.
         space: the design space whose grid counts. A window that lies between its ISIs counts as the nearest ones; what
             lies outside the space does not count.
+
+    Raises:
+        InvalidValueError: arguments of another kind, or in another order.
     """
+    _require(estimate, "the estimate", WindowEstimate, Window, NoneType)
+    _require(truth, "the true window", Window, NoneType)
+    require_space(space)
     if isinstance(estimate, WindowEstimate) and not estimate.has_answer:
         return 0.0
     window = estimate.window if isinstance(estimate, WindowEstimate) else estimate
     return float(f1_of_masks(_on_grid(window, space), _on_grid(truth, space)))
+
+
+def _require(given: object, what: str, *kinds: type) -> None:
+    """Raise where something else is given, such as an estimate in the place of the truth."""
+    if not isinstance(given, kinds):
+        raise InvalidValueError(
+            f"{what} is of another kind",
+            got=type(given).__name__,
+            expected=" or ".join("None" if kind is NoneType else kind.__name__ for kind in kinds),
+            remedy="The estimate comes first, then the true window, then the space.",
+        )
 
 
 def _on_grid(window: Window | None, space: DesignSpace) -> BoolArray:
@@ -62,23 +81,34 @@ def true_edges_ms(truth: Window, space: DesignSpace) -> Interval:
     Args:
         truth: the true window.
         space: the range.
+
+    Raises:
+        InvalidValueError: no window, or no space.
     """
+    _require(truth, "the true window", Window)
+    require_space(space)
     start = -math.inf if truth.start_ms <= space.low_ms else truth.start_ms
     end = math.inf if truth.end_ms >= space.high_ms else truth.end_ms
     return start, end
 
 
-def covers(estimate: WindowEstimate, truth: Window, space: DesignSpace, level: float = 0.9) -> tuple[bool, bool] | None:
-    """Whether the credible intervals of start and end hold the true edges; None where there are no intervals.
+def covers(
+    estimate: WindowEstimate, truth: Window | None, space: DesignSpace, level: float = 0.9
+) -> tuple[bool, bool] | None:
+    """Whether the credible intervals of start and end hold the true edges; None where there are none of either.
 
     Args:
         estimate: the estimate.
-        truth: the true window.
+        truth: the true window; None where there is none.
         space: the design space; an edge at its border counts as beyond the range. The grid's resolution is granted.
         level: the credible level.
+
+    Raises:
+        InvalidValueError: arguments of another kind or in another order, or a level outside 0–1.
     """
+    _require(estimate, "the estimate", WindowEstimate)
     intervals = estimate.interval(level)
-    if intervals is None:
+    if intervals is None or truth is None:
         return None
     slack = 0.5 * space.step_ms
     start, end = (
@@ -101,7 +131,11 @@ def edge_ranks(
         truth: the true window.
         space: the design space; an edge at its border counts as beyond the range.
         rng: breaks ties.
+
+    Raises:
+        InvalidValueError: arguments of another kind, or in another order.
     """
+    _require(estimate, "the estimate", WindowEstimate)
     samples = np.empty((0, 2)) if estimate.edge_samples_ms is None else estimate.edge_samples_ms
     edges = np.array(true_edges_ms(truth, space))
     below, equal = (samples < edges).sum(axis=0), (samples == edges).sum(axis=0)
@@ -115,7 +149,12 @@ def edge_error_ms(estimate: WindowEstimate | Window | None, truth: Window | None
     Args:
         estimate: the estimate, or its window.
         truth: the true window.
+
+    Raises:
+        InvalidValueError: arguments of another kind, or in another order.
     """
+    _require(estimate, "the estimate", WindowEstimate, Window, NoneType)
+    _require(truth, "the true window", Window, NoneType)
     window = estimate.window if isinstance(estimate, WindowEstimate) else estimate
     if window is None or truth is None:
         return None

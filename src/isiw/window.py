@@ -83,8 +83,17 @@ class Window:
         Args:
             grid_ms: ascending ISIs [ms], shape (t,).
             mask: which of them enhance the MEP, shape (t,).
+
+        Raises:
+            InvalidValueError: not one value of the mask for each ISI.
         """
         grid, inside = np.asarray(grid_ms, dtype=float), np.asarray(mask, dtype=bool)
+        if grid.shape != inside.shape or grid.ndim != 1:
+            raise InvalidValueError(
+                "each ISI needs one value",
+                got=f"{inside.size} values for {grid.size} ISIs",
+                remedy="Give both on the same grid, as space.grid_ms and person.expected_mep_mv(space) are.",
+            )
         if not inside.any():
             return None
         steps = np.flatnonzero(np.diff(np.concatenate(([False], inside, [False])).astype(int)))
@@ -137,7 +146,7 @@ def window_from_excess(grid_ms: ArrayLike, excess_mv: ArrayLike, baseline_mv: fl
         baseline or 2 µV, whichever is more.
 
     Raises:
-        InvalidValueError: an excess or a baseline that is not finite.
+        InvalidValueError: an excess or a baseline that is not finite, or not one excess for each ISI.
     """
     excess = np.asarray(excess_mv, dtype=float)
     if not (np.isfinite(excess).all() and math.isfinite(baseline_mv)):
@@ -340,7 +349,8 @@ class WindowEstimate:
         """Median and 90 % band of the expected MEP at some ISIs.
 
         Args:
-            isi_ms: ISIs [ms], shape (t,).
+            isi_ms: ISIs [ms], shape (t,). Beyond `grid_ms`, as where a sweep has not come yet, the values at its ends
+                are repeated: there they are no estimate.
 
         Returns:
             The band [mV], or None where the method has none.

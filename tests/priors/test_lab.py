@@ -171,6 +171,13 @@ def test_a_strategy_with_another_model_does_not_take_a_lab_prior(path: Path) -> 
         make_strategy("parametric-mi", prior=priors.load(path))
 
 
+def test_a_lab_prior_is_joined_with_the_usual_one_before_a_strategy_takes_it(path: Path) -> None:
+    learnt = priors.read_lab_prior(path)
+    with pytest.raises(StrategyError, match=r"another kind of model.*given as its \.joined\(\)"):
+        make_strategy(prior=learnt)
+    assert make_strategy(prior=learnt.joined(), particles=100).ask() >= 0
+
+
 @pytest.mark.parametrize(
     ("line", "wrong", "message"),
     [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,9 +48,17 @@ def test_candidates_are_few_evenly_spaced_and_hold_both_ends(space: DesignSpace)
     assert 0 < steps[-1] <= steps[0] * (1 + 1e-4)
 
 
-@pytest.mark.parametrize("scores", [torch.arange(3.0), torch.tensor(1.0), torch.zeros(3, 6)])
+@pytest.mark.parametrize(
+    "scores", [torch.arange(3.0), torch.tensor(1.0), torch.zeros(3, 6), torch.zeros(2, 5), torch.zeros(1, 3, 5)]
+)
 def test_each_isi_has_a_score(three: Posterior, scores: Tensor) -> None:
-    with pytest.raises(StrategyError, match="Scores must score each ISI"):
+    with pytest.raises(StrategyError, match=r"Scores must score each ISI; got .*expected scores of shape \(5,\) or"):
+        best_choices(three, Scores(scores), FIVE, told=2, people=3)
+
+
+@pytest.mark.parametrize("scores", [np.zeros(5), [0.0] * 5, None])
+def test_scores_are_a_tensor(three: Posterior, scores: Any) -> None:
+    with pytest.raises(StrategyError, match=r"must score each ISI; got .*a torch tensor.*Return torch.as_tensor"):
         best_choices(three, Scores(scores), FIVE, told=2, people=3)
 
 

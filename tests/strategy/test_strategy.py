@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import warnings
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -233,6 +234,39 @@ def test_an_acquisition_function_that_the_model_cannot_serve_is_refused_with_the
     assert all(need.__name__ in str(caught.value) for need in acquisition.needs)
 
 
+class WithoutNeeds:
+    """Scores, and does not say what of a posterior it uses."""
+
+    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+        del posterior
+        return isi_ms
+
+
+@pytest.mark.parametrize(
+    ("acquisition", "message"),
+    [
+        (MutualInformation, r"not its class; got <class .*MutualInformation'>. Make one: MutualInformation\(\)"),
+        (WithoutNeeds(), r"cannot be an acquisition function.*Give its class `needs`"),
+        (
+            Scores(torch.zeros(5), needs=cast("Any", WithoutNeeds)),
+            r"cannot be an acquisition function.*Give its class `needs`",
+        ),
+        ("thompson", r"cannot be an acquisition function; got 'thompson'"),
+    ],
+)
+def test_what_is_no_acquisition_function_is_told_with_the_way_out(acquisition: Any, message: str) -> None:
+    usual = scripted_strategy()
+    with pytest.raises(StrategyError, match=message):
+        Strategy(usual.space, usual.model, acquisition, usual.stopping)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5])
+def test_a_seed_is_a_whole_number_also_of_a_strategy_of_ones_own(seed: Any) -> None:
+    usual = scripted_strategy()
+    with pytest.raises(InvalidValueError, match="the seed must be a whole number of at least 0"):
+        Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, seed=seed)
+
+
 def test_a_tie_is_asked_at_the_first_isi_and_a_score_that_is_not_finite_never() -> None:
     model = scripted_strategy().model
     space = DesignSpace(0, 4)
@@ -402,6 +436,52 @@ def test_what_was_judged_before_is_learnt_as_it_is() -> None:
     strategy.ask()
     strategy.learn(100.0, 50.0)
     assert strategy.delivered == 1
+
+
+def warnings_of(strategy: Strategy, *isis_ms: float | None) -> list[str]:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for number, isi_ms in enumerate(isis_ms):
+            strategy.tell(isi_ms, 0.02 + 0.01 * number)
+    return [str(warning.message) for warning in caught]
+
+
+def a_batch() -> tuple[Strategy, list[float]]:
+    usual = scripted_strategy()
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, initial_ms=(20, 100, 180))
+    return strategy, strategy.ask_batch(3)
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+def test_a_batch_is_told_in_any_order_without_a_warning(order: tuple[int, ...]) -> None:
+    strategy, batch = a_batch()
+    assert warnings_of(strategy, None, *(batch[index] + 3.0 for index in order)) == []
+    assert strategy.delivered == 4
+
+
+def test_an_isi_of_a_batch_that_is_told_twice_is_odd() -> None:
+    strategy, batch = a_batch()
+    (said,) = warnings_of(strategy, batch[0], batch[0])
+    assert f"{batch[0]:g} ms is far from the {batch[1]:g} ms" in said
+
+
+def test_what_is_asked_after_a_batch_takes_its_place(particles: Strategy) -> None:
+    batch = particles.ask_batch(3)
+    particles.tell(batch[2], 1.0)
+    since_ms = particles.ask()
+    assert min(abs(since_ms - isi_ms) for isi_ms in batch) > VALVE_SPACE.tolerance_ms
+    assert warnings_of(particles, since_ms) == []
+    assert abs(particles.ask() - batch[0]) > VALVE_SPACE.tolerance_ms
+    assert len(warnings_of(particles, batch[0])) == 1
+
+
+@pytest.mark.parametrize(("told", "slip"), [((0.1, 0.02), "in seconds"), ((0.02, 180.0), "swapped")])
+def test_a_slip_with_any_isi_of_a_batch_is_refused(told: tuple[float, float], slip: str) -> None:
+    strategy, batch = a_batch()
+    with pytest.raises(InvalidValueError, match=slip):
+        strategy.tell(*told)
+    assert strategy.delivered == 0
+    assert warnings_of(strategy, *batch) == []
 
 
 def test_a_batch_begins_with_what_is_asked_also_where_trials_were_lost() -> None:

@@ -42,6 +42,14 @@ def test_a_strategy_of_ones_own_meets_the_people_of_a_study(capsys: pytest.Captu
     assert "10" in capsys.readouterr().out
 
 
+def test_people_of_ones_own_meet_named_strategies(capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict[str, Any] = {"__name__": "docs"}
+    exec(compile(blocks("python")[2], "studies.md", "exec"), names)  # noqa: S102 - as above
+    assert len(names["rows"]) == 2 * 2 * 2
+    assert set(names["rows"]["cohort"]) == {"mine"}
+    assert "random" in capsys.readouterr().out
+
+
 def test_every_column_of_a_row_is_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {"__name__": "docs"}

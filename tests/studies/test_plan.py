@@ -11,8 +11,10 @@ import tomli_w
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import ConfigError, InvalidValueError
+from isiw.strategy.catalogue import make_strategy
 from isiw.studies import Study, StudyStrategy, load_study
 from isiw.studies.plan import study_from, study_values
+from isiw.subjects import cohort
 from studies.tiny import TOML, tiny
 
 
@@ -98,6 +100,26 @@ def test_an_unknown_strategy_is_told_with_the_known_ones(tmp_path: Path) -> None
 def test_from_python_invalid_values_are_refused_as_well() -> None:
     with pytest.raises(InvalidValueError, match="engine is unknown"):
         Study((StudyStrategy("even"),), ("wide",), engine=cast("Any", "fast"))
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"cohorts": (cohort("gaussian", 2, 0),)}, r"unknown cohorts; got \['<list>'\].*People of your own"),
+        ({"cohorts": cohort("gaussian", 1, 0)}, r"got \['<SimulatedSubject>'\]; expected gaussian"),
+        ({"cohorts": 5}, r"got \['<int>'\]; expected gaussian"),
+        (
+            {"strategies": (make_strategy("even", particles=10),)},
+            r"by their names; got 'Strategy'; expected a name.*A strategy of your own",
+        ),
+        ({"strategies": make_strategy("even", particles=10)}, r"by their names; got 'Strategy'"),
+        ({"marks": (2, 2.5)}, r"a mark must be a whole number"),
+        ({"marks": 5}, r"marks ascend.*got \(5,\)"),
+    ],
+)
+def test_what_is_no_name_is_told_with_the_way_out(changed: Any, message: str) -> None:
+    with pytest.raises(InvalidValueError, match=message):
+        tiny(**changed)
 
 
 @pytest.mark.parametrize("changed", [{"people": 10**9}, {"trials": 10**9}, {"batch": 10**9}, {"people": 300_000}])

@@ -1,14 +1,20 @@
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+import torch
 
 from isiw.design import IMPACT_SPACE
-from isiw.errors import InvalidValueError, StudyError
+from isiw.errors import InvalidValueError, StrategyError, StudyError
 from isiw.metrics import f1
+from isiw.strategy.catalogue import make_strategy
 from isiw.studies import SimulatedSession, paired_sessions, play, run_study, simulate
+from isiw.studies.batch import simulate_batch
+from isiw.subjects import SimulatedSubject, cohort
 from isiw.window import Window
 from known import known
 
@@ -112,8 +118,33 @@ def test_paired_sessions_cross_strategies_cohorts_and_people() -> None:
     assert len({(s.strategy, s.cohort, s.person) for s in sessions}) == 12
 
 
-@pytest.mark.parametrize("wrong", [{"trials": 0}, {"person": -1}])
-def test_an_invalid_session_is_refused(wrong: dict[str, Any]) -> None:
+class Acquaintance(SimulatedSession):
+    """A session with somebody of no cohort."""
+
+    def subject(self) -> SimulatedSubject:
+        return replace(cohort("gaussian", 1, 8)[0], scale=2.0)
+
+
+def test_people_of_ones_own_have_a_cohort_of_any_name() -> None:
+    session = Acquaintance("even", "mine", 0, 5, 4, (4,), settings=SMALL)
+    (row,) = run_study([session]).to_dict("records")
+    assert (row["cohort"], row["true_window"]) == ("mine", True)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"trials": 0}, "SimulatedSession.trials"),
+        ({"person": -1}, "SimulatedSession.person"),
+        ({"seed": -5}, "SimulatedSession.seed"),
+        ({"marks": (3, 20)}, "a mark of a session of 3 trials must be a whole number from 0 to 3; got 20"),
+        ({"marks": 20}, "a whole number from 0 to 3; got 20"),
+        ({"marks": ()}, r"without a mark has no rows. Give it marks=\(3,\)"),
+        ({"cohort": "mine"}, r"unknown cohorts; got \['mine'\].*People of your own. in docs/studies.md"),
+        ({"strategy": make_strategy("even", particles=10)}, "by a name; got 'Strategy'.*A strategy of your own"),
+    ],
+)
+def test_an_invalid_session_is_refused(wrong: dict[str, Any], message: str) -> None:
     values: dict[str, Any] = {
         "strategy": "even",
         "cohort": "gaussian",
@@ -122,7 +153,7 @@ def test_an_invalid_session_is_refused(wrong: dict[str, Any]) -> None:
         "trials": 3,
         "marks": (3,),
     }
-    with pytest.raises(InvalidValueError):
+    with pytest.raises(InvalidValueError, match=message):
         SimulatedSession(**(values | wrong))
 
 
@@ -131,6 +162,23 @@ def test_a_study_without_workers_is_refused() -> None:
         run_study([small()], workers=0)
     with pytest.raises(InvalidValueError, match="needs sessions"):
         run_study([])
+
+
+def test_what_runs_a_session_returns_its_rows() -> None:
+    with pytest.raises(StudyError, match=r"no rows of it; got 'DataFrame'.*Return what play"):
+        run_study([small()], run=lambda _session: pd.DataFrame())
+
+
+@pytest.mark.parametrize("run", [simulate, lambda session: simulate_batch([session])])
+@pytest.mark.parametrize("strategy", ["even", "unknown"])
+def test_torch_has_as_many_threads_afterwards_as_before(run: Callable[[SimulatedSession], Any], strategy: str) -> None:
+    torch.set_num_threads(2)
+    try:
+        with nullcontext() if strategy == "even" else pytest.raises(StrategyError):
+            run(small(strategy))
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(1)
 
 
 def test_what_a_session_would_reject_is_delivered_again_and_not_told() -> None:

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Protocol, runtime_checkable
 
 import torch
 
 from isiw.design import DesignSpace
+from isiw.errors import StrategyError
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
 
-__all__ = ["AcquisitionFunction", "FollowsPlan", "ForeseesProfiles", "ForeseesWindows", "best_candidate"]
+__all__ = [
+    "AcquisitionFunction",
+    "FollowsPlan",
+    "ForeseesProfiles",
+    "ForeseesWindows",
+    "best_candidate",
+    "require_acquisition",
+    "require_scores",
+]
 
 
 class ForeseesProfiles(PredictsOutcomes, SamplesProfiles, Protocol):
@@ -43,6 +53,47 @@ class FollowsPlan(Protocol):
             space: the ISIs that may be asked.
             pairs: how many pairs were told; TMS alone is none.
         """
+
+
+def require_acquisition(given: object) -> None:
+    """Raise where something else is given for an acquisition function.
+
+    Raises:
+        StrategyError: it is none, or the class of one.
+    """
+    if isinstance(given, type):
+        raise StrategyError(
+            "an acquisition function is needed, and not its class", got=given, remedy=f"Make one: {given.__name__}()."
+        )
+    if not (isinstance(given, AcquisitionFunction) and isinstance(given.needs, Iterable)):
+        raise StrategyError(
+            "it cannot be an acquisition function",
+            got=given,
+            expected="something that can be called with a posterior and ISIs, and has needs",
+            remedy="Give its class `needs`, a tuple of what it uses of isiw.models.protocol; () where it uses nothing.",
+        )
+
+
+def require_scores(acquisition: AcquisitionFunction, scores: object, candidates: int, people: int = 1) -> Tensor:
+    """The scores of an acquisition function, which has one for each ISI, for all people alike or for each of them.
+
+    Args:
+        acquisition: the acquisition function.
+        scores: what it gave.
+        candidates: how many ISIs were scored, t.
+        people: how many people there are, b.
+
+    Raises:
+        StrategyError: no tensor of shape (t,), (1, t) or (b, t).
+    """
+    what = f"{type(acquisition).__name__} must score each ISI"
+    shape = f"shape ({candidates},) or ({people}, {candidates})"
+    if not isinstance(scores, torch.Tensor):
+        got, remedy = type(scores).__name__, "Return torch.as_tensor(scores)."
+        raise StrategyError(what, got=got, expected=f"a torch tensor of {shape}", remedy=remedy)
+    if tuple(scores.shape) not in {(candidates,), (1, candidates), (people, candidates)}:
+        raise StrategyError(what, got=tuple(scores.shape), expected=f"scores of {shape}")
+    return scores
 
 
 def best_candidate(scores: Tensor, cost: Tensor | None = None, first: int = 0) -> Tensor:

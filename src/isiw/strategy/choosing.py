@@ -10,9 +10,8 @@ from typing import Literal, TypeAlias
 import torch
 
 from isiw.acquisition.fixed import golden_index
-from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
+from isiw.acquisition.protocol import AcquisitionFunction, best_candidate, require_scores
 from isiw.design import DesignSpace
-from isiw.errors import StrategyError
 from isiw.models.protocol import Posterior, Tensor
 
 __all__ = ["Choice", "ChosenBy", "Cost", "best_choices", "candidate_isis", "evenly_spaced"]
@@ -77,17 +76,11 @@ def best_choices(
         cost: is taken off the scores.
 
     Raises:
-        StrategyError: not as many scores as there are ISIs.
+        StrategyError: no tensor of as many scores as there are ISIs.
     """
     candidates = candidate_isis(space)
-    scores = acquisition(posterior, candidates).cpu()
-    if scores.shape[-1:] != candidates.shape:
-        raise StrategyError(
-            f"{type(acquisition).__name__} must score each ISI",
-            got=tuple(scores.shape),
-            expected=f"scores of shape ({len(candidates)},), or a row of them for each person",
-        )
-    scores = scores.expand(people, -1)
+    given = require_scores(acquisition, acquisition(posterior, candidates), len(candidates), people)
+    scores = given.cpu().expand(people, -1)
     costs = None if cost is None else cost(candidates)
     best = best_candidate(scores, costs, first=golden_index(told, len(candidates)))
     nothing = f"{type(acquisition).__name__} gives no ISI a finite score: an evenly spaced one instead."

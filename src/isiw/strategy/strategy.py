@@ -12,13 +12,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from isiw.acquisition.batch import greedy_batch
-from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.acquisition.protocol import AcquisitionFunction, require_acquisition
 from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
 from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
 from isiw.signals.doubts import Doubts, doubt_of, doubt_of_isi, is_silent
-from isiw.signals.plausibility import require_isi_sd, require_plausible
+from isiw.signals.plausibility import off_by, require_isi_sd, require_plausible
 from isiw.strategy.choosing import Choice, Cost, evenly_spaced
 from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision, StoppingRule
@@ -42,6 +42,10 @@ def _fulfil(answer: Future[_T], choose: Callable[[], _T]) -> None:
         answer.set_result(choose())
     except Exception as error:  # noqa: BLE001 - handed over to whoever waits for the answer
         answer.set_exception(error)
+
+
+def _nearest(asked_ms: Sequence[float], value: float) -> float:
+    return min(asked_ms, key=lambda isi_ms: abs(isi_ms - value))
 
 
 @dataclass(frozen=True)
@@ -73,8 +77,8 @@ class Strategy:
         recipe: how the catalogue made this strategy; None where it was built by hand.
 
     Raises:
-        StrategyError: the model's posterior lacks a capability that the acquisition function needs.
-        InvalidValueError: no design space, or an initial ISI that is not a finite number.
+        StrategyError: no acquisition function, or one that needs a capability that the model's posterior lacks.
+        InvalidValueError: no design space, an initial ISI that is not a finite number, or an invalid seed.
     """
 
     def __init__(
@@ -90,6 +94,8 @@ class Strategy:
         recipe: Recipe | None = None,
     ) -> None:
         require_space(space)
+        require_acquisition(acquisition)
+        seed = whole("the seed", seed, least=0)
         self.space, self.model, self.acquisition, self.stopping = space, model, acquisition, stopping
         self.initial_ms = tuple(space.snap(isi_ms) for isi_ms in initial_ms)
         self.recipe = recipe or Recipe(name="", seed=seed)
@@ -107,6 +113,7 @@ class Strategy:
         self._isis_ms: list[float | None] = []
         self._doubts = Doubts()
         self._choice: Choice | None = None
+        self._batch_ms: list[float] = []  # what was not told yet of the last batch
         self._fallback_reason: str | None = None
 
     def __str__(self) -> str:
@@ -187,7 +194,7 @@ class Strategy:
             return Choice(evenly_spaced(self.space, course.told), reason, by="fallback")
 
     def ask_batch(self, n: int) -> list[float]:
-        """The next n ISIs [ms], to be delivered before anything is told; the first is what `ask` answers.
+        """The next n ISIs [ms], to be delivered before anything is told, and told in any order; the first is `ask`'s.
 
         Args:
             n: how many, at most 1,000.
@@ -198,7 +205,9 @@ class Strategy:
         """
         n = whole("the size of a batch", n, least=1, most=MOST_OF_A_BATCH)
         chosen = [self.ask(), *self._course.ahead_ms(n)[1:]][:n]
-        return greedy_batch(self.posterior, self.acquisition, chosen, n, self._next_of_batch)
+        batch_ms = greedy_batch(self.posterior, self.acquisition, chosen, n, self._next_of_batch)
+        self._batch_ms = list(batch_ms)
+        return batch_ms
 
     def _next_of_batch(self, posterior: Posterior) -> float:
         choice = self._course.chosen(posterior)[0]
@@ -243,12 +252,12 @@ class Strategy:
             StrategyError: a kind of outcome that the model cannot learn from.
 
         Warns:
-            ImplausibleDataWarning: an ISI far from the one that was asked, or amplitudes that look like a slip of unit
-                or a rig in trouble; once of each kind.
+            ImplausibleDataWarning: an ISI far from all that were asked and not told yet, or amplitudes that look like a
+                slip of unit or a rig in trouble; once of each kind.
         """
         plain_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
-        asked_ms = None if self._choice is None else self._choice.isi_ms
+        asked_ms = None if plain_ms is None else self._meant_ms(plain_ms, plain_mv)
         require_plausible(plain_ms, plain_mv, asked_ms, self.space)
         require_isi_sd(isi_sd_ms)
         self.learn(isi_ms, mep_mv, response=response, isi_sd_ms=isi_sd_ms)
@@ -292,8 +301,29 @@ class Strategy:
         if mep_mv is not None:
             self._meps_mv.append(mep_mv)
             self._isis_ms.append(isi_ms)
+        self._batch_ms = self._left_of_batch_ms(isi_ms)
         self._choice = self._fallback_reason = None
         self._lost = 0 if isi_ms is not None else self._lost
+
+    def _meant_ms(self, isi_ms: float, mep_mv: float | None) -> float | None:
+        """Which ISI that was asked a trial is of [ms], be it told in seconds or swapped; None where none was asked."""
+        asked_ms = self._batch_ms if self._choice is None else [self._choice.isi_ms, *self._batch_ms]
+        if not asked_ms:
+            return None
+        told = (isi_ms, isi_ms if mep_mv is None else max(isi_ms, mep_mv), 1000 * isi_ms)
+        near_ms = [_nearest(asked_ms, value) for value in told]
+        meant = (near for near, value in zip(near_ms, told, strict=True) if not off_by(value, near, self.space))
+        return next(meant, near_ms[0])
+
+    def _left_of_batch_ms(self, isi_ms: float | None) -> list[float]:
+        """What is not told of the last batch [ms] after a trial; nothing where one was told that was asked since."""
+        if isi_ms is None or not self._batch_ms:
+            return self._batch_ms
+        told_ms = _nearest(self._batch_ms, isi_ms)
+        if self._choice is not None and _nearest([told_ms, self._choice.isi_ms], isi_ms) != told_ms:
+            return []
+        index = self._batch_ms.index(told_ms)
+        return [*self._batch_ms[:index], *self._batch_ms[index + 1 :]]
 
     def count_mistrial(self) -> None:
         """Count a delivered stimulus whose outcome is not told: it uses up budget, and is asked again at most twice."""

@@ -20,6 +20,7 @@ from isiw.strategy.choosing import Choice
 from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision
 from isiw.studies.sessions import SimulatedSession, examine
+from isiw.studies.threads import one_torch_thread
 from isiw.subjects.subject import Response
 from isiw.window import WindowEstimate
 
@@ -33,8 +34,8 @@ def simulate_batch(sessions: Sequence[SimulatedSession], device: str = "cpu") ->
         sessions: sessions of one strategy, alike but for the person; the first gives the seed of the models' draws.
         device: torch device of the models that have one; the others compute on the CPU.
     """
-    torch.set_num_threads(1)
-    return examine(sessions, _Batch(sessions, device))
+    with one_torch_thread():
+        return examine(sessions, _Batch(sessions, device))
 
 
 class _Batch:

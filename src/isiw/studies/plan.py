@@ -13,7 +13,7 @@ Every strategy meets the same people with the same trial noise. As TOML:
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from itertools import groupby, product
 from operator import attrgetter
@@ -22,14 +22,13 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 
 import pandas as pd
 
-from isiw.checks import check_choice, check_numbers, check_wholes
+from isiw.checks import check_choice, check_numbers, check_wholes, whole
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.strategy.catalogue import settings_for
 from isiw.strategy.settings.common import settings_values
 from isiw.studies.batch import simulate_batch
-from isiw.studies.sessions import SimulatedSession, Stopping, simulate
-from isiw.subjects.cohorts import COHORTS
+from isiw.studies.sessions import OWN_STRATEGY, SimulatedSession, Stopping, require_cohorts, simulate
 from isiw.text.toml_files import checked, read_toml
 
 __all__ = [
@@ -127,6 +126,7 @@ class Study:
         seed: seed of the people, their trial noise and the strategies; 0–999 are for development.
         trials: how many trials a session has at most.
         marks: after which trials the estimate is recorded, 0 being before any; by default each fifth and the last.
+            Trials that were told count, no mistrials.
         space: the design space.
         stopping: whether a strategy's stopping rule is `"ignored"`, or it is `"noted"` when it fires (an estimate
             after each trial), or `"ends"` the session.
@@ -138,7 +138,8 @@ class Study:
             nothing (`"unstated"`).
 
     Raises:
-        InvalidValueError: an invalid number or choice, or a label given twice.
+        InvalidValueError: an invalid number or choice, a label given twice, or anything but names of cohorts and
+            strategies.
     """
 
     strategies: tuple[StudyStrategy, ...]
@@ -156,11 +157,9 @@ class Study:
     hit_delay: HitDelay = "unstated"
 
     def __post_init__(self) -> None:
-        strategies, cohorts = _several(self.strategies), _several(self.cohorts)
-        named = tuple(StudyStrategy(each) if isinstance(each, str) else each for each in strategies)
-        object.__setattr__(self, "strategies", named)
-        object.__setattr__(self, "cohorts", cohorts)
-        object.__setattr__(self, "marks", tuple(self.marks))
+        object.__setattr__(self, "strategies", tuple(map(_named, _several(self.strategies))))
+        object.__setattr__(self, "cohorts", _several(self.cohorts))
+        object.__setattr__(self, "marks", tuple(whole("a mark", mark, least=0) for mark in _several(self.marks)))
         check_wholes(self, "people", "batch", least=1, most=_MOST_SESSIONS)
         check_wholes(self, "trials", least=1, most=_MOST_TRIALS)
         check_wholes(self, "seed", least=0, most=_MOST_SEED)
@@ -172,8 +171,7 @@ class Study:
         check_choice(self, "stopping", get_args(Stopping))
         check_choice(self, "engine", get_args(Engine))
         check_choice(self, "hit_delay", get_args(HitDelay))
-        if unknown := sorted(set(self.cohorts) - set(COHORTS)):
-            raise InvalidValueError("unknown cohorts", got=unknown, expected=", ".join(COHORTS))
+        require_cohorts(self.cohorts)
         labels = [strategy.label for strategy in self.strategies]
         if (
             not labels
@@ -236,8 +234,22 @@ def load_study(path: str | Path) -> Study:
 
 
 def _several(values: Any) -> tuple[Any, ...]:
-    """What may be several, or one name."""
-    return (values,) if isinstance(values, str) else tuple(values)
+    """What may be several, or one."""
+    return tuple(values) if isinstance(values, Iterable) and not isinstance(values, str) else (values,)
+
+
+def _named(strategy: Any) -> StudyStrategy:
+    """A strategy of a study, which may be its name alone."""
+    if isinstance(strategy, StudyStrategy):
+        return strategy
+    if isinstance(strategy, str):
+        return StudyStrategy(strategy)
+    raise InvalidValueError(
+        "a study knows strategies by their names",
+        got=type(strategy).__name__,
+        expected="a name, or a StudyStrategy",
+        remedy=OWN_STRATEGY,
+    )
 
 
 def study_from(values: Mapping[str, Any], source: str) -> Study:

@@ -134,17 +134,24 @@ def run_study(
 
     Raises:
         InvalidValueError: no sessions, or fewer than one worker.
-        StudyError: a session failed.
+        StudyError: a session failed, or `run` gave no rows of it.
     """
     if not sessions:
         raise InvalidValueError("a study needs sessions", got=sessions, remedy="paired_sessions(...) makes some.")
+    keys = ["strategy", "cohort", "person", "trial"]
     tables = []
     for session, result in Processes(workers).results(run, sessions):
         if isinstance(result, Failure):
             raise StudyError(f"a session failed: {result.error}", got=session, remedy=result.details)
+        if not (isinstance(result, pd.DataFrame) and {*keys} <= {*result.columns}):
+            raise StudyError(
+                "what runs a session gave no rows of it",
+                got=type(result).__name__,
+                expected=f"a table with {', '.join(keys)}",
+                remedy="Return what play(session, player) gives.",
+            )
         tables.append(result)
         on_done(session)
-    keys = ["strategy", "cohort", "person", "trial"]
     return pd.concat(tables, ignore_index=True).sort_values(keys, ignore_index=True)
 
 

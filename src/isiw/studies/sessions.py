@@ -7,27 +7,39 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, TypeAlias, get_args
 
 import pandas as pd
-import torch
 
-from isiw.checks import check_choice, check_numbers, check_wholes
+from isiw.checks import check_choice, check_numbers, check_wholes, whole
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.errors import StudyError
+from isiw.errors import InvalidValueError, StudyError
 from isiw.metrics import covers, f1
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choosing import Choice
 from isiw.strategy.stopping import StopDecision, StoppingRule, stimuli_left
 from isiw.strategy.strategy import Strategy
-from isiw.subjects.cohorts import person_of
+from isiw.studies.threads import one_torch_thread
+from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
 from isiw.window import Window, WindowEstimate
 
-__all__ = ["TIMES", "Crowd", "Player", "Reported", "SimulatedSession", "Stopping", "examine", "play", "simulate"]
+__all__ = [
+    "OWN_STRATEGY",
+    "TIMES",
+    "Crowd",
+    "Player",
+    "Reported",
+    "SimulatedSession",
+    "Stopping",
+    "examine",
+    "play",
+    "require_cohorts",
+    "simulate",
+]
 
 TIMES = ("ask_ms", "tell_ms")
 """Columns that differ each time a session is run."""
@@ -35,6 +47,9 @@ TIMES = ("ask_ms", "tell_ms")
 _OF_THE_STOP = ("f1", "start_covered", "end_covered")
 
 _MOST_DELIVERIES = 1000
+
+OWN_STRATEGY = 'One of your own objects takes part through run_study: see "A strategy of your own" in docs/studies.md.'
+"""The way out where a strategy is given in the place of its name."""
 
 Stopping: TypeAlias = Literal["ignored", "noted", "ends"]
 Reported: TypeAlias = WindowEstimate | Window | None
@@ -85,17 +100,35 @@ class Crowd(Protocol):
         """Whether the last fit failed; None where it cannot be said for each person."""
 
 
+def require_cohorts(names: Iterable[object]) -> None:
+    """Raise where something is not the name of a cohort.
+
+    Args:
+        names: what was given.
+
+    Raises:
+        InvalidValueError: an unknown name, or people in the place of one.
+    """
+    if unknown := [name for name in names if not (isinstance(name, str) and name in COHORTS)]:
+        raise InvalidValueError(
+            "unknown cohorts",
+            got=[name if isinstance(name, str) else f"<{type(name).__name__}>" for name in unknown],
+            expected=", ".join(COHORTS),
+            remedy='Your own people take part through run_study: see "People of your own" in docs/studies.md.',
+        )
+
+
 @dataclass(frozen=True)
 class SimulatedSession:
     """One session of a study.
 
     Args:
-        strategy: a named strategy.
-        cohort: a named cohort.
+        strategy: a named strategy; with a player of one's own only what it is called.
+        cohort: a named cohort; where a subclass gives people of its own, only what they are called.
         person: which person of it, from 0.
         seed: seed of the cohort; trial noise and strategy use `seed + person`.
         trials: how many trials to run at most.
-        marks: after which trials the estimate is recorded; 0 is before any.
+        marks: after which trials the estimate is recorded; 0 is before any. Trials that were told count, no mistrials.
         space: the design space.
         settings: settings of the strategy, as (name, value) pairs.
         label: what the strategy is called in the table; by default its name.
@@ -104,7 +137,8 @@ class SimulatedSession:
         amplitude: factor on all of the person's amplitudes, as of another rig or muscle.
 
     Raises:
-        InvalidValueError: no trial, an invalid person or amplitude, or an unknown value of stopping.
+        InvalidValueError: no trial, an invalid person, seed or amplitude, no mark or one beyond the trials, or an
+            unknown cohort or value of stopping.
     """
 
     strategy: str
@@ -121,9 +155,22 @@ class SimulatedSession:
 
     def __post_init__(self) -> None:
         check_wholes(self, "trials", least=1)
-        check_wholes(self, "person", least=0)
+        check_wholes(self, "person", "seed", least=0)
         check_numbers(self, "amplitude", above=0)
         check_choice(self, "stopping", get_args(Stopping))
+        if not isinstance(self.strategy, str):
+            what = "a session knows its strategy by a name"
+            raise InvalidValueError(what, got=type(self.strategy).__name__, expected="a text", remedy=OWN_STRATEGY)
+        if type(self).subject is SimulatedSession.subject:
+            require_cohorts([self.cohort])
+        object.__setattr__(self, "marks", self._checked_marks())
+
+    def _checked_marks(self) -> tuple[int, ...]:
+        given = tuple(self.marks) if isinstance(self.marks, Iterable) else (self.marks,)
+        if not given:
+            raise InvalidValueError("a session without a mark has no rows", remedy=f"Give it marks=({self.trials},).")
+        what = f"a mark of a session of {self.trials} trials"
+        return tuple(whole(what, mark, least=0, most=self.trials) for mark in given)
 
     def subject(self) -> SimulatedSubject:
         """The simulated person."""
@@ -148,8 +195,8 @@ class SimulatedSession:
 
 def simulate(session: SimulatedSession) -> pd.DataFrame:
     """Run one session with its named strategy; columns as in `examine`."""
-    torch.set_num_threads(1)
-    return play(session, session.player())
+    with one_torch_thread():
+        return play(session, session.player())
 
 
 def play(session: SimulatedSession, player: Player) -> pd.DataFrame:
@@ -339,7 +386,7 @@ class _PlayerAlone:
 def _judged(estimate: Reported, truth: Window | None, space: DesignSpace) -> dict[str, Any]:
     posterior = estimate if isinstance(estimate, WindowEstimate) else None
     reported = posterior.window if posterior is not None else estimate
-    covered = None if posterior is None or truth is None else covers(posterior, truth, space)
+    covered = None if posterior is None else covers(posterior, truth, space)
     return {
         "f1": f1(estimate, truth, space),
         "true_window": truth is not None,

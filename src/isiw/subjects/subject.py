@@ -11,7 +11,16 @@ from typing import Final, get_args
 
 import numpy as np
 
-from isiw.checks import choice, number
+from isiw.checks import (
+    check_choice,
+    check_flags,
+    check_numbers,
+    check_probabilities,
+    choice,
+    mean_and_sd,
+    number,
+    whole,
+)
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.subjects.plasticity import Plasticity
@@ -34,11 +43,19 @@ class Drift:
         persistence: AR(1) coefficient from trial to trial.
         innovation_sd: SD of each step, natural log.
         startup: what the first trials have on top, natural log.
+
+    Raises:
+        InvalidValueError: a coefficient outside -1 to 1, a negative SD, or a start-up that is not finite.
     """
 
     persistence: float = 0.97
     innovation_sd: float = 0.12
     startup: tuple[float, ...] = (0.29, 0.20)
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "persistence", least=-1, most=1)
+        check_numbers(self, "innovation_sd", least=0)
+        object.__setattr__(self, "startup", tuple(number("Drift.startup", each) for each in self.startup))
 
 
 @dataclass(frozen=True)
@@ -78,7 +95,8 @@ class SimulatedSubject:
             profile are those before the first pair.
 
     Raises:
-        InvalidValueError: a depressed segment, but a response that has no recruitment curve.
+        InvalidValueError: an invalid number or choice, or a depressed segment, but a response that has no recruitment
+            curve.
     """
 
     profile: Profile
@@ -96,6 +114,15 @@ class SimulatedSubject:
     plasticity: Plasticity | None = None
 
     def __post_init__(self) -> None:
+        check_numbers(self, "hit_delay_ms")
+        check_numbers(self, "hit_delay_sd_ms", "isi_jitter_ms", least=0)
+        check_numbers(self, "input_correlation", least=-1, most=1)
+        check_probabilities(self, "outlier_probability")
+        check_numbers(self, "scale", above=0)
+        check_flags(self, "jitter_told")
+        check_choice(self, "conditioning", get_args(Conditioning))
+        stated_ms = mean_and_sd("SimulatedSubject.stated_hit_delay_ms", self.stated_hit_delay_ms)
+        object.__setattr__(self, "stated_hit_delay_ms", stated_ms)
         if isinstance(self.profile, OpposedProfile) and not isinstance(self.response, RecruitmentResponse):
             raise InvalidValueError(
                 "only an MEP on a recruitment curve can be depressed",
@@ -134,7 +161,11 @@ class SimulatedSubject:
         return window_from_excess(space.grid_ms, self.baseline_mv - self.expected_mep_mv(space), self.baseline_mv)
 
     def begin(self, seed: int) -> Responder:
-        """A session with this person, its trial noise from this seed."""
+        """A session with this person, its trial noise from this seed.
+
+        Raises:
+            InvalidValueError: a seed that is negative or no whole number.
+        """
         return Responder(self, seed)
 
 
@@ -144,11 +175,14 @@ class Responder:
     Args:
         subject: the person.
         seed: seed of the session's trial noise.
+
+    Raises:
+        InvalidValueError: a seed that is negative or no whole number.
     """
 
     def __init__(self, subject: SimulatedSubject, seed: int) -> None:
         self.subject = subject
-        self._rng = np.random.default_rng(seed)
+        self._rng = np.random.default_rng(whole("the seed", seed, least=0))
         self._trials = 0
         self._input_z = self._rng.standard_normal()
         self._walk = 0.0

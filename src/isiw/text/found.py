@@ -52,6 +52,8 @@ def nothing_found(probability: float | None, *, has_answer: bool) -> str:
     """
     if not has_answer:
         return "no answer yet"
+    if probability is not None and probability >= 0.5:
+        return "window not reported"
     return "no window" if rules_out(probability) else "undecided"
 
 

@@ -252,7 +252,10 @@ def _converted(setting: Setting, value: Any, source: str) -> Any:
     kind = next((k for k in kinds if isinstance(k, type) and is_dataclass(k)), None)
     if kind is not None and is_dataclass(value) and not isinstance(value, kind):
         raise StrategyError(
-            f"{source} is of another kind of model", got=type(value).__module__, expected=kind.__module__
+            f"{source} is of another kind of model",
+            got=type(value).__module__,
+            expected=kind.__module__,
+            remedy="A lab's prior is given as its .joined()." if hasattr(value, "joined") else None,
         )
     taken = (Mapping, *(each for each in kinds if isinstance(each, type)))
     if kind is not None and get_origin(setting.kind) is not tuple and not isinstance(value, taken):
