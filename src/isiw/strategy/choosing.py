@@ -13,7 +13,7 @@ from isiw.acquisition.fixed import golden_index
 from isiw.acquisition.protocol import AcquisitionFunction, best_candidate
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
-from isiw.models.protocol import Posterior, Tensor
+from isiw.models.protocol import DTYPE, Posterior, Tensor
 
 __all__ = ["Choice", "ChosenBy", "Cost", "best_choices", "candidate_isis", "evenly_spaced"]
 
@@ -54,7 +54,7 @@ def candidate_isis(space: DesignSpace) -> Tensor:
     grid = space.grid_ms
     stride = max(1, math.ceil((len(grid) - 1) / (MAX_CANDIDATES - 1)))
     picked = sorted({*range(0, len(grid), stride), len(grid) - 1})
-    return torch.as_tensor(grid[picked], dtype=torch.float32)
+    return torch.as_tensor(grid[picked], dtype=DTYPE)
 
 
 def best_choices(
