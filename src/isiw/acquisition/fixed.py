@@ -12,7 +12,7 @@ from scipy.stats import qmc
 
 from isiw.checks import check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.models.protocol import Posterior, ProposesIsi, Tensor
+from isiw.models.protocol import DTYPE, Posterior, ProposesIsi, Tensor
 
 __all__ = ["EvenSpacing", "IncrementalSweep", "OwnProposal", "RandomIsi", "SobolIsi", "golden_index"]
 
@@ -30,7 +30,7 @@ def golden_index(trial: int, candidates: int) -> int:
 
 
 def _only(index: int, isi_ms: Tensor) -> Tensor:
-    scores = torch.zeros((1, len(isi_ms)), device=isi_ms.device)
+    scores = torch.zeros((1, len(isi_ms)), dtype=DTYPE, device=isi_ms.device)
     scores[0, index] = 1.0
     return scores
 

@@ -21,6 +21,7 @@ from isiw.checks import check_numbers, check_wholes, whole
 from isiw.errors import InvalidValueError
 from isiw.interval.task import score_pct
 from isiw.log.production import LONGEST_MS, Block
+from isiw.models.protocol import DTYPE
 from isiw.types import FloatArray
 
 __all__ = ["LightSearch", "search_light"]
@@ -94,7 +95,8 @@ def search_light(block: Block, seed: int, search: LightSearch | None = None) -> 
 def _next_ms(how: LightSearch, grid_ms: FloatArray, produced_ms: FloatArray, lights: FloatArray) -> float:
     """Where the upper confidence bound is highest [ms]."""
     kernel = ScaleKernel(RBFKernel()).double()
-    kernel.base_kernel.lengthscale, kernel.outputscale = how.length_scale_ms, LIGHT_VARIANCE
+    length_scale_ms, variance, beta = torch.tensor([how.length_scale_ms, LIGHT_VARIANCE, how.beta], dtype=DTYPE)
+    kernel.base_kernel.lengthscale, kernel.outputscale = length_scale_ms.double(), variance.double()
     model = SingleTaskGP(
         torch.tensor(produced_ms)[:, None],
         torch.tensor(lights)[:, None],
@@ -103,5 +105,5 @@ def _next_ms(how: LightSearch, grid_ms: FloatArray, produced_ms: FloatArray, lig
         outcome_transform=None,
     )
     with torch.no_grad():
-        bounds = UpperConfidenceBound(model, beta=how.beta)(torch.tensor(grid_ms)[:, None, None])
+        bounds = UpperConfidenceBound(model, beta=beta)(torch.tensor(grid_ms)[:, None, None])
     return float(grid_ms[int(bounds.argmax())])

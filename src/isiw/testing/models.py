@@ -10,6 +10,7 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.models.protocol import (
+    DTYPE,
     Conditions,
     HasEvidence,
     Observation,
@@ -110,7 +111,7 @@ def _check_order(model: ResponseModel, space: DesignSpace, trials: Trials, toler
 
 
 def _check_capabilities(posterior: Posterior, space: DesignSpace, people: int, when: str) -> None:
-    isi_ms = torch.linspace(space.low_ms, space.high_ms, 7)
+    isi_ms = torch.linspace(space.low_ms, space.high_ms, 7, dtype=DTYPE)
     shapes = _sample_shapes(posterior, isi_ms, when)
     wrong = [shape for shape in shapes if shape[0] != people]
     require(not wrong, f"all samples are of {people} people {when}", str(wrong))
@@ -156,7 +157,7 @@ def _sample_shapes(posterior: Any, isi_ms: Tensor, when: str) -> list[tuple[int,
 def _check_further(posterior: Posterior, people: int, when: str) -> None:
     trials = posterior.trials
     if isinstance(posterior, Conditions):
-        isi_ms, mep_mv = torch.full((people,), 100.0), torch.full((people,), 0.05)
+        isi_ms, mep_mv = torch.tensor([[100.0] * people, [0.05] * people], dtype=DTYPE)
         imagined = posterior.condition(isi_ms, mep_mv)
         require(imagined.trials == trials + 1, f"condition adds one trial {when}")
     if isinstance(posterior, HasEvidence):

@@ -194,7 +194,7 @@ def fixed_fit(
         fixed: the hyperparameters.
     """
     present = torch.tensor([[fixed.length_ms, fixed.amplitude, fixed.noise]], dtype=torch.float64)
-    both = torch.cat((present, present * torch.tensor([1.0, 0.0, 1.0])))
+    both = torch.cat((present, present * torch.tensor([1.0, 0.0, 1.0], dtype=torch.float64)))
     return _sound(Fit(prior, kernel, scale, told, Hyperparameters(*both.unbind(-1)), prior.log_hypotheses))
 
 
@@ -205,7 +205,7 @@ def _sound(found: Fit) -> Fit:
     medians = found.prior.at(torch.zeros((2, 3), dtype=torch.float64))
     return replace(
         found,
-        processes=medians._replace(amplitude=medians.amplitude * torch.tensor([1.0, 0.0])),
+        processes=medians._replace(amplitude=medians.amplitude * torch.tensor([1.0, 0.0], dtype=torch.float64)),
         log_prior=found.prior.log_hypotheses,
         noise=EQUAL_NOISE,
         trouble="The covariance of the trials is singular under all hyperparameters. "
@@ -222,7 +222,7 @@ def _most_likely(found: Fit, max_evaluations: int) -> Fit:
         return float(0.5 * point.square().sum() - found.log_marginal(found.prior.at(point), log_variance)[0])
 
     start = found.prior.z(found.processes.picked(torch.tensor([found.best])))[0]
-    simplex = start + torch.nn.functional.pad(0.5 * torch.eye(3), (0, 0, 1, 0))
+    simplex = start + torch.nn.functional.pad(0.5 * torch.eye(3, dtype=torch.float64), (0, 0, 1, 0))
     options: dict[str, object] = {
         "initial_simplex": simplex.numpy(),
         "xatol": 0.05,

@@ -22,7 +22,7 @@ from isiw.models.gp.prior import FixedProcess, HyperparameterPrior
 from isiw.models.gp.process import KernelName, SingleTaskGP
 from isiw.models.gp.samples import Paths, ProfileSample, draw_paths
 from isiw.models.gp.scale import Scale, Transform, scale_of
-from isiw.models.protocol import Observation, Tensor
+from isiw.models.protocol import DTYPE, Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory, PersonTrials
 from isiw.models.windows import SampledProfiles, profile_grid, sampled_estimate
@@ -212,7 +212,7 @@ class GaussianProcessPosterior:
         It is that of equal noise also where the noise depends on the ISI, and of a process whose mean and scale come
         from the same trials (empirical Bayes): it compares these processes with each other, not with other models.
         """
-        return torch.tensor([f.log_evidence for f in self.fits])
+        return torch.tensor([f.log_evidence for f in self.fits], dtype=DTYPE)
 
     @property
     def trouble(self) -> str | None:
@@ -230,6 +230,6 @@ class GaussianProcessPosterior:
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32)
+        grid = torch.tensor(self.space.grid_ms, dtype=DTYPE)
         profiles = SampledProfiles(self.profiles_mv(profile_grid(self.space))[person], self.baselines_mv()[person])
         return sampled_estimate(self.window_masks(grid)[person], profiles, self.space)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import torch
 
-from isiw.models.protocol import Tensor
+from isiw.models.protocol import DTYPE, Tensor
 
 __all__ = ["Health", "distinct_share", "ess_share", "trouble_of"]
 
@@ -53,7 +53,7 @@ def distinct_share(log_likelihood: Tensor) -> Tensor:
         log_likelihood: of the history under each particle, shape (b, p).
     """
     changes = log_likelihood.sort(dim=-1).values.diff(dim=-1) != 0
-    return (1.0 + changes.sum(-1)) / log_likelihood.shape[-1]
+    return (1.0 + changes.sum(-1, dtype=DTYPE)) / log_likelihood.shape[-1]
 
 
 def trouble_of(health: Health) -> str | None:

@@ -128,11 +128,11 @@ class Mover(Generic[L]):
             log_likelihood: of the history under each of them, shape (b, p).
         """
         if not number:
-            return Moved(latents, log_likelihood, *torch.full((2, len(log_likelihood)), torch.nan))
+            return Moved(latents, log_likelihood, *log_likelihood.new_full((2, len(log_likelihood)), torch.nan))
         half = log_likelihood.shape[-1] // 2
         everyone = _Weighed(latents, log_likelihood, self.target.log_prior(latents))
         first, second = everyone.part(slice(0, half)), everyone.part(slice(half, None))
-        counts = torch.zeros(4, len(log_likelihood), device=log_likelihood.device)
+        counts = log_likelihood.new_zeros((4, len(log_likelihood)))
         for _ in range(number):
             first = self._step(first, second.latents, counts)
             second = self._step(second, first.latents, counts)
@@ -150,7 +150,7 @@ class Mover(Generic[L]):
         log_likelihood = total_log_likelihood(self.target.person(proposal), self.history)
         log_prior = self.target.log_prior(proposal)
         # A jump draws from the prior, so that its density cancels, where what it leads to is possible at all.
-        possible = torch.where(log_prior.isneginf(), -torch.inf, 0.0)
+        possible = torch.where(log_prior.isneginf(), log_prior, 0.0)
         prior_ratio = torch.where(jumps, possible, log_prior - mine.log_prior)
         accept = torch.log(self._uniform(log_prior)) < log_likelihood - mine.log_likelihood + prior_ratio
         counts += torch.stack([~jumps, accept & ~jumps, jumps, accept & jumps]).sum(-1)
@@ -172,10 +172,10 @@ class Mover(Generic[L]):
         return mine._replace(values=mine.values + moves * (scale.unsqueeze(-1) * (first - second) + blur))
 
     def _uniform(self, like: Tensor) -> Tensor:
-        return torch.rand(like.shape, generator=self.generator, device=like.device)
+        return torch.rand(like.shape, generator=self.generator, dtype=like.dtype, device=like.device)
 
     def _normal(self, like: Tensor) -> Tensor:
-        return torch.randn(like.shape, generator=self.generator, device=like.device)
+        return torch.randn(like.shape, generator=self.generator, dtype=like.dtype, device=like.device)
 
     def _pick(self, people: int, size: int, of: int) -> Tensor:
         return torch.randint(of, (people, size), generator=self.generator, device=self.generator.device)

@@ -186,7 +186,8 @@ def _curve(response: Response, gain: Tensor | float = 0.0) -> _Curve:
     log_gamma, slope = _log_gamma_nodes(response.spread)
     spread = torch.where(recruits, width * _nodes(width), log_gamma - FAR_BELOW)
     between = (BETWEEN_NODES * torch.where(recruits, width, slope)).square()
-    log_scale = response.log_ratio.unsqueeze(-1) + torch.where(recruits, 0.0, FAR_BELOW) + gain
+    log_ratio = response.log_ratio.unsqueeze(-1)
+    log_scale = torch.where(recruits, log_ratio, log_ratio + FAR_BELOW) + gain
     output = torch.where(recruits, response.output_log_sd.unsqueeze(-1).square(), 0.0)
     return _Curve(log_scale.exp(), spread, between, output)
 
@@ -371,8 +372,9 @@ def draw_log_mep(response: Response, level: Tensor, generator: torch.Generator, 
     node = torch.multinomial(_node_weights(level), level.numel(), replacement=True, generator=generator)
     picks = node.view(level.shape).unsqueeze(-2)
     mean, inverse_sd = (x.gather(-2, picks).squeeze(-2) for x in (mean, inverse_sd))
-    z = torch.randn(level.shape, generator=generator, device=level.device)
-    chance, artefact, place = torch.rand((3, *level.shape), generator=generator, device=level.device)
+    z = torch.randn(level.shape, generator=generator, dtype=level.dtype, device=level.device)
+    size = (3, *level.shape)
+    chance, artefact, place = torch.rand(size, generator=generator, dtype=level.dtype, device=level.device)
     responds = chance < _response_probability(response, level)
     log_relative = torch.where(responds, mean + z / inverse_sd, z * response.floor_log_sd.unsqueeze(-1))
     low, high = OUTLIER_LOG_RANGE

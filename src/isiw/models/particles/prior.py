@@ -35,7 +35,7 @@ from isiw.models.particles.noise import NoiseKind, Response, recruits
 from isiw.models.particles.places import mixture_of
 from isiw.models.particles.profile import ProfilePrior
 from isiw.models.particles.shapes import Shape
-from isiw.models.protocol import Tensor
+from isiw.models.protocol import DTYPE, Tensor
 from isiw.models.shared.scales import Scale
 
 __all__ = ["Depression", "Person", "Prior"]
@@ -137,7 +137,7 @@ class Prior:
     def spreads(self) -> Tensor:
         """Usual SD of each latent, shape (d,)."""
         first = self.profile.start.spans[0]
-        parts = [torch.tensor([first.high_ms - first.low_ms]) / math.sqrt(12.0)]
+        parts = [torch.tensor([first.high_ms - first.low_ms], dtype=DTYPE) / math.sqrt(12.0)]
         return torch.cat(parts + [self.mixtures[name].sds[0] for name in BLOCKS if name != "start"])
 
     def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> Latents:
@@ -150,12 +150,12 @@ class Prior:
             space: the design space that the window is in.
         """
         size = (people, particles)
-        uniform = torch.rand((4, *size), generator=generator, device=generator.device)
+        uniform = torch.rand((4, *size), generator=generator, dtype=DTYPE, device=generator.device)
         start_ms = self.profile.start.start_ms(uniform[3], space).unsqueeze(-1)
         values = torch.cat([start_ms, self._joint.sample(size, generator)], dim=-1)
         if self.profile.p_place:
-            known = torch.rand((*size, 1), generator=generator, device=generator.device) < self.profile.p_place
-            place = self._joint_place.sample(size, generator)
+            chance = torch.rand((*size, 1), generator=generator, dtype=DTYPE, device=generator.device)
+            known, place = chance < self.profile.p_place, self._joint_place.sample(size, generator)
             values = torch.cat([torch.where(known, place, values[..., :2]), values[..., 2:]], dim=-1)
         shape, noise = drawn(astuple(self.profile.shapes), uniform[0]), drawn(astuple(self.noise), uniform[1])
         return Latents(values, shape, noise, uniform[2] < self.profile.p_window)

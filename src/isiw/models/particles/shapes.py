@@ -135,7 +135,7 @@ def _two_peaks(shape: Shape, isi_ms: Tensor) -> Tensor:
     form, start_ms, width_ms = (field.unsqueeze(-1) for field in (shape.form, shape.start_ms, shape.width_ms))
     share = (isi_ms - start_ms) / width_ms
     apart = form.abs() > TOGETHER
-    sd = torch.where(apart, APART_SD, PEAK_SD)
+    sd = torch.full_like(form, PEAK_SD).masked_fill_(apart, APART_SD)
     lower = 1.0 - 0.7 * torch.where(apart, (form.abs() - TOGETHER) / (1.0 - TOGETHER), form.abs() / TOGETHER)
     heights = torch.where(form < 0, lower, 1.0), torch.where(form < 0, 1.0, lower)
     first, second = (

@@ -84,7 +84,7 @@ class Swarm(Generic[L]):
     def of(cls, latents: L) -> Swarm[L]:
         """Particles of the prior, before the first trial."""
         people, particles = latents.values.shape[:-1]
-        nothing = torch.zeros((people, particles), device=latents.values.device)
+        nothing = latents.values.new_zeros((people, particles))
         history = History.empty(people, nothing.device)
         return cls(latents, nothing - math.log(particles), nothing, nothing[:, 0], history)
 

@@ -11,7 +11,7 @@ import torch
 
 from isiw.checks import ascending, check_numbers, check_probabilities, mean_and_sd, require_sum_of_one
 from isiw.design import DesignSpace
-from isiw.models.protocol import Tensor
+from isiw.models.protocol import DTYPE, Tensor
 
 __all__ = ["TAP_SPANS", "Span", "StartPrior"]
 
@@ -193,7 +193,8 @@ class _Law(NamedTuple):
 @lru_cache(maxsize=64)
 def _law(space: DesignSpace, prior: StartPrior, dtype: torch.dtype, device: torch.device) -> _Law:
     low_ms, high_ms = space.low_ms - BEFORE_MS, space.high_ms
-    knots_ms = torch.linspace(low_ms, high_ms, min(MAX_KNOTS, math.ceil((high_ms - low_ms) / KNOT_MS) + 1)).double()
+    knots = min(MAX_KNOTS, math.ceil((high_ms - low_ms) / KNOT_MS) + 1)
+    knots_ms = torch.linspace(low_ms, high_ms, knots, dtype=DTYPE).double()
     expected = torch.stack([span.share * span.density(knots_ms) for span in prior.in_space(space)]).sum(0)
     even = torch.full_like(knots_ms, 1.0 / (high_ms - low_ms))
     mixed = (1.0 - prior.p_anywhere) * expected + prior.p_anywhere * even

@@ -12,7 +12,7 @@ from isiw.design import DesignSpace
 from isiw.models.particles.mixture import drawn
 from isiw.models.particles.prior import Person
 from isiw.models.particles.supra.prior import BLOCKS, LATENTS, SupraLatents, SupraPrior
-from isiw.models.protocol import Tensor
+from isiw.models.protocol import DTYPE, Tensor
 
 __all__ = ["SupraTarget"]
 
@@ -72,7 +72,7 @@ class SupraTarget:
     def jumped(self, latents: SupraLatents, generator: torch.Generator) -> SupraLatents:
         """Particles (n,) with some latents, and whether their segment is there, drawn anew."""
         fresh = self.prior.draw(1, len(latents.enhanced), generator, self.space)
-        uniform = torch.rand(latents.enhanced.shape, generator=generator, device=generator.device)
+        uniform = torch.rand(latents.enhanced.shape, generator=generator, dtype=DTYPE, device=generator.device)
         jump = drawn(tuple(JUMPS.values()), uniform)
         enhanced, depressed, *_ = (jump == number for number in range(len(JUMPS)))
         return SupraLatents(

@@ -18,7 +18,7 @@ from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraLatents, SupraPrior
 from isiw.models.particles.swarm import Moving, Swarm
-from isiw.models.protocol import Observation, Tensor
+from isiw.models.protocol import DTYPE, Observation, Tensor
 from isiw.models.randomness import step_generator
 from isiw.models.windows import SampledProfiles, best_window, profile_grid, sampled_estimate
 from isiw.window import WindowEstimate
@@ -102,7 +102,7 @@ class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person, and the segment in which the tap depresses the MEP."""
-        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32)
+        grid = torch.tensor(self.space.grid_ms, dtype=DTYPE)
         profiles_mv, baselines_mv = self.sample.expected_mep_mv(profile_grid(self.space)), self.baselines_mv()
         profiles = SampledProfiles(profiles_mv[person], baselines_mv[person])
         estimate = sampled_estimate(self._all.window_masks(grid)[person], profiles, self.space)

@@ -23,7 +23,7 @@ from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.prior import Depression, Person
 from isiw.models.particles.profile import Width
 from isiw.models.particles.shapes import Shape, ShapeKind
-from isiw.models.protocol import Tensor
+from isiw.models.protocol import DTYPE, Tensor
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.models.shared.start import Span, StartPrior
 
@@ -187,7 +187,7 @@ class SupraPrior:
     def spreads(self) -> Tensor:
         """Usual SD of each latent, shape (d,)."""
         first = self.start.spans[0]
-        starts = torch.full((2,), (first.high_ms - first.low_ms) / math.sqrt(12.0))
+        starts = torch.full((2,), (first.high_ms - first.low_ms) / math.sqrt(12.0), dtype=DTYPE)
         return torch.cat([starts, *(mixture.sds[0] for mixture in self._mixtures)])
 
     def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> SupraLatents:
@@ -215,7 +215,7 @@ class SupraPrior:
             space: the design space that the segments are in.
         """
         size = (people, particles)
-        uniform = torch.rand((4, *size), generator=generator, device=generator.device)
+        uniform = torch.rand((4, *size), generator=generator, dtype=DTYPE, device=generator.device)
         starts_ms = self.start.start_ms(uniform[:2], space).movedim(0, -1)
         values = torch.cat([starts_ms, self._joint.sample(size, generator)], dim=-1)
         return SupraLatents(values, uniform[2] < self.enhanced.probability, uniform[3] < self.depressed.probability)
