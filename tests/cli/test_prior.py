@@ -144,3 +144,11 @@ def test_a_prior_among_the_settings_excludes_one_from_earlier_sessions(isiw: Com
     result = isiw("run", "both.toml", "--prior", lab, "--log", "b.mcap")
     assert result.exit_code == 1
     assert "exclude each other" in result.output
+
+
+def test_only_a_prior_is_replaced_by_a_prior(isiw: Command, logs: Any, lab: Path, folder: Path) -> None:
+    content = (folder / "short.toml").read_text()
+    refused = isiw("prior", "learn", *logs, "-o", "short.toml", "--overwrite")
+    assert "the file that is there is not a lab's prior" in refused.output
+    assert (folder / "short.toml").read_text() == content
+    assert isiw("prior", "learn", *logs, "-o", lab, "--overwrite").exit_code == 0

@@ -125,6 +125,18 @@ def test_a_width_that_is_to_end_no_session_is_no_slip(config_file: WriteFile) ->
     assert config.strategy.settings == {"stop_width_ms": 0.001}
 
 
+def test_files_that_are_read_are_looked_for_beside_the_configuration(
+    config_file: WriteFile, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = config_file('log = "s.mcap"\nprior = "lab.toml"\nafter = ["../P07.mcap"]\n[subject]\ndata = "uef"\n')
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    config = load_config(file)
+    assert (config.prior, config.after) == (tmp_path / "lab.toml", (tmp_path / "../P07.mcap",))
+    assert (config.subject.data, config.log) == (tmp_path / "uef", Path("s.mcap"))
+    assert config.with_overrides(prior=Path("own.toml")).prior == Path("own.toml")
+
+
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"cannot be read.*nowhere.toml"):
         load_config(tmp_path / "nowhere.toml")

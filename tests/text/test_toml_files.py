@@ -46,6 +46,12 @@ def test_what_is_wrong_is_named(values: dict[str, Any], message: str) -> None:
         checked(Whole, values, "f.toml")
 
 
+def test_the_mark_that_windows_puts_before_a_text_is_no_error(tmp_path: Path) -> None:
+    file = tmp_path / "f.toml"
+    file.write_text("people = 4\n", encoding="utf-8-sig")
+    assert read_toml(file) == {"people": 4}
+
+
 def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path: Path) -> None:
     (tmp_path / "broken.toml").write_text("people = = 3")
     with pytest.raises(ConfigError, match=r"broken\.toml is not valid TOML"):

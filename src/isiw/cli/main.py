@@ -331,6 +331,10 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
         raise isiw.errors.ConfigError(
             "the log would be overwritten by its picture", got=str(session.log_path), expected=".mcap"
         )
+    if session.log_path.name.startswith("-"):
+        raise isiw.errors.ConfigError(
+            "a log's name cannot begin like an option", got=str(session.log_path), remedy="Give --log a file's name."
+        )
     before, ours = len(session.trials), resumed or not _is_log(str(session.log_path))
     try:
         with errors_reported(_INTERRUPTED), _shown_live(session) if live else nullcontext():

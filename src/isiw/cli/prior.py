@@ -11,7 +11,6 @@ from rich.progress import Progress
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, Overwrite, counted, errors_reported, exit_if_damaged, show
-from isiw.log.outputs import check_output
 from isiw.text.commands import command
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ def learn(
     """Learn what a lab's people are like from sessions already run. Exit code 3 where a log is damaged."""
     losses: list[str] = []
     with errors_reported("Interrupted: nothing was written."):
-        check_output(output, overwrite=overwrite)
+        isiw.priors.check_lab_output(output, overwrite=overwrite)
         with Progress(console=Console(stderr=True)) as progress:
             task = progress.add_task("sessions", total=len(logs))
 

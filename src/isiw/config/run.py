@@ -135,6 +135,9 @@ def _given(**values: object) -> dict[str, object]:
 def load_config(path: str | Path | None = None) -> RunConfig:
     """Read a configuration file; without one, the defaults.
 
+    Files that it names to be read (a prior, earlier logs, recordings) are looked for from its own folder on; a log is
+    written from where the command is given.
+
     Args:
         path: a TOML file.
 
@@ -144,15 +147,25 @@ def load_config(path: str | Path | None = None) -> RunConfig:
     """
     if path is None:
         return _validated({}, "the defaults")
-    values = read_toml(path)
+    values, folder = read_toml(path), Path(path).resolve().parent
     if isinstance(values.get("device"), dict):  # a module of the user's own usually lies beside the file
-        values["device"] = {"folder": Path(path).resolve().parent} | values["device"]
-    config = _validated(values, str(path))
+        values["device"] = {"folder": folder} | values["device"]
+    config = _read_from(folder, _validated(values, str(path)))
     require_units(values)
     require_together(values)
     limits_for(config).require_effect()
     config.protocol.require_effect(config.limits.min_iti_s)
     return config
+
+
+def _read_from(folder: Path, config: RunConfig) -> RunConfig:
+    """A configuration whose files that are read, but for modules, lie where they do as seen from its own folder."""
+    found: dict[str, Any] = {"after": tuple(folder / log for log in config.after)} if config.after else {}
+    if config.prior is not None:
+        found["prior"] = folder / config.prior
+    if config.subject.data is not None:
+        found["subject"] = config.subject.model_copy(update={"data": folder / config.subject.data})
+    return config.model_copy(update=found)
 
 
 def _validated(values: Mapping[str, Any], source: str) -> RunConfig:

@@ -3,7 +3,7 @@
 from isiw.priors.comparison import compared, densities
 from isiw.priors.days import DayToDay, after, moved
 from isiw.priors.differing import Difference, differences
-from isiw.priors.file import load, read_lab_prior, write_lab_prior
+from isiw.priors.file import check_lab_output, load, read_lab_prior, write_lab_prior
 from isiw.priors.lab import LabPrior, LearntSession, learn
 from isiw.priors.recall import recalled
 
@@ -13,6 +13,7 @@ __all__ = [
     "LabPrior",
     "LearntSession",
     "after",
+    "check_lab_output",
     "compared",
     "densities",
     "differences",

@@ -8,14 +8,14 @@ from typing import Any
 
 import tomli_w
 
-from isiw.errors import ConfigError
-from isiw.log.outputs import write_output
+from isiw.errors import ConfigError, InvalidValueError
+from isiw.log.outputs import check_output, write_output
 from isiw.models.particles.laws import NoiseShares
 from isiw.models.particles.prior import Prior
 from isiw.priors.lab import SCHEMA_VERSION, LabPrior
 from isiw.text.toml_files import checked, read_toml
 
-__all__ = ["load", "read_lab_prior", "write_lab_prior"]
+__all__ = ["check_lab_output", "load", "read_lab_prior", "write_lab_prior"]
 
 
 def write_lab_prior(lab: LabPrior, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -27,9 +27,36 @@ def write_lab_prior(lab: LabPrior, path: str | Path, *, overwrite: bool = False)
         overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: there is a file that is not to be replaced.
+        InvalidValueError: there is a file that is not to be replaced, or is something else than a lab's prior.
     """
+    check_lab_output(path, overwrite=overwrite)
     return write_output(path, tomli_w.dumps(_plain(asdict(lab))).encode(), overwrite=overwrite)
+
+
+def check_lab_output(path: str | Path, *, overwrite: bool = False) -> None:
+    """Check that `write_lab_prior` may write a file; for whoever has long work to do before.
+
+    Args:
+        path: where to.
+        overwrite: whether to replace a lab's prior that is there.
+
+    Raises:
+        InvalidValueError: there is a file that is not to be replaced, or is something else than a lab's prior.
+    """
+    check_output(path, overwrite=overwrite)
+    if Path(path).exists() and "schema_version" not in _values_or_none(path):
+        raise InvalidValueError(
+            "the file that is there is not a lab's prior, so it is not replaced",
+            got=str(path),
+            remedy="Choose another path.",
+        )
+
+
+def _values_or_none(path: str | Path) -> dict[str, Any]:
+    try:
+        return read_toml(path)
+    except ConfigError:
+        return {}
 
 
 def read_lab_prior(path: str | Path) -> LabPrior:

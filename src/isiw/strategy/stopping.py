@@ -105,7 +105,7 @@ class Budget:
         left = self.max_trials - progress.delivered
         if left <= 0:
             return StopDecision(stop=True, reason=f"The budget of {self.max_trials} stimuli is used up.")
-        return StopDecision(stop=False, reason=f"{left} stimuli are left.")
+        return StopDecision(stop=False, reason="1 stimulus is left." if left == 1 else f"{left} stimuli are left.")
 
 
 @dataclass(frozen=True)

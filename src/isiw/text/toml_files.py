@@ -40,7 +40,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         ConfigError: it cannot be read, or is not TOML.
     """
     try:
-        return parsed(Path(path).read_text(encoding="utf-8"))
+        return parsed(Path(path).read_text(encoding="utf-8-sig"))  # with the mark that Windows puts first
     except OSError as error:
         raise ConfigError(
             f"the TOML file cannot be read: {error.strerror}", got=str(path), remedy="Check the path."
@@ -51,7 +51,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
             got=str(path),
             remedy="To see what a session's log holds use isiw show, to continue the session isiw resume.",
         ) from error
-    except (ValueError, RecursionError) as error:  # not TOML, not UTF-8, or nested without end
+    except (ValueError, RecursionError) as error:  # not TOML, or nested without end
         raise ConfigError(f"{path} is not valid TOML: {error}", remedy="Correct the line that it names.") from error
 
 
