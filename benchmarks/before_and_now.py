@@ -4,8 +4,8 @@
     PYTHONPATH=../before/src python -m benchmarks.before_and_now run --out before
     python -m benchmarks.before_and_now run --out now
     python -m benchmarks.before_and_now compare before now --out benchmarks/results/before_and_now
-    PYTHONPATH=../before/src python -m benchmarks.before_and_now run --cohorts nonresponder --to-stopping --out before
-    python -m benchmarks.before_and_now run --cohorts nonresponder --to-stopping --out now
+    PYTHONPATH=../before/src python -m benchmarks.before_and_now run --to-stopping 80 --out before
+    python -m benchmarks.before_and_now run --to-stopping 80 --out now
     python -m benchmarks.before_and_now stops before now --out benchmarks/results/before_and_now_stops
     python -m benchmarks.before_and_now speed ../before/src src > benchmarks/results/before_and_now_speed.md
 
@@ -33,7 +33,7 @@ from benchmarks.provenance import command_of, made_with
 from isiw.studies import Processes, Study, StudyStrategy, conduct, run_unit
 
 MARKS = (5, 10, 15, 20, 25, 30, 40)
-TO_STOPPING = (*MARKS, 50, 60)
+LATER = (50, 60, 80)
 COHORTS = "recruitment,gaussian,nonresponder"
 
 app = typer.Typer(help=__doc__)
@@ -45,13 +45,15 @@ def run(
     people: Annotated[int, typer.Option(help="People a cohort.")] = 1000,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 100_000,
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
-    to_stopping: Annotated[bool, typer.Option("--to-stopping", help="60 trials, and where the rule ends.")] = False,  # noqa: FBT002 - a flag
+    to_stopping: Annotated[int | None, typer.Option(help="So many trials, and where the rule ends.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("now"),
 ) -> None:
     """Run the default of the isiw that is imported."""
     torch.set_num_threads(1)
     for name in cohorts.split(","):
-        marks, stopping = (TO_STOPPING, "noted") if to_stopping else (MARKS, "ignored")
+        marks, stopping = MARKS, "ignored"
+        if to_stopping is not None:
+            marks, stopping = tuple(sorted({*(m for m in (*MARKS, *LATER) if m <= to_stopping), to_stopping})), "noted"
         study = study_of(name, people, seed, marks, stopping)
         results = conduct(study, out / f"{name}.study", executor=Processes(workers))
         results.rows().to_parquet(out / f"{name}.parquet")
@@ -76,7 +78,7 @@ def stops(
 ) -> None:
     """Compare where the stopping rules of both versions end, on the people that both measured."""
     table = pd.concat([ends(before / path.name, path) for path in sorted(now.glob("*.parquet"))])
-    _write(table, now, out, "a session that has not stopped by trial 60 counts as it stands there")
+    _write(table, now, out, "a session that has not stopped by the last trial counts as it stands there")
 
 
 def _write(table: pd.DataFrame, now: Path, out: Path, how: str) -> None:
@@ -179,7 +181,7 @@ def ends(before: Path, now: Path) -> pd.DataFrame:
     both = _ends(now).merge(_ends(before), on=keys, suffixes=("_now", "_before"))
     rows = []
     for cohort, people in both.groupby("cohort"):
-        for what in ("stimuli", "f1", "stopped_on_window", "stopped_on_none", "told_window", "told_window_at_60"):
+        for what in ("stimuli", "f1", "stopped_on_window", "stopped_on_none", "told_window", "told_window_at_the_end"):
             difference = people[f"{what}_now"].astype(float) - people[f"{what}_before"].astype(float)
             means = {which: people[f"{what}_{which}"].mean() for which in ("before", "now")}
             change = {"difference": difference.mean(), "difference_se": difference.sem()}
@@ -199,7 +201,7 @@ def _ends(rows: Path) -> pd.DataFrame:
         stopped_on_window=stopped & ~none,
         stopped_on_none=none,
         told_window=(stopped & ~none) | (~stopped & told),
-        told_window_at_60=told,
+        told_window_at_the_end=told,
     )
 
 
