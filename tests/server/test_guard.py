@@ -113,7 +113,9 @@ def test_a_body_that_is_cut_off_is_not_taken_for_a_whole_one(client: httpx.Clien
             "Content-Type: application/x-www-form-urlencoded\r\nContent-Length: 29\r\n\r\ntrial=0&isi_ms=60&mep_mv=0.1"
         )
         connection.sendall(f"{head}{form}".encode())  # of 0.12
-    time.sleep(0.1)
+        connection.shutdown(socket.SHUT_WR)
+        while connection.recv(10_000):  # until the server has done with it
+            pass
     assert done(client.get(session))["trials"] == 0
 
 
