@@ -16,6 +16,7 @@ from isiw.devices.protocol import Device
 from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import ConfigError
+from isiw.log.durable import log_exists
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import RUN_KEY
 from isiw.session.loop import Session
@@ -35,7 +36,7 @@ def fresh_log_path(config: RunConfig) -> Path:
     stem = f"{dt.datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}_seed{config.seed}"
     names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
     paths = (SESSIONS / f"{name}.mcap" for name in names)
-    return next(path for path in paths if not path.exists() and not path.with_name(f"{path.name}.part").exists())
+    return next(path for path in paths if not log_exists(path))
 
 
 def subject_for(config: RunConfig) -> SimulatedSubject:

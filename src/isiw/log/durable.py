@@ -31,6 +31,7 @@ __all__ = [
     "damaged_of",
     "disk_errors",
     "kept_for",
+    "log_exists",
     "log_of",
     "part_of",
     "put",
@@ -71,6 +72,11 @@ def part_of(path: Path) -> Path:
 def log_of(path: Path) -> Path:
     """Where a log is once it is finished, from either of its names."""
     return path.with_suffix("") if path.suffix == ".part" else path
+
+
+def log_exists(log: Path) -> bool:
+    """Whether there is a log of this name, finished or still being written."""
+    return log.exists() or part_of(log).exists()
 
 
 def damaged_of(path: Path, number: int) -> Path:

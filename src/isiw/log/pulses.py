@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from isiw.errors import DamagedLogError, LogError
-from isiw.log.durable import kept_for, log_of, part_of
+from isiw.log.durable import kept_for, log_exists, log_of
 from isiw.log.outputs import is_log
 from isiw.log.reader import of_production, read_any
 from isiw.log.salvage import Message, Salvage, holds, salvage
@@ -83,7 +83,7 @@ def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: 
         raise LogError("there is no such folder of logs", got=str(folder), remedy="Check Safeguards.earlier_logs.")
     own = log_of(but.resolve())
     given = {stimulus for log in sorted(_recent(folder, period_s) - {own}) for stimulus in _of_subject(log, subject)}
-    if own.exists() or part_of(own).exists():
+    if log_exists(own):
         given -= set(_given(salvage(own)))  # of which there may be a copy
     return sorted((age_s for age_s in _ages_s(given) if age_s <= period_s), reverse=True)
 
@@ -120,7 +120,7 @@ def _raise(error: OSError) -> None:
 def _went_on(damaged: Salvage) -> bool:
     """Whether a damaged file is only kept, and its log was resumed with all that was left: its pulses count there."""
     log = kept_for(damaged.path)
-    if log is None or not (log.exists() or part_of(log).exists()):
+    if log is None or not log_exists(log):
         return False
     later = salvage(log)
     return holds(later, damaged) and _resumed(later) > _resumed(damaged)

@@ -12,7 +12,7 @@ from typing import Final
 
 from isiw.devices.limits import Limits
 from isiw.errors import told
-from isiw.log.durable import log_of, part_of
+from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.outputs import made_folder
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import SERVED_KEY
@@ -98,7 +98,7 @@ class Sessions:
             IsiwError: its strategy cannot be made, or its log not written.
         """
         path = self._path(request.id)
-        if path.exists() or part_of(path).exists():
+        if log_exists(path):
             self._require_same_beginning(request)
             return self.resume(request.id)
         with self._opened_as(request.id):

@@ -11,7 +11,7 @@ from isiw.devices.clock import Clock, MonotonicClock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, StrategyError
-from isiw.log.durable import part_of
+from isiw.log.durable import log_exists
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Header
@@ -110,7 +110,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     header.limits.require_effect()
     header.protocol.require_effect(header.limits.min_iti_s)
     clock = clock or MonotonicClock()
-    if not (resume and (path.exists() or part_of(path).exists())):
+    if not (resume and log_exists(path)):
         return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
     given = {"subject": subject, "visit": visit, "protocol": protocol, "limits": limits, "config": config}
     unsaid = {name for name, value in given.items() if value is None or value == ""}
