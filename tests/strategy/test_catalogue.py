@@ -254,3 +254,9 @@ def test_a_setting_that_would_fill_the_memory_is_refused_at_once(setting: str) -
 def test_a_setting_deep_in_a_part_is_refused_as_well(moves: Any) -> None:
     with pytest.raises(InvalidValueError, match=r"the setting moves of random: sweeps must be .*at most"):
         make_strategy("random", moves=moves)
+
+
+def test_a_tap_that_hits_after_the_last_isi_is_refused() -> None:
+    with pytest.raises(InvalidValueError, match=r"would hit after the last ISI.*a hit delay of 5000 ms"):
+        make_strategy(hit_delay_ms=(5000.0, 6.0), **FEW)
+    assert make_strategy(space=IMPACT_SPACE, hit_delay_ms=(5000.0, 6.0), **FEW).estimate().window is not None

@@ -242,8 +242,9 @@ class Strategy:
         Args:
             isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone, which uses up no budget.
             mep_mv: peak-to-peak amplitude [mV]; 0 is left-censored at the detection limit.
-            response: whether a response was seen, instead of an amplitude.
-            isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
+            response: whether a response was seen, instead of an amplitude; for a strategy of its own, as sessions log
+                amplitudes.
+            isi_sd_ms: SD of the realised ISI [ms], at most 50; 0 where it was measured.
 
         Raises:
             InvalidValueError: NaN, infinite or negative values, a response that is neither True nor False, not exactly

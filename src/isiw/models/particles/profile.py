@@ -151,9 +151,9 @@ class ProfilePrior:
         """Check that the conditioning stimulus and the places mean something in a space.
 
         Raises:
-            InvalidValueError: ISIs count from a valve command that the conditioning stimulus does not have; or the
-                places count from another event than the space, or are of a rig with another hit delay, or of another
-                conditioning stimulus.
+            InvalidValueError: ISIs count from a valve command that the conditioning stimulus does not have, or all are
+                shorter than the hit delay; or the places count from another event than the space, or are of a rig with
+                another hit delay, or of another conditioning stimulus.
         """
         if self.conditioning == "electrical" and space.reference == "valve":
             raise InvalidValueError(
@@ -179,6 +179,13 @@ class ProfilePrior:
                 f"not, learn from sessions that count from the {origin(space.reference)}, or leave the prior out.",
             )
         delay_ms = self.start.hit_delay_ms
+        if delay_ms is not None and space.reference == "valve" and delay_ms[0] > space.high_ms:
+            raise InvalidValueError(
+                "the tap would hit after the last ISI, so no window could be found",
+                got=f"a hit delay of {delay_ms[0]:g} ms",
+                expected=f"less than {space.high_ms:g} ms, which is the largest ISI after the valve command",
+                remedy="Is it in ms? isiw timing LOG measures it. If it is right, make the space longer.",
+            )
         if others := [place.hit_delay_ms for place in self.places if not place.is_of_rig(delay_ms)]:
             raise InvalidValueError(
                 "the prior was learnt on a rig with another hit delay, so its windows would be in the wrong place",
