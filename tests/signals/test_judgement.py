@@ -125,6 +125,12 @@ def test_the_rounded_top_of_an_mep_is_no_limit(turn_ms: float) -> None:
         assert not is_saturated(with_mep(float(peak_mv), seed, turn_ms=turn_ms), 5000.0, span_ms=MEP_SPAN_MS)
 
 
+def test_an_mep_that_is_on_its_flank_at_the_windows_edge_is_not_clipped() -> None:
+    for late_ms in np.arange(4.0, 16.0, 0.5):
+        emg_mv = with_mep(0.4, 0)
+        assert not is_saturated(emg_mv, 5000.0, span_ms=(615.0 - late_ms, 635.0 - late_ms))
+
+
 def test_an_artefact_that_saturates_outside_the_mep_window_is_no_saturation() -> None:
     emg = sweep_of().channels["emg"].values.copy()
     emg[3899:3909] = 5.0  # the pulse

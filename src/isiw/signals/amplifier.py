@@ -23,8 +23,8 @@ MAD_TO_SD = 1.4826  # of a normal distribution
 PLATEAU_MS = 2.0
 PLATEAU_SD, FLANK_SD = 1.5, 6.0
 STEEPNESS = 1.5
-"""On the limit of an amplifier that saturates before the converter there is the converter's noise alone, and EMG at rest
-has more. The top of an MEP is within 1.5 SD of that for less than 1.4 ms, and rounded: within 6 SD it lasts twice as
+"""On the limit of an amplifier that saturates before the converter there is the converter's noise alone, less than EMG
+at rest has. The top of an MEP is within 1.5 SD of that for less than 1.4 ms, and rounded: within 6 SD it lasts twice as
 long."""
 
 FAR_OUT_SD = 60.0
@@ -98,12 +98,12 @@ def _has_plateau(upright: FloatArray, top: int, rate_hz: float) -> bool:
     return plateau * 1000 / rate_hz >= PLATEAU_MS and _width(upright, top, FLANK_SD * noise) <= STEEPNESS * plateau
 
 
-def _width(upright: FloatArray, top: int, depth: float) -> int:
-    """For how many samples about its top the EMG does not fall below it by more than a depth."""
-    fallen = np.flatnonzero(upright < upright[top] - depth)
-    after = int(np.searchsorted(fallen, top))
-    first = int(fallen[after - 1]) + 1 if after else 0
-    last = int(fallen[after]) if after < fallen.size else upright.size
+def _width(emg_mv: FloatArray, top: int, depth_mv: float) -> int:
+    """For how many samples about its top the EMG stays within so much of it; the top of a part may be on a flank."""
+    away = np.flatnonzero(np.abs(emg_mv - emg_mv[top]) > depth_mv)
+    after = int(np.searchsorted(away, top))
+    first = int(away[after - 1]) + 1 if after else 0
+    last = int(away[after]) if after < away.size else emg_mv.size
     return last - first
 
 
