@@ -22,7 +22,7 @@ from isiw.signals.units import EMG_UNITS_MV
 from isiw.signals.waveforms import is_recording
 from isiw.trials import Channel, Measurement, MistrialReason, Sweep, Trial
 
-__all__ = ["Fault", "likely_fault", "remedy_for", "steepest_edge", "too_early_by_chance"]
+__all__ = ["Fault", "likely_fault", "remedy_for", "steepest_edge", "tap_span_ms", "too_early_by_chance"]
 
 TOO_LOUD_UV, TOO_QUIET_UV = 400.0, 0.05
 """EMG before the pulse [µV RMS] that is no muscle's at rest or at work, and no amplifier's."""
@@ -173,11 +173,8 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
     if trial.t_tms_ms is None:
         return None
     steepest_ms = steepest_edge(emg)
-    spans = [(trial.t_tms_ms + EVOKED_SPAN_MS[0], trial.t_tms_ms + EVOKED_SPAN_MS[1])]
-    begins = [ms for ms in (trial.t_valve_ms, trial.t_hit_ms) if ms is not None]
-    if begins:  # the valve switches on and off before the hit
-        hit_ms = begins[0] + LATEST_HIT_MS if trial.t_hit_ms is None else trial.t_hit_ms
-        spans.append((begins[0] - 2.0, hit_ms + JOLT_MS))
+    evoked_ms = (trial.t_tms_ms + EVOKED_SPAN_MS[0], trial.t_tms_ms + EVOKED_SPAN_MS[1])
+    spans = [span for span in (evoked_ms, tap_span_ms(trial)) if span is not None]
     if steepest_ms is None or any(first <= steepest_ms <= last for first, last in spans):
         return None
     return Fault(
@@ -185,6 +182,19 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
         f"{trial.t_tms_ms:.0f} ms",
         "Is that edge the pulse's? Then check the sampling rate, and that all times are on the sweep's own clock.",
     )
+
+
+def tap_span_ms(trial: Trial) -> tuple[float, float] | None:
+    """When the tap may be in the EMG [ms on the sweep's clock]: the valve switches on and off before the hit.
+
+    Args:
+        trial: a trial; None is answered where it has no time of a tap.
+    """
+    begins = [ms for ms in (trial.t_valve_ms, trial.t_hit_ms) if ms is not None]
+    if not begins:
+        return None
+    hit_ms = begins[0] + LATEST_HIT_MS if trial.t_hit_ms is None else trial.t_hit_ms
+    return begins[0] - 2.0, hit_ms + JOLT_MS
 
 
 def steepest_edge(emg: Channel) -> float | None:
