@@ -510,6 +510,42 @@ def test_the_suite_finds_an_artefact_that_pairs_alone_have() -> None:
     check_device(lambda: reflex, RIG_SPACE, clock=VirtualClock())
 
 
+@pytest.mark.parametrize("early_ms", [5.0, 12.0, 40.0, 47.0])
+def test_the_suite_finds_a_pulse_away_from_its_reported_time_on_a_phantom(early_ms: float) -> None:
+    late = rf"a phantom evokes nothing, and the steepest edge of the EMG is \+{early_ms - 0.2:.1f} ms from the reported"
+    with pytest.raises(AssertionError, match=late):
+        check_device(lambda: PhantomRig(early_ms), RIG_SPACE, clock=VirtualClock())
+    simulated = PhantomRig(early_ms)
+    simulated.simulated = True
+    check_device(lambda: simulated, RIG_SPACE)
+
+
+class Blanking(PhantomRig):
+    """Its amplifier blanks the pulse for some time, and lets go with a jump; the tap shows as clearly."""
+
+    def __init__(self, blanked_ms: float) -> None:
+        super().__init__()
+        self.blanked_ms = blanked_ms
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Sweep:
+        Hardware.deliver(self, stimulus, timeout_s)
+        since_ms = np.arange(-600.0, 100.0, 0.2)
+        emg_mv = 0.0015 * np.random.default_rng(stimulus.trial).standard_normal(since_ms.size)
+        emg_mv[(since_ms >= -1.0) & (since_ms < self.blanked_ms)] = 0.0
+        let_go_ms = since_ms - self.blanked_ms
+        emg_mv += 0.5 * np.exp(-np.clip(let_go_ms, 0.0, None)) * (let_go_ms >= 0) * (self.blanked_ms > 0)
+        if stimulus.isi_ms is not None:
+            tap_ms = since_ms + stimulus.isi_ms - 20.0
+            emg_mv[(tap_ms >= 0) & (tap_ms < 1)] += 3.0
+        hit_ms = None if stimulus.isi_ms is None else -stimulus.isi_ms
+        return Sweep({"emg": Channel(emg_mv, 5000.0, "mV", t0_ms=-600.0)}, t_tms_ms=0.0, t_hit_ms=hit_ms)
+
+
+@pytest.mark.parametrize("blanked_ms", [-1.0, 5.0, 8.0])
+def test_an_amplifier_that_blanks_the_pulse_and_the_artefact_of_a_tap_are_no_late_pulse(blanked_ms: float) -> None:
+    check_device(lambda: Blanking(blanked_ms), DesignSpace(25, 320, reference="impact"), clock=VirtualClock())
+
+
 def test_a_simulated_person_has_a_muscle() -> None:
     rig = PhantomRig(15.0)
     rig.simulated = True

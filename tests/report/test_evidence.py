@@ -82,6 +82,12 @@ def test_where_no_mep_stands_out_of_emg_at_rest_the_statement_asks_whether_the_s
     assert nothing_stood_out([at_rest(0.01, None)] * 20) is None
 
 
+def test_what_was_measured_in_the_mep_window_is_said_of_that_window_only() -> None:
+    said = str(nothing_stood_out([at_rest(0.01)] * 10, (15.0, 35.0)))
+    assert said.startswith("In no trial was the EMG in the MEP window, 15–35 ms after the pulse, larger than at rest. ")
+    assert said.endswith("Is the time of the pulse right? Does the MEP window fit the muscle?")
+
+
 def test_that_no_mep_is_seen_any_more_is_said_with_the_trial_from_which_on() -> None:
     meps_mv = [0.2, 0.1] * 4 + [0.006] * 12
     trials = [replace(at_rest(mep_mv), index=index) for index, mep_mv in enumerate(meps_mv)]

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
+from isiw.devices.callback import CallbackDevice
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import DeviceInfo
 from isiw.log.reader import read_session
 from isiw.plots.session import session_figure
 from isiw.report import final_statement
@@ -20,7 +23,7 @@ from isiw.session.watch import Watch
 from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Trial, TrialTable
+from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial, TrialTable
 from scripted import ScriptedDevice, scripted_strategy
 from wrong_rigs import NAMED, SPACE, WRONG, rig
 
@@ -127,6 +130,26 @@ def test_a_stimulator_that_stops_firing_pauses_the_session(log: Path) -> None:
     result = Session(device, make_strategy("random", particles=50, max_trials=60), log=log).run()
     assert len(result.trials) < 40
     assert "Does the stimulator still fire" in result.decision.reason
+
+
+def late_trigger(stimulus: Stimulus) -> Sweep:
+    """EMG whose trigger is 20 ms late: the MEP lies 45 to 50 ms after the pulse that is reported."""
+    rng, since_ms = np.random.default_rng(stimulus.trial), np.arange(-600, 100, 0.2)
+    turns = [np.exp(-0.5 * ((since_ms - at_ms) / 2) ** 2) for at_ms in (45.0, 50.0)]
+    emg_mv = 0.0015 * rng.standard_normal(since_ms.size) + rng.uniform(0.05, 0.5) * (turns[0] - turns[1])
+    hit_ms = None if stimulus.isi_ms is None else -stimulus.isi_ms
+    return Sweep({"emg": Channel(emg_mv, 5000.0, "mV", t0_ms=-600.0)}, t_tms_ms=0.0, t_hit_ms=hit_ms)
+
+
+def test_an_mep_outside_its_window_pauses_the_session_once(log: Path) -> None:
+    info = DeviceInfo("late", "impact", simulated=True, channels={"emg": "mV"})
+    device = CallbackDevice(lambda stimulus, _: late_trigger(stimulus), info)
+    result = Session(device, strategy_for_rigs(), log=log).run()
+    assert len(result.trials) == 4
+    assert "a response at about 47 ms after the pulse, outside the MEP window" in result.decision.reason
+    assert "Doubt since trial 3: In 4 trials the EMG has a response" in final_statement(read_session(log))
+    assert resume(log, device).run().decision.stop
+    assert [event.kind for event in read_session(log).events].count("doubt") == 1
 
 
 def early(isi_ms: float, commanded_ms: float) -> Trial:

@@ -60,6 +60,34 @@ def test_a_sweep_without_the_time_of_the_hit_is_told_from_one_without_emg() -> N
     assert "t_hit_ms" in str(fault)
 
 
+@pytest.mark.parametrize(
+    ("described", "factor", "asked"),
+    [
+        ("V", 1.0, "has 1.5 mV RMS, more than any muscle's at rest. Is it in mV, and described as V? Give"),
+        ("V", 1e3, "has 1.5 V RMS, more than any muscle's at rest. Is it in µV, and described as V? Give"),
+        ("mV", 1e3, "Is it in µV, and described as mV?"),
+        ("mV", 1e-3, "Is it in V, and described as mV?"),
+        ("uV", 1.0, "has 0.001 µV RMS, less than any amplifier's noise. Is it in mV, and described as uV? Give"),
+        ("µV", 1e-3, "Is it in V, and described as µV?"),
+        ("uV", 1e6, "more than any muscle's at rest. Correct the gain."),
+        ("V", 1e-6, "less than any amplifier's noise. Correct the gain; is the amplifier on?"),
+    ],
+)
+def test_a_wrong_unit_is_told_by_the_one_described_and_the_likely_one(
+    described: str, factor: float, asked: str
+) -> None:
+    emg_mv = 0.0015 * np.random.default_rng(0).standard_normal(3500)
+    sweep = Sweep({"emg": Channel(factor * emg_mv, 5000.0, described, t0_ms=-600.0)}, t_tms_ms=0.0)
+    fault = likely_fault(sweep, judge(sweep, Stimulus(0, None), SPACE))
+    assert asked in str(fault)
+
+
+def test_of_a_device_that_measures_by_itself_no_channel_is_accused() -> None:
+    loud = Trial(0, Status.ACCEPTED, 40.0, isi_ms=40.0, mep_mv=0.1, background_rms_uv=2900.0)
+    said = str(likely_fault(Measurement(0.1, 40.0, background_rms_uv=2900.0), loud))
+    assert said.endswith("Is background_rms_uv, as the device tells it, in µV? Convert it, or correct the gain.")
+
+
 def test_every_reason_of_a_mistrial_has_a_remedy() -> None:
     assert all(remedy_for(reason).endswith(".") for reason in MistrialReason)
 

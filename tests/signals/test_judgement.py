@@ -99,6 +99,38 @@ def test_saturation() -> None:
     assert mistrial_of(sweep_of(), limits=SignalLimits(full_scale_mv=0.04)) is MistrialReason.SATURATION
 
 
+def with_mep(peak_mv: float, seed: int, *, turn_ms: float = 2.0, rate_hz: float = 5000.0) -> FloatArray:
+    """EMG of 700 ms at rest, with an MEP whose two turns have this height and width, 600 ms after its begin [mV]."""
+    since_ms = np.arange(-600, 100, 1000 / rate_hz)
+    turns = (np.exp(-0.5 * ((since_ms - at_ms) / turn_ms) ** 2) for at_ms in (25.0, 30.0))
+    noise_mv = 0.0015 * np.random.default_rng(seed).standard_normal(since_ms.size)
+    return np.asarray(noise_mv + peak_mv * (next(turns) - next(turns)))
+
+
+MEP_SPAN_MS = (615.0, 635.0)
+
+
+@pytest.mark.parametrize("rate_hz", [2000.0, 5000.0, 10000.0])
+@pytest.mark.parametrize("peak_mv", [0.4, 0.6, 1.0])
+def test_an_amplifier_that_saturates_before_a_noisy_converter_is_noticed(peak_mv: float, rate_hz: float) -> None:
+    for seed in range(10):
+        emg_mv = np.clip(with_mep(peak_mv, seed, rate_hz=rate_hz), -0.25, 0.25)
+        emg_mv += 2e-4 * np.random.default_rng(seed).standard_normal(emg_mv.size)
+        assert is_saturated(emg_mv, rate_hz, span_ms=MEP_SPAN_MS)
+
+
+@pytest.mark.parametrize("turn_ms", [1.2, 2.0, 4.0])
+def test_the_rounded_top_of_an_mep_is_no_limit(turn_ms: float) -> None:
+    for seed, peak_mv in enumerate(np.geomspace(0.02, 10.0, 60)):
+        assert not is_saturated(with_mep(float(peak_mv), seed, turn_ms=turn_ms), 5000.0, span_ms=MEP_SPAN_MS)
+
+
+def test_an_mep_that_is_on_its_flank_at_the_windows_edge_is_not_clipped() -> None:
+    for late_ms in np.arange(4.0, 16.0, 0.5):
+        emg_mv = with_mep(0.4, 0)
+        assert not is_saturated(emg_mv, 5000.0, span_ms=(615.0 - late_ms, 635.0 - late_ms))
+
+
 def test_an_artefact_that_saturates_outside_the_mep_window_is_no_saturation() -> None:
     emg = sweep_of().channels["emg"].values.copy()
     emg[3899:3909] = 5.0  # the pulse

@@ -66,3 +66,5 @@ def test_the_background_follows_the_reference(recorded: Recorded) -> None:
 
 def test_no_recorded_sweep_is_called_saturated(recorded: Recorded) -> None:
     assert not any(is_saturated(emg, RATE_HZ) for emg in recorded[0])
+    first_ms, last_ms = (PULSE_MS + edge_ms for edge_ms in recorded[2])
+    assert not any(is_saturated(emg, RATE_HZ, span_ms=(first_ms, last_ms)) for emg in recorded[0])

@@ -29,6 +29,7 @@ OF_REST = 8.0
 ENOUGH_TO_STAND_OUT = 10
 
 _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high enough?"
+_WHERE = "Is the time of the pulse right? Does the MEP window fit the muscle?"
 
 
 def nothing_estimated(record: SessionRecord) -> str:
@@ -109,22 +110,30 @@ def contradiction(window: Window | None, trials: Sequence[Trial], *, without_pro
     return None
 
 
-def nothing_stood_out(trials: Sequence[Trial]) -> str | None:
+def nothing_stood_out(trials: Sequence[Trial], window_ms: tuple[float, float] | None = None) -> str | None:
     """That no MEP was larger than EMG at rest, or none any more; None where some were, or too few trials say so.
 
-    A muscle that the pulse alone does not reach looks like this, and so does a stimulator that does not fire.
+    A muscle that the pulse alone does not reach looks like this, and so do a stimulator that does not fire and an MEP
+    outside the window that it is sought in.
 
     Args:
         trials: the trials that count.
+        window_ms: where the MEP was sought [ms after the pulse]; None where the device itself measured it.
     """
     known = [(t, t.mep_mv, t.background_rms_uv) for t in trials if t.mep_mv is not None and t.background_rms_uv]
     stood_out = [1e3 * mep_mv > OF_REST * rest_uv for _, mep_mv, rest_uv in known]
+    sought = "after the pulse" if window_ms is None else _sought(window_ms)
+    look = _LOOK if window_ms is None else f"{_LOOK} {_WHERE}"
     if len(known) >= ENOUGH_TO_STAND_OUT and not any(stood_out):
-        return f"In no trial was the EMG after the pulse larger than at rest. {_LOOK}"
+        return f"In no trial was the EMG {sought} larger than at rest. {look}"
     first = stopped_after([trial.isi_ms for trial, *_ in known], stood_out)
     if first is None:
         return None
-    return f"From trial {known[first][0].index} on, the EMG after the pulse was never larger than at rest. {_LOOK}"
+    return f"From trial {known[first][0].index} on, the EMG {sought} was never larger than at rest. {look}"
+
+
+def _sought(window_ms: tuple[float, float]) -> str:
+    return f"in the MEP window, {window_ms[0]:g}–{window_ms[1]:g} ms after the pulse,"
 
 
 def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:

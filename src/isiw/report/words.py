@@ -127,7 +127,7 @@ def finding_sentences(record: SessionRecord) -> list[str]:
         _edges(estimate, space),
         contradiction(estimate.window, record.table.told, without_probability=estimate.probability is None) or "",
         no_comparison(estimate.window, record.table.told) or "",
-        nothing_stood_out(record.table.told) or "",
+        nothing_stood_out(record.table.told, _mep_window_ms(record)) or "",
         *(f"Doubt since trial {event.trial}: {event.text}" for event in record.events if event.kind == "doubt"),
         _best_isi(estimate),
         _excluded(estimate),
@@ -136,6 +136,11 @@ def finding_sentences(record: SessionRecord) -> list[str]:
         _unusual(estimate),
     ]
     return [sentence for sentence in said if sentence]
+
+
+def _mep_window_ms(record: SessionRecord) -> tuple[float, float] | None:
+    """Where the session sought the MEP [ms after the pulse]; None where its device, or somebody, measured it."""
+    return record.header.signals.mep_window_ms if "emg" in record.header.device.channels else None
 
 
 def finding_sentence(record: SessionRecord, estimate: Estimate) -> str:

@@ -8,10 +8,11 @@ from typing import Final
 
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer
-from isiw.signals.doubts import Doubts, doubt_of, doubts_of
+from isiw.signals.doubts import DoubtKind, Doubts, doubt_of, doubts_of
 from isiw.signals.faults import Fault, likely_fault, remedy_for, too_early_by_chance
 from isiw.signals.limits import SignalLimits
-from isiw.trials import MistrialReason, Trial, TrialTable
+from isiw.signals.misplaced import Misplaced, asks_about_place, doubt_of_place, misplaced_after
+from isiw.trials import MistrialReason, Sweep, Trial, TrialTable
 
 __all__ = ["Watch"]
 
@@ -33,6 +34,7 @@ class Watch:
         early: how many in a row there.
         meps_mv: the amplitudes told [mV].
         isis_ms: the ISIs of the same trials [ms]; None for TMS alone.
+        misplaced: responses outside the MEP window, since the last one within it.
         doubts: which doubts about the amplitudes were raised, and which the last trial raised.
         seen_reasons: why it paused before, as a person has seen; of trials that count, the same fault is said once.
         reason: why to pause now, and what to do; None where there is no reason.
@@ -47,6 +49,7 @@ class Watch:
     early: int = 0
     meps_mv: tuple[float, ...] = ()
     isis_ms: tuple[float | None, ...] = ()
+    misplaced: tuple[Misplaced, ...] = ()
     doubts: Doubts = field(default_factory=Doubts)
     seen_reasons: frozenset[str] = frozenset()
     reason: str | None = None
@@ -59,8 +62,10 @@ class Watch:
             reasons: why it paused.
         """
         meps_mv, isis_ms = trials.amplitudes
-        doubts = doubts_of(meps_mv, self.detection_limit_mv, isis_ms)
-        return replace(self, meps_mv=meps_mv, isis_ms=isis_ms, doubts=doubts, seen_reasons=frozenset(reasons))
+        seen, doubts = frozenset(reasons), doubts_of(meps_mv, self.detection_limit_mv, isis_ms)
+        if any(asks_about_place(reason) for reason in seen):  # which no amplitude shows
+            doubts = replace(doubts, raised=doubts.raised | {DoubtKind.MISPLACED})
+        return replace(self, meps_mv=meps_mv, isis_ms=isis_ms, doubts=doubts, seen_reasons=seen)
 
     def seen(self) -> Watch:
         """The same after a person has seen the reason and went on."""
@@ -89,6 +94,8 @@ class Watch:
             learned = replace(learned, early_ms=None, early=0)
         if trial.mep_mv is None or not trial.told:
             return learned
+        if isinstance(answer, Sweep):
+            learned = replace(learned, misplaced=misplaced_after(learned.misplaced, answer, trial, self.signals))
         return _with_amplitude(learned, trial.mep_mv, trial.isi_ms)
 
 
@@ -100,7 +107,8 @@ def _said(fault: Fault, count: int) -> str:
 
 def _with_amplitude(watch: Watch, mep_mv: float, isi_ms: float | None) -> Watch:
     watch = replace(watch, meps_mv=(*watch.meps_mv, mep_mv), isis_ms=(*watch.isis_ms, isi_ms))
-    doubts = watch.doubts.after(doubt_of(watch.meps_mv, watch.detection_limit_mv, watch.isis_ms))
+    odd = doubt_of(watch.meps_mv, watch.detection_limit_mv, watch.isis_ms)
+    doubts = watch.doubts.after(odd, doubt_of_place(watch.misplaced, watch.signals))
     reason = watch.reason or (None if doubts.new is None else doubts.new.text)
     return replace(watch, doubts=doubts, reason=reason)
 

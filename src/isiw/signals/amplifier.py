@@ -18,6 +18,18 @@ FAR_OUT = 10.0
 FAR_OUT_STEPS = 30.0
 """And farther than this many steps of the converter: of EMG at rest, a coarse one shows a few codes only."""
 
+MAD_TO_SD = 1.4826  # of a normal distribution
+
+PLATEAU_MS = 2.0
+PLATEAU_SD, FLANK_SD = 1.5, 6.0
+STEEPNESS = 1.5
+"""On the limit of an amplifier that saturates before the converter there is the converter's noise alone, less than EMG
+at rest has. The top of an MEP is within 1.5 SD of that for less than 1.4 ms, and rounded: within 6 SD it lasts twice as
+long."""
+
+FAR_OUT_SD = 60.0
+"""Nearer to the sweep's middle the noise at rest hides whether a top is rounded."""
+
 BLANKED_MS = 5.0
 BLANKED_TIMES = 3
 """An amplifier that blanks the pulse's artefact holds one value; a coarse converter repeats one at rest as well."""
@@ -39,7 +51,8 @@ def is_saturated(
         emg_mv: EMG [mV], shape (w,).
         rate_hz: sampling rate [Hz].
         full_scale_mv: the largest value that the amplifier can show [mV]. With and without it, a top that stays at
-            exactly one value for 1 ms or longer, far out of the sweep's usual range, is taken for a limit.
+            exactly one value for 1 ms or longer, far out of the sweep's usual range, is taken for a limit; so is one
+            that stays there for 2 ms or longer with less noise than the EMG has, between steep flanks.
         span_ms: the part of the sweep that counts [ms from the first sample]; artefacts may run into limits elsewhere.
 
     Raises:
@@ -52,7 +65,15 @@ def is_saturated(
         raise InvalidValueError("there is no EMG in the part that counts", got=span_ms, expected="a part of the sweep")
     if full_scale_mv is not None and np.abs(counts).max() >= NEARLY_FULL * full_scale_mv:
         return True
-    level = np.median(emg)
+    level = float(np.median(emg))
+    return _has_flat_top(emg, counts, level, rate_hz) or any(
+        _has_plateau(sign * (emg - level), math.floor(first) + int((sign * counts).argmax()), rate_hz)
+        for sign in (1.0, -1.0)
+    )
+
+
+def _has_flat_top(emg: FloatArray, counts: FloatArray, level: float, rate_hz: float) -> bool:
+    """Whether a top stays at exactly one value, as at the converter's own limit."""
     samples = max(3, round(FLAT_MS * rate_hz / 1000))
     tops = (float(counts.max()), float(counts.min()))
     flat = [top for top in tops if top != level and _longest_run(counts == top) >= samples]
@@ -60,6 +81,30 @@ def is_saturated(
         return False
     usual, step = np.median(np.abs(emg - level)), np.diff(np.unique(emg)).min()
     return any(abs(top - level) > max(FAR_OUT * usual, FAR_OUT_STEPS * step) for top in flat)
+
+
+def _has_plateau(upright: FloatArray, top: int, rate_hz: float) -> bool:
+    """Whether the EMG stays at its top longer than noise and a rounded top allow.
+
+    Args:
+        upright: EMG about its level, with the top above it [mV], shape (w,).
+        top: the top's sample.
+        rate_hz: sampling rate [Hz].
+    """
+    noise = MAD_TO_SD * float(np.median(np.abs(upright)))
+    if noise == 0 or upright[top] <= FAR_OUT_SD * noise:
+        return False
+    plateau = _width(upright, top, PLATEAU_SD * noise)
+    return plateau * 1000 / rate_hz >= PLATEAU_MS and _width(upright, top, FLANK_SD * noise) <= STEEPNESS * plateau
+
+
+def _width(emg_mv: FloatArray, top: int, depth_mv: float) -> int:
+    """For how many samples about its top the EMG stays within so much of it; the top of a part may be on a flank."""
+    away = np.flatnonzero(np.abs(emg_mv - emg_mv[top]) > depth_mv)
+    after = int(np.searchsorted(away, top))
+    first = int(away[after - 1]) + 1 if after else 0
+    last = int(away[after]) if after < away.size else emg_mv.size
+    return last - first
 
 
 def is_blanked(emg_mv: FloatArray, rate_hz: float, pulse_ms: float, span_ms: tuple[float, float]) -> bool:

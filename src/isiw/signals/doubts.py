@@ -1,6 +1,6 @@
 """What is odd about the amplitudes of a person, so that somebody should look: a `Doubt`, and each kind told once.
 
-What cannot be true is refused by `isiw.signals.plausibility`.
+What cannot be true is refused by `isiw.signals.plausibility`; `isiw.signals.misplaced` looks at sweeps.
 """
 
 from __future__ import annotations
@@ -53,6 +53,7 @@ class DoubtKind(StrEnum):
     SMALL = "small amplitudes"
     LARGE = "large amplitudes"
     JUMP = "a jump of the scale"
+    MISPLACED = "a response outside the MEP window"
 
 
 @dataclass(frozen=True)

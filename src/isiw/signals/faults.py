@@ -18,13 +18,17 @@ from isiw.signals.impact import impact_time
 from isiw.signals.judgement import of_one_length
 from isiw.signals.limits import SignalLimits
 from isiw.signals.plausibility import implausible_amplitude, off_by
+from isiw.signals.units import EMG_UNITS_MV
 from isiw.signals.waveforms import is_recording
 from isiw.trials import Channel, Measurement, MistrialReason, Sweep, Trial
 
-__all__ = ["Fault", "likely_fault", "remedy_for", "steepest_edge", "too_early_by_chance"]
+__all__ = ["Fault", "likely_fault", "remedy_for", "steepest_edge", "tap_span_ms", "too_early_by_chance"]
 
 TOO_LOUD_UV, TOO_QUIET_UV = 400.0, 0.05
 """EMG before the pulse [µV RMS] that is no muscle's at rest or at work, and no amplifier's."""
+
+USUAL_UV = 2.0
+"""EMG at rest [µV RMS], in the median."""
 
 DRIVEN_MS = 25.0
 """How long a hammer is driven before its impact, at least."""
@@ -103,7 +107,7 @@ def likely_fault(answer: Sweep | Measurement, trial: Trial, limits: SignalLimits
         limits: what it was judged by.
     """
     found = _fault_of_sweep(answer, trial) if isinstance(answer, Sweep) else None
-    found = found or _fault_of_level(trial)
+    found = found or _fault_of_level(trial, _emg_unit(answer))
     if found is not None or trial.reason is None:
         return found
     return Fault(_explained(trial, limits or SignalLimits()), remedy_for(trial.reason))
@@ -169,11 +173,8 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
     if trial.t_tms_ms is None:
         return None
     steepest_ms = steepest_edge(emg)
-    spans = [(trial.t_tms_ms + EVOKED_SPAN_MS[0], trial.t_tms_ms + EVOKED_SPAN_MS[1])]
-    begins = [ms for ms in (trial.t_valve_ms, trial.t_hit_ms) if ms is not None]
-    if begins:  # the valve switches on and off before the hit
-        hit_ms = begins[0] + LATEST_HIT_MS if trial.t_hit_ms is None else trial.t_hit_ms
-        spans.append((begins[0] - 2.0, hit_ms + JOLT_MS))
+    evoked_ms = (trial.t_tms_ms + EVOKED_SPAN_MS[0], trial.t_tms_ms + EVOKED_SPAN_MS[1])
+    spans = [span for span in (evoked_ms, tap_span_ms(trial)) if span is not None]
     if steepest_ms is None or any(first <= steepest_ms <= last for first, last in spans):
         return None
     return Fault(
@@ -181,6 +182,19 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
         f"{trial.t_tms_ms:.0f} ms",
         "Is that edge the pulse's? Then check the sampling rate, and that all times are on the sweep's own clock.",
     )
+
+
+def tap_span_ms(trial: Trial) -> tuple[float, float] | None:
+    """When the tap may be in the EMG [ms on the sweep's clock]: the valve switches on and off before the hit.
+
+    Args:
+        trial: a trial; None is answered where it has no time of a tap.
+    """
+    begins = [ms for ms in (trial.t_valve_ms, trial.t_hit_ms) if ms is not None]
+    if not begins:
+        return None
+    hit_ms = begins[0] + LATEST_HIT_MS if trial.t_hit_ms is None else trial.t_hit_ms
+    return begins[0] - 2.0, hit_ms + JOLT_MS
 
 
 def steepest_edge(emg: Channel) -> float | None:
@@ -196,22 +210,50 @@ def steepest_edge(emg: Channel) -> float | None:
     return emg.t0_ms + 1000 * float(steps.argmax()) / emg.rate_hz
 
 
-def _fault_of_level(trial: Trial) -> Fault | None:
+def _emg_unit(answer: Sweep | Measurement) -> str | None:
+    """The unit that the EMG is described with; None where the device itself measures."""
+    emg = answer.channels.get("emg") if isinstance(answer, Sweep) else None
+    return None if emg is None else emg.unit
+
+
+def _fault_of_level(trial: Trial, unit: str | None) -> Fault | None:
     rest_uv = trial.background_rms_uv
     if rest_uv is not None and rest_uv > TOO_LOUD_UV:
         return Fault(
-            f"the EMG before the pulse has {rest_uv / 1000:.2g} mV RMS, more than any muscle's at rest",
-            "Is it in µV, and described as mV? Give the channel its unit, or correct the gain.",
+            f"the EMG before the pulse has {_level(rest_uv)} RMS, more than any muscle's at rest",
+            f"{_slip_of_unit(rest_uv, unit)}orrect the gain.",
         )
     if rest_uv is not None and rest_uv < TOO_QUIET_UV:
         return Fault(
             f"the EMG before the pulse has {rest_uv:.1g} µV RMS, less than any amplifier's noise",
-            "Is it in V, and described as mV? Give the channel its unit, or correct the gain; is the amplifier on?",
+            f"{_slip_of_unit(rest_uv, unit)}orrect the gain; is the amplifier on?",
         )
     wrong = None if trial.mep_mv is None else implausible_amplitude(trial.mep_mv)
     if trial.reason is MistrialReason.IMPLAUSIBLE and wrong is not None:
         return Fault(*wrong)
     return None
+
+
+def _level(rest_uv: float) -> str:
+    scale, unit = (1e6, "V") if rest_uv >= 1e6 else (1e3, "mV")
+    return f"{float(f'{rest_uv / scale:.2g}'):g} {unit}"
+
+
+def _slip_of_unit(rest_uv: float, unit: str | None) -> str:
+    """Which unit the EMG is likely in, up to the c of "correct the gain"; without a likely one, no question."""
+    if unit is None:
+        return "Is background_rms_uv, as the device tells it, in µV? Convert it, or c"
+    true_unit = _likely_unit(rest_uv, unit)
+    if true_unit is None:
+        return "C"
+    return f"Is it in {true_unit}, and described as {unit}? Give the channel its unit, or c"
+
+
+def _likely_unit(rest_uv: float, unit: str) -> str | None:
+    """The unit in which EMG at rest would be nearest to its usual level; None where none makes it plausible."""
+    levels_uv = {true: rest_uv * EMG_UNITS_MV[true] / EMG_UNITS_MV[unit] for true in ("V", "mV", "µV")}
+    plausible = {true: uv for true, uv in levels_uv.items() if TOO_QUIET_UV <= uv <= TOO_LOUD_UV}
+    return min(plausible, key=lambda true: abs(math.log(plausible[true] / USUAL_UV)), default=None)
 
 
 def _explained(trial: Trial, limits: SignalLimits) -> str:

@@ -9,11 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from isiw.devices.protocol import Answer, DeviceInfo
-from isiw.signals.faults import steepest_edge
+from isiw.signals.faults import steepest_edge, tap_span_ms
 from isiw.signals.limits import SignalLimits
-from isiw.trials import Stimulus, Sweep, Trial
+from isiw.trials import Channel, Stimulus, Sweep, Trial
 
-__all__ = ["Delivery", "DeviceTable", "device_table"]
+__all__ = ["NEAR_PULSE_MS", "Delivery", "DeviceTable", "device_table", "edges_ms"]
+
+NEAR_PULSE_MS = 3.0
+"""How far from the reported pulse its artefact's steepest edge may be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,13 +128,38 @@ def _amplitudes(trials: Sequence[Trial]) -> str:
     return f"{1e3 * min(meps_mv):.3g} to {1e3 * max(meps_mv):.3g} µV" if meps_mv else "none"
 
 
+def edges_ms(deliveries: Sequence[Delivery]) -> list[float]:
+    """When the steepest edge of each EMG comes, where one stands out and is not the tap's [ms after the pulse].
+
+    Args:
+        deliveries: what was delivered.
+    """
+    found = [_edge_ms(delivery.answer, delivery.trial) for delivery in deliveries if isinstance(delivery.answer, Sweep)]
+    return [edge_ms for edge_ms in found if edge_ms is not None]
+
+
+def _edge_ms(sweep: Sweep, trial: Trial) -> float | None:
+    emg = sweep.channels.get("emg")
+    edge_ms = None if emg is None else steepest_edge(emg)
+    if emg is None or edge_ms is None or trial.t_tms_ms is None:
+        return None
+    late_ms = edge_ms - trial.t_tms_ms
+    blanked_ms = _held_since_ms(emg, edge_ms) - trial.t_tms_ms  # an amplifier that blanks the pulse lets go after it
+    if abs(blanked_ms) <= NEAR_PULSE_MS:
+        return blanked_ms
+    tap_ms = tap_span_ms(trial)
+    is_taps = abs(late_ms) > NEAR_PULSE_MS and tap_ms is not None and tap_ms[0] <= edge_ms <= tap_ms[1]
+    return None if is_taps else late_ms
+
+
+def _held_since_ms(emg: Channel, edge_ms: float) -> float:
+    """Since when the EMG had had the value that an edge ends [ms on the sweep's clock]."""
+    edge = round((edge_ms - emg.t0_ms) * emg.rate_hz / 1000)
+    moved = np.flatnonzero(emg.values[:edge] != emg.values[edge])
+    first = int(moved[-1]) + 1 if moved.size else 0
+    return emg.t0_ms + 1000 * first / emg.rate_hz
+
+
 def _artefacts(deliveries: Sequence[Delivery]) -> str:
-    late_ms = []
-    for delivery in deliveries:
-        emg = delivery.answer.channels.get("emg") if isinstance(delivery.answer, Sweep) else None
-        edge_ms = None if emg is None else steepest_edge(emg)
-        if edge_ms is not None and delivery.trial.t_tms_ms is not None:
-            late_ms.append(edge_ms - delivery.trial.t_tms_ms)
-    if not late_ms:
-        return "none seen"
-    return f"steepest edge of the EMG {np.median(late_ms):+.1f} ms from the pulse"
+    late_ms = edges_ms(deliveries)
+    return f"steepest edge of the EMG {np.median(late_ms):+.1f} ms from the pulse" if late_ms else "none seen"

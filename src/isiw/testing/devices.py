@@ -20,7 +20,7 @@ from isiw.signals.doubts import DoubtKind, doubt_of
 from isiw.signals.faults import likely_fault, too_early_by_chance
 from isiw.testing.device_table import Delivery, DeviceTable, device_table
 from isiw.testing.guarded import Guarded, Pace
-from isiw.testing.phantom import artefact_in_window
+from isiw.testing.phantom import artefact_in_window, late_artefact
 from isiw.testing.requirements import broken, require
 from isiw.text.shown import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
@@ -63,7 +63,8 @@ def check_device(
 
     Raises:
         AssertionError: a promise is broken, a session would reject a trial, or a real device shows an MEP although a
-            phantom has no muscle; the message says which, and why.
+            phantom has no muscle, or the artefact of its pulse at another time than it reports; the message says which,
+            and why.
         DeviceError: the device failed, is not ready, or is driven by a session.
         LimitExceededError: the limits do not allow a stimulus; it was not delivered.
         InvalidValueError: an inter-trial interval that is negative or not finite.
@@ -212,7 +213,7 @@ def _require_usable(deliveries: Sequence[Delivery], rules: _Rules, *, real: bool
     doubt = doubt_of(meps_mv)
     if doubt is not None and doubt.kind is not DoubtKind.EQUAL:
         said.append(doubt.text)
-    artefact = artefact_in_window(deliveries, rules.limits) if real else None
+    artefact = (artefact_in_window(deliveries, rules.limits) or late_artefact(deliveries)) if real else None
     if artefact is not None:
         said.append(artefact)
     require(not said, "a session can use what deliver returns", "; ".join(dict.fromkeys(said)))

@@ -9,11 +9,12 @@ from typing import Final
 import numpy as np
 
 from isiw.signals import SignalLimits
+from isiw.signals.faults import EVOKED_SPAN_MS
 from isiw.signals.units import EMG_UNITS_MV
-from isiw.testing.device_table import Delivery
+from isiw.testing.device_table import NEAR_PULSE_MS, Delivery, edges_ms
 from isiw.trials import RESPONSE_MV, Sweep
 
-__all__ = ["artefact_in_window"]
+__all__ = ["artefact_in_window", "late_artefact"]
 
 FACTOR: Final = 3.0
 """From one stretch of noise to the next of the same length the range differs by less than half; hum adds nothing."""
@@ -40,6 +41,26 @@ def artefact_in_window(deliveries: Sequence[Delivery], signals: SignalLimits) ->
                 "Is the reported time of the pulse right?"
             )
     return None
+
+
+def late_artefact(deliveries: Sequence[Delivery]) -> str | None:
+    """What is wrong where the stimulator's artefact comes after the reported pulse; None where none does.
+
+    One that comes before it, or much later, is the likely fault of each sweep already. Where no edge stands out of the
+    EMG, as behind an amplifier that blanks the pulse, nobody can tell.
+
+    Args:
+        deliveries: what was delivered.
+    """
+    late_ms = edges_ms(deliveries)
+    usual_ms = float(np.median(late_ms)) if late_ms else 0.0
+    if not NEAR_PULSE_MS < usual_ms <= EVOKED_SPAN_MS[1]:
+        return None
+    return (
+        f"a phantom evokes nothing, and the steepest edge of the EMG is {usual_ms:+.1f} ms from the reported pulse: "
+        "the stimulator's artefact is not where the pulse is said to be. Is the reported time of the pulse right? "
+        "Check the delay of the EMG's trigger, the sampling rate, and that all times are on the sweep's own clock."
+    )
 
 
 def _shown(delivery: Delivery, signals: SignalLimits) -> tuple[float, float] | None:

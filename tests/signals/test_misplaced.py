@@ -1,0 +1,149 @@
+"""Responses outside the MEP window are doubted where they are the MEP's, and only there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from isiw.design import DesignSpace
+from isiw.devices.recorded import RecordedPerson, load_recordings
+from isiw.devices.simulated import Simulation
+from isiw.signals import SignalLimits, judge
+from isiw.signals.doubts import Doubt, DoubtKind
+from isiw.signals.misplaced import Misplaced, asks_about_place, doubt_of_place, misplaced_after
+from isiw.subjects.cohorts import cohort
+from isiw.trials import Channel, Stimulus, Sweep
+from isiw.types import Reference
+from known import instance
+from wrong_rigs import SPACE, tapper
+
+LIMITS = SignalLimits()
+ISIS_MS: Sequence[float | None] = (70.0, 90.0, 120.0, 200.0)
+
+
+def sweep(
+    trial: int,
+    isi_ms: float | None,
+    *,
+    late_ms: float,
+    size_mv: float | None = None,
+    artefact_mv: float = 0.0,
+    decay_ms: float = 0.2,
+    known: bool = True,
+) -> Sweep:
+    """EMG whose MEP comes late: without that its turns are 25 and 30 ms after the pulse, which is at 0 ms."""
+    rng = np.random.default_rng(trial)
+    since_ms = np.arange(-600, 100, 0.2)
+    size_mv = rng.uniform(0.05, 0.5) if size_mv is None else size_mv
+    turns = (np.exp(-0.5 * ((since_ms - at_ms - late_ms) / 2) ** 2) for at_ms in (25.0, 30.0))
+    emg_mv = 0.0015 * rng.standard_normal(since_ms.size) + size_mv * (next(turns) - next(turns))
+    emg_mv += artefact_mv * np.exp(-np.clip(since_ms, 0.0, None) / decay_ms) * (since_ms >= 0)
+    times = {} if isi_ms is None else {"t_hit_ms": -isi_ms} if known else {"t_valve_ms": -isi_ms}
+    return Sweep({"emg": Channel(1e3 * emg_mv, 5000.0, "uV", t0_ms=-600.0)}, t_tms_ms=0.0, **times)
+
+
+def after(
+    sweeps: Iterable[Sweep], isis_ms: Sequence[float | None] = ISIS_MS, reference: Reference = "impact"
+) -> tuple[Misplaced, ...]:
+    """The responses outside the window after these trials, each of which counts."""
+    space = DesignSpace(0, 500, reference=reference)
+    misplaced: tuple[Misplaced, ...] = ()
+    for trial, (one, isi_ms) in enumerate(zip(sweeps, isis_ms, strict=True)):
+        judged = judge(one, Stimulus(trial, isi_ms), space, LIMITS)
+        assert judged.told
+        misplaced = misplaced_after(misplaced, one, judged, LIMITS)
+    return misplaced
+
+
+def doubt_after(sweeps: Iterable[Sweep], isis_ms: Sequence[float | None] = ISIS_MS) -> Doubt | None:
+    return doubt_of_place(after(sweeps, isis_ms), LIMITS)
+
+
+@pytest.mark.parametrize(("late_ms", "seen_ms"), [(20.0, "47 ms"), (-22.0, "7 ms"), (45.0, "72 ms")])
+@pytest.mark.parametrize("isis_ms", [ISIS_MS, (None, 120.0, 121.0, 122.0)])
+def test_an_mep_outside_its_window_is_doubted(late_ms: float, seen_ms: str, isis_ms: Sequence[float | None]) -> None:
+    sweeps = [sweep(trial, isi_ms, late_ms=late_ms) for trial, isi_ms in enumerate(isis_ms)]
+    doubt = doubt_after(sweeps, isis_ms)
+    assert doubt is not None
+    assert doubt.kind is DoubtKind.MISPLACED
+    assert f"In 4 trials the EMG has a response at about {seen_ms} after the pulse" in doubt.text
+    assert "outside the MEP window of 15–35 ms, and none within it. Is the time of the pulse right?" in doubt.text
+    assert asks_about_place(f"The session is paused: {doubt.text}")
+    assert doubt_after(sweeps[:3], isis_ms[:3]) is None
+
+
+def test_an_mep_within_the_window_begins_the_count_anew_and_a_quiet_trial_does_not() -> None:
+    sizes_mv = (0.1, 0.3, 0.0, 0.2)
+    late = [sweep(trial, 60.0 + 30 * trial, late_ms=20.0, size_mv=size_mv) for trial, size_mv in enumerate(sizes_mv)]
+    isis_ms = (60.0, 90.0, 120.0, 150.0)
+    assert len(after(late, isis_ms)) == 3
+    assert after([*late, sweep(4, 100.0, late_ms=0.0)], (*isis_ms, 100.0)) == ()
+
+
+def test_the_late_wave_of_an_mep_is_not_counted() -> None:
+    both = sweep(0, 90.0, late_ms=20.0).channels["emg"].values + sweep(1, 90.0, late_ms=0.0).channels["emg"].values
+    one = Sweep({"emg": Channel(both, 5000.0, "uV", t0_ms=-600.0)}, t_tms_ms=0.0, t_hit_ms=-90.0)
+    assert after([one] * 4, (90.0,) * 4) == ()
+
+
+def test_at_one_isi_it_may_be_the_reflex_of_the_tap() -> None:
+    isis_ms = (98.0, 100.0, 102.0, 104.0)
+    assert doubt_after([sweep(trial, isi_ms, late_ms=20.0) for trial, isi_ms in enumerate(isis_ms)], isis_ms) is None
+
+
+def test_activity_at_any_time_after_the_pulse_is_not_doubted() -> None:
+    lates_ms = (20.0, 30.0, 25.0, 45.0)
+    sweeps = [sweep(trial, isi, late_ms=late) for trial, (isi, late) in enumerate(zip(ISIS_MS, lates_ms, strict=True))]
+    assert len(after(sweeps)) == 4
+    assert doubt_after(sweeps) is None
+
+
+@pytest.mark.parametrize(("artefact_mv", "decay_ms"), [(0.8, 1.5), (0.3, 2.0), (5.0, 1.0)])
+def test_the_end_of_a_long_artefact_is_not_taken_for_a_response(artefact_mv: float, decay_ms: float) -> None:
+    sweeps = [
+        sweep(trial, isi_ms, late_ms=0.0, size_mv=0.0, artefact_mv=artefact_mv, decay_ms=decay_ms)
+        for trial, isi_ms in enumerate(ISIS_MS)
+    ]
+    assert after(sweeps) == ()
+
+
+def test_what_comes_before_the_window_and_is_always_alike_is_not_doubted() -> None:
+    sweeps = [sweep(trial, isi_ms, late_ms=-22.0, size_mv=0.2) for trial, isi_ms in enumerate(ISIS_MS)]
+    assert len(after(sweeps)) == 4
+    assert doubt_after(sweeps) is None
+
+
+@pytest.mark.parametrize(
+    ("known", "isi_ms", "counted"), [(True, 5.0, 0), (True, 90.0, 1), (False, 200.0, 0), (False, 400.0, 1)]
+)
+def test_what_may_be_the_taps_is_not_counted(isi_ms: float, counted: int, *, known: bool) -> None:
+    reflex = sweep(0, isi_ms, late_ms=15.0, size_mv=0.02, known=known)
+    assert len(after([reflex], (isi_ms,), "impact" if known else "valve")) == counted
+
+
+def misplaced_of(simulation: Simulation, space: DesignSpace, trials: int, limits: SignalLimits) -> int:
+    """How many of a simulation's trials have a response outside the window."""
+    rng, found = np.random.default_rng(0), 0
+    for trial in range(trials):
+        isi_ms = None if trial % 6 == 5 else float(rng.uniform(space.low_ms + 5, space.high_ms - 5))
+        one, stimulus = instance(Sweep, simulation.answer(Stimulus(trial, isi_ms))), Stimulus(trial, isi_ms)
+        found += len(misplaced_after((), one, judge(one, stimulus, space, limits), limits))
+    return found
+
+
+@pytest.mark.parametrize("accelerometer", [True, False])
+@pytest.mark.parametrize("name", ["gaussian", "recruitment"])
+def test_no_sweep_of_the_simulated_robot_has_a_response_elsewhere(name: str, *, accelerometer: bool) -> None:
+    robot = tapper(1, accelerometer=accelerometer, name=name)
+    assert misplaced_of(robot, SPACE, 30, LIMITS) == 0
+
+
+def test_no_recorded_sweep_has_a_response_elsewhere(recordings_folder: Path) -> None:
+    person = cohort("recruitment", 1, 11)[0].begin(0)
+    recorded = RecordedPerson(
+        lambda isi_ms: person.respond(isi_ms, "impact"), "impact", load_recordings(recordings_folder)
+    )
+    assert misplaced_of(recorded, SPACE, 60, SignalLimits(background_uv=50.0)) == 0
