@@ -90,7 +90,7 @@ def test_the_version_is_shown(isiw: Command) -> None:
 
 def test_a_strategys_settings_are_listed_as_a_configuration_has_them_with_unit_and_meaning(isiw: Command) -> None:
     output = isiw("strategies", "default").output
-    assert "\nmax_trials = 80\n    stop after this many stimuli; mistrials count, control trials do not." in output
+    assert "\nmax_trials = 60\n    stop after this many stimuli; mistrials count, control trials do not." in output
     assert "\nstop_width_ms = 30.0  # ms\n" in output
     assert "\nprior.switch.reliability = [0.2, 0.7, 0.0]  # median, sd, tail\n" in output
     assert "\nprior.profile\n" in output
@@ -100,7 +100,9 @@ def test_a_strategys_settings_are_listed_as_a_configuration_has_them_with_unit_a
 def test_what_is_listed_can_be_set(isiw: Command, tmp_path: Path) -> None:
     listed = isiw("strategies", "default").output.splitlines()
     lines = [line for line in listed if " = " in line and not line.startswith(" ")]
-    (tmp_path / "all.toml").write_text("\n".join(["[strategy.settings]", *lines]).replace("= 80", "= 2"))
+    (tmp_path / "all.toml").write_text(
+        "\n".join(["[strategy.settings]", *lines]).replace("max_trials = 60", "max_trials = 2")
+    )
     result = isiw("run", "all.toml")
     assert result.exit_code == 0, result.output
     assert "The budget of 2 stimuli is used up." in result.output

@@ -125,6 +125,17 @@ def test_the_rounded_top_of_an_mep_is_no_limit(turn_ms: float) -> None:
         assert not is_saturated(with_mep(float(peak_mv), seed, turn_ms=turn_ms), 5000.0, span_ms=MEP_SPAN_MS)
 
 
+@pytest.mark.parametrize("rate_hz", [1000.0, 1500.0, 2000.0])
+@pytest.mark.parametrize("turn_ms", [8.0, 10.0, 14.0])
+def test_a_rounded_mep_of_few_samples_is_not_clipped(rate_hz: float, turn_ms: float) -> None:
+    time_ms = np.arange(0.0, 300.0, 1000 / rate_hz)
+    noise_mv = 0.002 * np.sin(np.arange(time_ms.size) ** 2)
+    for start_ms in np.linspace(120.0, 121.0, 11):
+        turn = np.sin((time_ms - start_ms) / turn_ms * 2 * np.pi)
+        emg_mv = noise_mv + 0.3 * turn * ((time_ms >= start_ms) & (time_ms < start_ms + turn_ms))
+        assert not is_saturated(emg_mv, rate_hz)
+
+
 def test_an_mep_that_is_on_its_flank_at_the_windows_edge_is_not_clipped() -> None:
     for late_ms in np.arange(4.0, 16.0, 0.5):
         emg_mv = with_mep(0.4, 0)

@@ -20,7 +20,7 @@ FAR_OUT_STEPS = 30.0
 
 MAD_TO_SD = 1.4826  # of a normal distribution
 
-PLATEAU_MS = 2.0
+PLATEAU_MS, PLATEAU_SAMPLES = 2.0, 6
 PLATEAU_SD, FLANK_SD = 1.5, 6.0
 STEEPNESS = 1.5
 """On the limit of an amplifier that saturates before the converter there is the converter's noise alone, less than EMG
@@ -95,7 +95,8 @@ def _has_plateau(upright: FloatArray, top: int, rate_hz: float) -> bool:
     if noise == 0 or upright[top] <= FAR_OUT_SD * noise:
         return False
     plateau = _width(upright, top, PLATEAU_SD * noise)
-    return plateau * 1000 / rate_hz >= PLATEAU_MS and _width(upright, top, FLANK_SD * noise) <= STEEPNESS * plateau
+    least = max(PLATEAU_SAMPLES, PLATEAU_MS * rate_hz / 1000)
+    return plateau >= least and _width(upright, top, FLANK_SD * noise) <= STEEPNESS * plateau
 
 
 def _width(emg_mv: FloatArray, top: int, depth_mv: float) -> int:

@@ -119,7 +119,7 @@ class Stopping:
         InvalidValueError: an invalid number.
     """
 
-    max_trials: int = 80
+    max_trials: int = 60
     stop_width_ms: float = 30.0
     stop_expected_f1: float = 0.92
     stop_gain: float = 0.02
