@@ -133,8 +133,8 @@ def test_zeros_below_a_high_detection_limit_are_a_finding(
 
 
 def test_a_strategy_finds_nothing_without_an_mep_and_goes_on() -> None:
-    strategy = isiw.make_strategy("default", particles=200)
-    for _ in range(50):
+    strategy = isiw.make_strategy("default", particles=200, max_trials=80)
+    for _ in range(70):
         strategy.learn(strategy.ask(), 0.0)
     assert (strategy.estimate().probability or 1.0) < 0.1
     assert str(strategy.estimate()) == NO_MEP
