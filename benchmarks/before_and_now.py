@@ -189,20 +189,24 @@ def ends(before: Path, now: Path) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _ends(rows: Path) -> pd.DataFrame:
-    """The end of each session."""
-    last = pd.read_parquet(rows).sort_values("trial").groupby(["cohort", "person"]).tail(1)
-    stopped = last["stop_trial"].notna()
-    none = stopped & last["stop_reason"].str.startswith(("There is no window", "There is probably no window"))
-    told = last["reported_window"].astype(bool)
-    return last[["cohort", "person"]].assign(
-        stimuli=last["stop_trial"].where(stopped, last["trial"]),
-        f1=last["stop_f1"].where(stopped, last["f1"]),
-        stopped_on_window=stopped & ~none,
+def _ends(path: Path) -> pd.DataFrame:
+    """The end of each session; one that its budget ends, or that goes on, is told what is reported by then."""
+    rows, who = pd.read_parquet(path).sort_values("trial"), ["cohort", "person"]
+    last = rows.groupby(who).tail(1).set_index(who)
+    stimuli = last["stop_trial"].fillna(last["trial"])
+    by_then = rows[rows["trial"] >= rows.set_index(who).index.map(stimuli)].groupby(who).head(1).set_index(who)
+    decided = last["converged"] == 1.0
+    none = decided & last["stop_reason"].str.startswith(("There is no window", "There is probably no window"))
+    told = by_then["reported_window"].astype(bool).reindex(last.index)
+    ends = last[[]].assign(
+        stimuli=stimuli,
+        f1=last["stop_f1"].fillna(last["f1"]),
+        stopped_on_window=decided & ~none,
         stopped_on_none=none,
-        told_window=(stopped & ~none) | (~stopped & told),
-        told_window_at_the_end=told,
+        told_window=(decided & ~none) | (~decided & told),
+        told_window_at_the_end=last["reported_window"].astype(bool),
     )
+    return ends.reset_index()
 
 
 if __name__ == "__main__":

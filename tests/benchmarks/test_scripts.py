@@ -40,3 +40,15 @@ def test_two_versions_are_compared_on_the_same_people(tmp_path: Path) -> None:
     )
     run("before_and_now", ["compare", folder, folder, "--out", str(out)])
     assert "gaussian" in out.with_suffix(".md").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_where_two_versions_stop_is_compared_within_their_budgets(tmp_path: Path) -> None:
+    folder, out = str(tmp_path / "now"), tmp_path / "stops"
+    few = ["--cohorts", "weak", "--people", "2", "--seed", "1", "--workers", "1"]
+    run("before_and_now", ["run", *few, "--to-stopping", "6", "--out", folder])
+    run("before_and_now", ["stops", folder, folder, "--out", str(out)])
+    rows = [line.split("|")[2:-1] for line in out.with_suffix(".md").read_text(encoding="utf-8").splitlines()[6:]]
+    found = {what.strip(): (float(before), float(now)) for _, what, before, now, *_ in rows}
+    assert found["stimuli"] == (6.0, 6.0)
+    assert found["stopped_on_window"] == (0.0, 0.0)
