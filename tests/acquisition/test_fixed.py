@@ -119,7 +119,7 @@ def test_a_sweep_is_planned_on_the_grid_of_the_space(space: DesignSpace, step_ms
     assert planned_ms == [isi_ms for isi_ms in asked_ms for _ in range(3)]
 
 
-@pytest.mark.parametrize(("low_ms", "high_ms", "step_ms"), [(100, 109, 0.3), (0, 0.3, 0.1), (10, 17, 0.1), (0, 8, 0.4)])
+@pytest.mark.parametrize(("low_ms", "high_ms", "step_ms"), [(100, 109, 0.3), (0, 1.3, 0.1), (10, 17, 0.1), (0, 8, 0.4)])
 def test_a_sweep_comes_to_the_last_isi_of_a_range_of_whole_steps(low_ms: float, high_ms: float, step_ms: float) -> None:
     stops, sweep = round((high_ms - low_ms) / step_ms) + 1, IncrementalSweep(step_ms, trials_per_isi=1)
     space = DesignSpace(low_ms, high_ms, step_ms=step_ms)

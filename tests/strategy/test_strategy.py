@@ -207,7 +207,7 @@ def test_a_mistrial_moves_the_budget_and_nothing_else(particles: Strategy) -> No
     reason = particles.decision().reason
     particles.count_mistrial()
     assert (particles.ask(), particles.posterior, particles.estimate()) == before
-    assert "79 stimuli are left" in reason
+    assert "59 stimuli are left" in reason
     assert particles.decision().reason == reason.replace("79 stimuli", "78 stimuli")
 
 
