@@ -208,7 +208,7 @@ def test_a_mistrial_moves_the_budget_and_nothing_else(particles: Strategy) -> No
     particles.count_mistrial()
     assert (particles.ask(), particles.posterior, particles.estimate()) == before
     assert "59 stimuli are left" in reason
-    assert particles.decision().reason == reason.replace("79 stimuli", "78 stimuli")
+    assert particles.decision().reason == reason.replace("59 stimuli", "58 stimuli")
 
 
 def test_pairs_and_mistrials_use_up_one_budget_and_control_trials_none() -> None:
