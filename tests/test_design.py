@@ -20,7 +20,7 @@ spaces = st.builds(
     lambda low, step, count: DesignSpace(low, low + step * count, step_ms=step),
     st.integers(-200, 200),
     st.sampled_from([0.1, 0.25, 0.5, 1.0, 2.5, 5.0]),
-    st.integers(10, 400),
+    st.integers(1, 400),
 )
 isis = st.floats(-1e4, 1e4)
 
@@ -138,8 +138,3 @@ def test_a_space_with_more_isis_than_anybody_needs_is_refused(space: tuple[float
 
 def test_a_second_in_steps_of_a_tenth_of_a_millisecond_is_a_space() -> None:
     assert len(DesignSpace(0, 1000, 0.1).grid_ms) == 10_001
-
-
-def test_a_range_in_seconds_is_refused() -> None:
-    with pytest.raises(InvalidValueError, match=r"In seconds\? Then DesignSpace\(0, 300\)"):
-        DesignSpace(0, 0.3, step_ms=0.001)

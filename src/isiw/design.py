@@ -21,10 +21,6 @@ MOST_ISIS = 10_001
 """Of a design space: a second in steps of 0.1 ms."""
 
 
-NARROWEST_MS = 1.0
-"""A range below is not in ms."""
-
-
 @dataclass(frozen=True)
 class DesignSpace:
     """The ISIs that may be asked: a grid from `low_ms` to `high_ms`, both included.
@@ -58,11 +54,11 @@ class DesignSpace:
             raise InvalidValueError(
                 "the design space is empty", got=(self.low_ms, self.high_ms), expected="low_ms < high_ms"
             )
-        if self.high_ms - self.low_ms < max(0.5 * self.step_ms, NARROWEST_MS):
+        if self.high_ms - self.low_ms < 0.5 * self.step_ms:
             raise InvalidValueError(
-                "the design space is narrower than a step, or than any window",
+                "the design space is narrower than a step",
                 got=(self.low_ms, self.high_ms),
-                expected=f"a range in ms of at least {max(self.step_ms, NARROWEST_MS):g} ms",
+                expected=f"a range in ms of at least {self.step_ms:g} ms",
                 remedy=f"In seconds? Then DesignSpace({1e3 * self.low_ms:g}, {1e3 * self.high_ms:g}).",
             )
         steps = (self.high_ms - self.low_ms) / self.step_ms

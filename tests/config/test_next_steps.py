@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from isiw.config import after_error
+from isiw.errors import LogError
 from isiw.session.loop import Session
 from scripted import ScriptedDevice, scripted_strategy
 
@@ -25,3 +26,16 @@ def test_a_session_that_was_over_when_its_device_failed_is_not_to_be_resumed(
     (line,) = after_error(session, None, failed.value, delivered=True)
     assert line.startswith("The session is over, and its log is complete.")
     assert line.endswith(f"isiw show {tmp_path / 's.mcap'}")
+
+
+def test_a_session_whose_last_decision_is_not_on_disk_is_to_be_resumed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise LogError("the log cannot be written")
+
+    session = Session(ScriptedDevice(), scripted_strategy(2), log=tmp_path / "s.mcap")
+    monkeypatch.setattr("isiw.session.steps.believed", full)
+    with pytest.raises(LogError) as failed:
+        session.run()
+    assert "isiw resume" in after_error(session, None, failed.value, delivered=True)[-1]

@@ -132,8 +132,8 @@ def test_files_that_are_read_are_looked_for_beside_the_configuration(
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     config = load_config(file)
-    assert (config.prior, config.after) == (tmp_path / "lab.toml", (tmp_path / "../P07.mcap",))
-    assert (config.subject.data, config.log) == (tmp_path / "uef", Path("s.mcap"))
+    assert (config.prior, config.after) == (tmp_path.resolve() / "lab.toml", (tmp_path.resolve().parent / "P07.mcap",))
+    assert (config.subject.data, config.log) == (tmp_path.resolve() / "uef", Path("s.mcap"))
     assert config.with_overrides(prior=Path("own.toml")).prior == Path("own.toml")
 
 

@@ -24,9 +24,10 @@ from isiw.log.topics import decode
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
+from isiw.session.replay import strategy_of
 from isiw.session.resume import resume
 from isiw.session.updates import SessionUpdate
-from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.catalogue import make_strategy, remade_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Measurement, MistrialReason, Stimulus
@@ -582,3 +583,16 @@ def test_a_session_that_is_over_arms_nothing_when_it_is_resumed(tmp_path: Path) 
     assert result.decision.stop
     assert device.calls == []
     assert read_session(log).finished
+
+
+def test_a_session_that_would_not_be_accepted_any_more_goes_on_as_it_was(tmp_path: Path) -> None:
+    space = DesignSpace(0, 100, reference="valve")
+    settings: dict[str, Any] = {"hit_delay_ms": (150.0, 5.0), "particles": 50}
+    with pytest.raises(InvalidValueError, match="would hit after the last ISI"):
+        make_strategy(space=space, **settings)
+    log = tmp_path / "s.mcap"
+    with open_session(remade_strategy("default", space, 0, **settings), log) as session:
+        session.tell(session.ask(), 0.05)
+    with open_session(strategy_of(read_session(log).header), log, resume=True) as session:
+        session.tell(session.ask(), 0.05)
+    assert len(read_session(log).table.told) == 2

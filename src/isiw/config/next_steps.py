@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from isiw.config.taught import learns_from_earlier
-from isiw.errors import LimitExceededError
+from isiw.errors import IsiwError, LimitExceededError
+from isiw.log.reader import read_session
 from isiw.log.schema import RUN_KEY
 from isiw.session.loop import Session
 from isiw.text.commands import command
@@ -24,7 +25,7 @@ def after_error(session: Session, config: Path | None, error: BaseException | No
         error: what ended it.
         delivered: whether it had delivered anything since it was begun or resumed.
     """
-    if session.strategy.decision().stop:
+    if _is_over(session.log_path):
         seen = command("show", session.log_path)
         return [f"The session is over, and its log is complete. See what was found with: {seen}"]
     limited = config is not None and isinstance(error, LimitExceededError)
@@ -35,6 +36,15 @@ def after_error(session: Session, config: Path | None, error: BaseException | No
     )
     safe = "The session ended early. Its log is safe" if delivered else "No stimulus was delivered. The log is kept"
     return [*lines, f"{safe}; go on with: {_resume(session, config, named=limited)}"]
+
+
+def _is_over(log: Path) -> bool:
+    """Whether the log's last decision was to stop, so that nothing is missing in it."""
+    try:
+        decision = read_session(log).decision
+    except IsiwError:
+        return False
+    return decision is not None and decision.stop
 
 
 def after_end(session: Session, config: Path | None, *, delivered: bool) -> str | None:

@@ -160,11 +160,11 @@ def load_config(path: str | Path | None = None) -> RunConfig:
 
 def _read_from(folder: Path, config: RunConfig) -> RunConfig:
     """A configuration whose files that are read, but for modules, lie where they do as seen from its own folder."""
-    found: dict[str, Any] = {"after": tuple(folder / log for log in config.after)} if config.after else {}
+    found: dict[str, Any] = {"after": tuple((folder / log).resolve() for log in config.after)} if config.after else {}
     if config.prior is not None:
-        found["prior"] = folder / config.prior
+        found["prior"] = (folder / config.prior).resolve()
     if config.subject.data is not None:
-        found["subject"] = config.subject.model_copy(update={"data": folder / config.subject.data})
+        found["subject"] = config.subject.model_copy(update={"data": (folder / config.subject.data).resolve()})
     return config.model_copy(update=found)
 
 

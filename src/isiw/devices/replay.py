@@ -6,7 +6,7 @@ import math
 
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError
-from isiw.trials import Measurement, Stimulus, Trial, TrialTable
+from isiw.trials import MOST_ISI_SD_MS, Measurement, Stimulus, Trial, TrialTable
 from isiw.types import Reference
 
 __all__ = ["RecordedTrials"]
@@ -28,13 +28,13 @@ class RecordedTrials:
         isiw.Session(device, isiw.make_strategy(space=space), log="again.mcap", limits=limits).run()
 
     Args:
-        table: the recorded trials; only those that a strategy may learn from are used.
+        table: the recorded trials; only those that a strategy may learn from are used, and whose ISIs are known.
         reference: the event that their ISIs count from.
     """
 
     def __init__(self, table: TrialTable, reference: Reference) -> None:
         self.info = DeviceInfo(name="replay of recorded trials", reference=reference, simulated=True)
-        self._left: list[Trial] = list(table.told)
+        self._left: list[Trial] = [trial for trial in table.told if trial.isi_sd_ms <= MOST_ISI_SD_MS]
 
     def answer(self, stimulus: Stimulus) -> Measurement:
         """The recorded answer nearest to the next pair of stimuli.

@@ -12,7 +12,7 @@ from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent, StrategyRecip
 from isiw.log.verdicts import VERDICTS, under
 from isiw.session.header import versions
 from isiw.session.journal import learn, relearned
-from isiw.strategy.catalogue import make_strategy, settings_for
+from isiw.strategy.catalogue import remade_strategy, settings_for
 from isiw.strategy.strategy import Strategy
 from isiw.text import plain
 from isiw.trials import Trial, TrialTable
@@ -114,7 +114,7 @@ def strategy_of(header: Header) -> Strategy:
     settings = recipe.settings
     if header.schema_version < SCHEMA_VERSION:
         settings = _known_settings(recipe)
-    return make_strategy(recipe.name, space=header.space, seed=recipe.seed, **settings)
+    return remade_strategy(recipe.name, header.space, recipe.seed, **settings)
 
 
 def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:

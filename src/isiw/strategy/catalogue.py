@@ -10,11 +10,12 @@ from typing import Any, Final
 from isiw.checks import whole
 from isiw.design import VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import StrategyError, did_you_mean
+from isiw.models.particles.profile import ProfilePrior
 from isiw.strategy.settings.common import Settings, settings_from, settings_keys, settings_values
 from isiw.strategy.settings.described import DescribedSetting, described
 from isiw.strategy.strategy import Recipe, Strategy
 
-__all__ = ["known_settings", "list_settings", "list_strategies", "make_strategy", "settings_for"]
+__all__ = ["known_settings", "list_settings", "list_strategies", "make_strategy", "remade_strategy", "settings_for"]
 
 
 @dataclass(frozen=True)
@@ -164,6 +165,27 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
         StrategyError: an unknown name or setting, or an acquisition function that cannot work with the model.
         ConfigError: a nested key or value that cannot be used.
         InvalidValueError: an invalid seed or setting, or no design space.
+    """
+    strategy = remade_strategy(name, space, seed, **settings)
+    profile = getattr(getattr(strategy.model, "prior", None), "profile", None)
+    if isinstance(profile, ProfilePrior):
+        profile.require_rig(space)
+    return strategy
+
+
+def remade_strategy(name: str, space: DesignSpace, seed: int, **settings: Any) -> Strategy:
+    """As `make_strategy`, for a log: also with what a new session does not accept any more.
+
+    Args:
+        name: as for `make_strategy`.
+        space: as for `make_strategy`.
+        seed: as for `make_strategy`.
+        **settings: as for `make_strategy`.
+
+    Raises:
+        StrategyError: as for `make_strategy`.
+        ConfigError: as for `make_strategy`.
+        InvalidValueError: as for `make_strategy`.
     """
     seed = whole("the seed", seed, least=0)
     chosen = settings_for(name, **settings)

@@ -248,7 +248,8 @@ class Strategy:
 
         Raises:
             InvalidValueError: NaN, infinite or negative values, a response that is neither True nor False, not exactly
-                one of `mep_mv` and `response`, an amplitude that no muscle gives, swapped arguments, or seconds.
+                one of `mep_mv` and `response`, an amplitude that no muscle gives, swapped arguments, seconds, a pulse
+                before the impact, or an ISI that is too uncertain.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             StrategyError: a kind of outcome that the model cannot learn from.
 

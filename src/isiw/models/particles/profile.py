@@ -147,13 +147,12 @@ class ProfilePrior:
         usual = replace(first, share=1.0 - math.fsum(width.share for width in less))
         return replace(self, start=self.start.as_usual(kept), widths=(usual, *less))
 
-    def require_space(self, space: DesignSpace) -> None:
-        """Check that the conditioning stimulus and the places mean something in a space.
+    def require_rig(self, space: DesignSpace) -> None:
+        """Check that the rig of a new session fits its space; what an earlier log says goes on as it was.
 
         Raises:
             InvalidValueError: ISIs count from a valve command that the conditioning stimulus does not have, or all are
-                shorter than the hit delay; or the places count from another event than the space, or are of a rig with
-                another hit delay, or of another conditioning stimulus.
+                shorter than the hit delay.
         """
         if self.conditioning == "electrical" and space.reference == "valve":
             raise InvalidValueError(
@@ -162,6 +161,22 @@ class ProfilePrior:
                 expected='reference "impact", which is the pulse here',
                 remedy='Make the space with isiw.DesignSpace(0, 100), or set reference = "impact" under [space].',
             )
+        delay_ms = self.start.hit_delay_ms
+        if delay_ms is not None and space.reference == "valve" and delay_ms[0] > space.high_ms:
+            raise InvalidValueError(
+                "the tap would hit after the last ISI, so no window could be found",
+                got=f"a hit delay of {delay_ms[0]:g} ms",
+                expected=f"less than {space.high_ms:g} ms, which is the largest ISI after the valve command",
+                remedy="Is it in ms? isiw timing LOG measures it. If it is right, make the space longer.",
+            )
+
+    def require_space(self, space: DesignSpace) -> None:
+        """Check that the places mean something in a space.
+
+        Raises:
+            InvalidValueError: they count from another event than the space, or are of a rig with another hit delay, or
+                of another conditioning stimulus.
+        """
         if any(place.conditioning != self.conditioning for place in self.places):
             raise InvalidValueError(
                 "the prior was learnt with another conditioning stimulus, so its windows say nothing here",
@@ -179,13 +194,6 @@ class ProfilePrior:
                 f"not, learn from sessions that count from the {origin(space.reference)}, or leave the prior out.",
             )
         delay_ms = self.start.hit_delay_ms
-        if delay_ms is not None and space.reference == "valve" and delay_ms[0] > space.high_ms:
-            raise InvalidValueError(
-                "the tap would hit after the last ISI, so no window could be found",
-                got=f"a hit delay of {delay_ms[0]:g} ms",
-                expected=f"less than {space.high_ms:g} ms, which is the largest ISI after the valve command",
-                remedy="Is it in ms? isiw timing LOG measures it. If it is right, make the space longer.",
-            )
         if others := [place.hit_delay_ms for place in self.places if not place.is_of_rig(delay_ms)]:
             raise InvalidValueError(
                 "the prior was learnt on a rig with another hit delay, so its windows would be in the wrong place",
