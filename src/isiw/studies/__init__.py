@@ -6,8 +6,9 @@ it once more, and `summarise` says what it came to.
 
 from isiw.studies.execution import DaskCluster, Failure, Processes
 from isiw.studies.plan import Study, StudyStrategy, Unit, load_study, run_unit
+from isiw.studies.players import Player
 from isiw.studies.running import Replay, conduct, paired_sessions, replay, run_study, unit_of_row
-from isiw.studies.sessions import Player, SimulatedSession, play, simulate
+from isiw.studies.sessions import SimulatedSession, play, simulate
 from isiw.studies.store import Store, begin_store, open_store
 from isiw.studies.summary import summarise
 

@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, Protocol, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import pandas as pd
 
@@ -20,8 +20,9 @@ from isiw.metrics import covers, f1
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choosing import Choice
-from isiw.strategy.stopping import StopDecision, StoppingRule, stimuli_left
+from isiw.strategy.stopping import stimuli_left
 from isiw.strategy.strategy import Strategy
+from isiw.studies.players import Crowd, Player, Reported, alone
 from isiw.studies.threads import one_torch_thread
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
@@ -30,9 +31,6 @@ from isiw.window import Window, WindowEstimate
 __all__ = [
     "OWN_STRATEGY",
     "TIMES",
-    "Crowd",
-    "Player",
-    "Reported",
     "SimulatedSession",
     "Stopping",
     "examine",
@@ -52,52 +50,6 @@ OWN_STRATEGY = 'One of your own objects takes part through run_study: see "A str
 """The way out where a strategy is given in the place of its name."""
 
 Stopping: TypeAlias = Literal["ignored", "noted", "ends"]
-Reported: TypeAlias = WindowEstimate | Window | None
-
-
-class Player(Protocol):
-    """What proposes ISIs in a simulated session: a strategy, or what a benchmark compares it with."""
-
-    def ask(self) -> float:
-        """The next ISI [ms]."""
-
-    def tell(self, isi_ms: float | None, mep_mv: float | None = None, *, isi_sd_ms: float = 0.0) -> None:
-        """Learn from one trial.
-
-        Args:
-            isi_ms: the realised ISI [ms]; None for TMS alone.
-            mep_mv: amplitude of the MEP [mV].
-            isi_sd_ms: SD of the realised ISI [ms].
-        """
-
-    def estimate(self) -> Reported:
-        """What is believed about the window now."""
-
-
-class Crowd(Protocol):
-    """What proposes ISIs to some people side by side."""
-
-    @property
-    def stopping(self) -> StoppingRule | None:
-        """The rule that says when to stop with each; None where there is none."""
-
-    def ask(self) -> Sequence[Choice]:
-        """What is asked of each person next."""
-
-    def tell(self, responses: Sequence[Response]) -> None:
-        """Learn from one trial of each person."""
-
-    def count_mistrial(self, person: int) -> None:
-        """Count a pair of stimuli that was delivered in vain."""
-
-    def estimate(self, person: int) -> Reported:
-        """What is believed about the window of a person."""
-
-    def decision(self, person: int) -> StopDecision:
-        """Whether to stop with a person; asked only where there is a rule."""
-
-    def trouble(self) -> bool | None:
-        """Whether the last fit failed; None where it cannot be said for each person."""
 
 
 def require_cohorts(names: Iterable[object]) -> None:
@@ -206,8 +158,7 @@ def play(session: SimulatedSession, player: Player) -> pd.DataFrame:
         session: the session.
         player: what proposes ISIs in it.
     """
-    crowd: Crowd = _StrategyAlone(player) if isinstance(player, Strategy) else _PlayerAlone(player)
-    return examine([session], crowd)
+    return examine([session], alone(player))
 
 
 def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
@@ -315,72 +266,6 @@ class _Person:
         counts = {"seed": session.seed, "trial": 0, "delivered": delivered, "mistrials": self.mistrials}
         judged = _judged(self.crowd.estimate(self.number), self.truth, session.space)
         return who | counts | judged | {"fallbacks": self.fallbacks, "troubles": self.troubles} | self.stop
-
-
-@dataclass(frozen=True)
-class _StrategyAlone:
-    """A strategy as a crowd of one."""
-
-    strategy: Strategy
-
-    @property
-    def stopping(self) -> StoppingRule:
-        return self.strategy.stopping
-
-    def ask(self) -> list[Choice]:
-        isi_ms = self.strategy.ask()
-        return [Choice(isi_ms, self.strategy.fallback_reason)]
-
-    def tell(self, responses: Sequence[Response]) -> None:
-        (told,) = responses
-        self.strategy.learn(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
-
-    def count_mistrial(self, person: int) -> None:
-        del person
-        self.strategy.count_mistrial()
-
-    def estimate(self, person: int) -> Reported:
-        del person
-        return self.strategy.estimate()
-
-    def decision(self, person: int) -> StopDecision:
-        del person
-        return self.strategy.decision()
-
-    def trouble(self) -> bool:
-        return self.strategy.trouble is not None
-
-
-@dataclass(frozen=True)
-class _PlayerAlone:
-    """Any other player as a crowd of one: it has no stopping rule, and no fit that could fail."""
-
-    player: Player
-
-    @property
-    def stopping(self) -> None:
-        return None
-
-    def ask(self) -> list[Choice]:
-        return [Choice(self.player.ask())]
-
-    def tell(self, responses: Sequence[Response]) -> None:
-        (told,) = responses
-        self.player.tell(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
-
-    def count_mistrial(self, person: int) -> None:
-        del person
-
-    def estimate(self, person: int) -> Reported:
-        del person
-        return self.player.estimate()
-
-    def decision(self, person: int) -> StopDecision:
-        del person
-        return StopDecision(stop=False, reason="The player has no stopping rule.")
-
-    def trouble(self) -> bool:
-        return False
 
 
 def _judged(estimate: Reported, truth: Window | None, space: DesignSpace) -> dict[str, Any]:
