@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -13,6 +15,11 @@ from isiw.cli import app
 
 Command: TypeAlias = Callable[..., Result]
 
+COMMAND = [sys.executable, "-c", "from isiw.cli import app; app()"]
+"""isiw as a process of its own."""
+
+SHORT = "[strategy.settings]\nmax_trials = 3\nparticles = 100\n"
+
 
 @pytest.fixture
 def isiw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
@@ -23,3 +30,27 @@ def isiw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
         return CliRunner().invoke(app, [str(argument) for argument in arguments], **given)
 
     return run
+
+
+@pytest.fixture
+def short(tmp_path: Path) -> Path:
+    """A configuration of few trials."""
+    path = tmp_path / "short.toml"
+    path.write_text(SHORT)
+    return path
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The log of a short session."""
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "short.toml").write_text(SHORT)
+    result = CliRunner().invoke(app, ["run", str(folder / "short.toml"), "--log", str(folder / "s.mcap")])
+    assert result.exit_code == 0, result.output
+    return folder / "s.mcap"
+
+
+@pytest.fixture
+def log(finished: Path, tmp_path: Path) -> Path:
+    """A copy of that log."""
+    return Path(shutil.copy(finished, tmp_path))

@@ -19,10 +19,12 @@ from isiw.text import plain
 __all__ = [
     "DAMAGED",
     "INTERRUPTED",
+    "LOGS",
     "NOT_OVER",
     "NO_DEFAULT",
+    "SESSIONS",
+    "STUDIES",
     "Overwrite",
-    "counted",
     "errors_reported",
     "exit_if_damaged",
     "refuse_ignored",
@@ -33,6 +35,8 @@ __all__ = [
 DAMAGED = 3
 NOT_OVER = 5  # a session that a person should look at, or that its operator ended early
 INTERRUPTED = 130  # what shells report for Ctrl-C
+
+SESSIONS, LOGS, STUDIES = "Sessions and devices", "Logs", "Strategies, priors and studies"  # panels of isiw --help
 
 NO_DEFAULT: dict[str, Any] = {"show_default": False}
 
@@ -121,13 +125,3 @@ def refuse_ignored(why: str, **options: object) -> None:
     given = [f"--{name.replace('_', '-')}" for name, value in options.items() if value not in (None, [])]
     if given:
         raise isiw.errors.ConfigError(why, got=", ".join(given), remedy="Leave these options out.")
-
-
-def counted(count: int, noun: str) -> str:
-    """A number of things in words, such as "1 session" and "2 sessions".
-
-    Args:
-        count: how many.
-        noun: what one of them is called.
-    """
-    return f"{count} {noun}{'' if count == 1 else 's'}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, errors_reported, exit_if_damaged, refuse_ignored, show
+from isiw.cli.console import NO_DEFAULT, SESSIONS, errors_reported, exit_if_damaged, refuse_ignored, show
 from isiw.text.commands import command
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ __all__ = ["app"]
 app = typer.Typer()
 
 
-@app.command()
+@app.command(rich_help_panel=SESSIONS)
 def interval(  # noqa: PLR0913, PLR0917 - an option each
     log: Annotated[Path, typer.Argument(help="The log's file.", **NO_DEFAULT)],
     session: Annotated[

@@ -1,4 +1,4 @@
-"""The commands about several logs: exporting them for others' software, and comparing them."""
+"""The commands about logs: what is in one, its picture and page, trials excluded afterwards, exports, comparisons."""
 
 from __future__ import annotations
 
@@ -8,14 +8,95 @@ from typing import Annotated, Literal
 import typer
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, Overwrite, counted, errors_reported, exit_if_damaged, show
+from isiw.cli.console import LOGS, NO_DEFAULT, Overwrite, errors_reported, exit_if_damaged, show
+from isiw.cli.files import free_beside
+from isiw.text.numbers import counted
 
 __all__ = ["app"]
 
 app = typer.Typer()
 
+Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
 
-@app.command()
+
+@app.command("show", rich_help_panel=LOGS)
+def show_log(log: Log) -> None:
+    """Say who, when and with what, list the trials, and say what was found; works on a damaged log, too."""
+    with errors_reported():
+        record = isiw.read_session(log)
+        for fact in isiw.report.first_facts(record):
+            show(f"{fact.name + ':':10}{fact.value}")
+        show("")
+        for row in (isiw.report.TRIAL_HEADINGS, *isiw.report.trial_rows(record)):
+            show(isiw.session.aligned(row))
+        for event in record.events:
+            when = "no trial" if event.trial is None else f"trial {event.trial}"
+            show(f"{event.kind} ({when}): {event.text}")
+        show(isiw.report.final_statement(record), style="bold")
+        exit_if_damaged(record.losses)
+
+
+@app.command(rich_help_panel=LOGS)
+def plot(
+    log: Log,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="The picture's file: .png, .pdf, .svg …; by default beside the log.", **NO_DEFAULT
+        ),
+    ] = None,
+    overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
+) -> None:
+    """Draw a session: profile, trials, window, and how the edges developed."""
+    with errors_reported():
+        record = isiw.read_session(log)
+        truth = isiw.config.true_window(record)
+        target = output or free_beside(record.path, ".png")
+        show(f"picture: {isiw.plots.save_session_plot(record, target, truth=truth, overwrite=overwrite)}")
+        exit_if_damaged(record.losses)
+
+
+@app.command(rich_help_panel=LOGS)
+def report(
+    log: Log,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The page's file; by default beside the log.", **NO_DEFAULT)
+    ] = None,
+    overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
+) -> None:
+    """Write a page about a session: what was found and how, trial by trial, for any browser, without a network."""
+    with errors_reported():
+        record = isiw.read_session(log)
+        truth = isiw.config.true_window(record)
+        target = output or free_beside(record.path, ".html")
+        show(f"report: {isiw.report.save_report(record, target, truth=truth, overwrite=overwrite)}")
+        exit_if_damaged(record.losses)
+
+
+@app.command(rich_help_panel=LOGS)
+def exclude(
+    log: Log,
+    trial: Annotated[int, typer.Argument(help="The trial's number, as in isiw show.")],
+    reason: Annotated[str, typer.Option(help="The reason, for readers of the log.")],
+) -> None:
+    """Exclude a trial afterwards. Nothing is erased; a resumed session learns without it."""
+    with errors_reported():
+        isiw.exclude(log, trial, reason)
+        show(f"Trial {trial} is excluded: {reason}")
+
+
+@app.command(rich_help_panel=LOGS)
+def include(
+    log: Log,
+    trial: Annotated[int, typer.Argument(help="The trial's number, as in isiw show.")],
+) -> None:
+    """Let an excluded trial count again; a resumed session learns with it."""
+    with errors_reported():
+        isiw.include(log, trial)
+        show(f"Trial {trial} counts again.")
+
+
+@app.command(rich_help_panel=LOGS)
 def export(
     source: Annotated[Path, typer.Argument(help="A session's log, or a folder of logs.", **NO_DEFAULT)],
     folder: Annotated[Path, typer.Argument(help="A new folder; nothing is replaced.", **NO_DEFAULT)],
@@ -41,7 +122,7 @@ def export(
         exit_if_damaged(exported.lacking)
 
 
-@app.command()
+@app.command(rich_help_panel=LOGS)
 def compare(
     logs: Annotated[list[Path], typer.Argument(help="Logs; each is compared to the first.", **NO_DEFAULT)],
     output: Annotated[

@@ -10,8 +10,9 @@ from rich.console import Console
 from rich.progress import Progress
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, Overwrite, counted, errors_reported, exit_if_damaged, show
+from isiw.cli.console import NO_DEFAULT, Overwrite, errors_reported, exit_if_damaged, show
 from isiw.text.commands import command
+from isiw.text.numbers import counted
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, errors_reported, show
+from isiw.cli.console import NO_DEFAULT, SESSIONS, errors_reported, show
 
 __all__ = ["app"]
 
@@ -18,7 +18,7 @@ app = typer.Typer()
 TOKEN = "ISIW_TOKEN"  # noqa: S105 - the variable's name
 
 
-@app.command()
+@app.command(rich_help_panel=SESSIONS)
 def serve(
     folder: Annotated[Path, typer.Argument(help="The folder for the logs; created if missing.", **NO_DEFAULT)],
     host: Annotated[str, typer.Option(help="The address to listen on; any but 127.0.0.1 needs TLS.")] = "127.0.0.1",

@@ -9,8 +9,9 @@ import typer
 from rich.console import Console
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, counted, errors_reported, exit_if_damaged, refuse_ignored, show
+from isiw.cli.console import NO_DEFAULT, SESSIONS, errors_reported, exit_if_damaged, refuse_ignored, show
 from isiw.text.commands import command
+from isiw.text.numbers import counted
 
 if TYPE_CHECKING:
     from isiw.session import ThresholdRecorder
@@ -20,7 +21,7 @@ __all__ = ["app"]
 app = typer.Typer()
 
 
-@app.command()
+@app.command(rich_help_panel=SESSIONS)
 def threshold(  # noqa: PLR0913, PLR0917 - an option each
     log: Annotated[Path, typer.Argument(help="The log: a new file, unless --resume or --show is given.", **NO_DEFAULT)],
     by_hand: Annotated[  # noqa: FBT002 - a flag

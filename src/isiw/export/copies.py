@@ -10,6 +10,7 @@ from isiw.log.durable import part_of
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import only_in, salvage_file
 from isiw.log.verdicts import VERDICTS
+from isiw.text.numbers import counted
 from isiw.trials import MistrialReason
 
 __all__ = ["once_each", "stimuli"]
@@ -74,7 +75,7 @@ class _Copy:
     def __str__(self) -> str:
         name, fuller = _names(self.record, self.fuller)
         if self.alone:
-            more = f"{self.alone} {'record is' if self.alone == 1 else 'records are'} in {name} alone"
+            more = f"{counted(self.alone, 'record is', 'records are')} in {name} alone"
             return f"{name} is left out: it is of the same session as {fuller}, which tells of more; {more}."
         if _is_damaged(self.record):
             return f"{name} is left out: it is a damaged copy of {fuller}, which has all that can be read of it."

@@ -19,6 +19,7 @@ from isiw.log.production import LONGEST_MS, MODES, Block
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
 from isiw.session.terminal import Keys, Screen, somebody_there
+from isiw.text.numbers import counted
 
 __all__ = ["REST_S", "SHORTEST_MS", "resume_task", "run_task"]
 
@@ -116,7 +117,7 @@ def _open_block(record: ProductionRecord, index: int, screen: Screen, presses: P
     target = f"target {block.target_ms:.0f} ms" if block.mode in {3, 4} else "find the hidden target"
     place = f"Block {index + 1} of {len(record.header.blocks)}"
     left = sum(of == index for _, of in record.left)
-    trials = f"{left} {'trial' if left == 1 else 'trials'}" + (" left" if left < block.trials else "")
+    trials = counted(left, "trial") + (" left" if left < block.trials else "")
     screen.say(f"{place}: {trials}, feedback: {MODES[block.mode]}; {target}.")
 
 

@@ -20,6 +20,7 @@ from isiw.log.blocks import UNREADABLE, LostBlockError, Unpacking, marked
 from isiw.log.durable import Fingerprint, disk_errors, log_of, part_of
 from isiw.log.index import RECORD_HEAD_BYTES, counted_records
 from isiw.log.topics import ANNOUNCEMENT, CHANNEL_IDS
+from isiw.text.numbers import counted
 
 __all__ = ["Message", "Salvage", "current_file", "holds", "only_in", "salvage", "salvage_file"]
 
@@ -319,7 +320,7 @@ def _put_in_order(found: Salvage) -> None:
     ordered = [first_of[number] for number in sorted(first_of)]
     if twice := len(found.messages) - len(ordered):
         found.losses.append(
-            f"{twice} {'record is' if twice == 1 else 'records are'} in the file twice; the first of each counts."
+            f"{counted(twice, 'record is', 'records are')} in the file twice; the first of each counts."
         )
     elif ordered != found.messages:
         found.losses.append(

@@ -11,6 +11,7 @@ from scipy.stats import mannwhitneyu
 from isiw.log.reader import SessionRecord
 from isiw.signals.doubts import stopped_after
 from isiw.text.found import NO_MEP
+from isiw.text.numbers import counted
 from isiw.trials import Trial
 from isiw.window import Window
 
@@ -39,9 +40,9 @@ def nothing_estimated(record: SessionRecord) -> str:
         record: the session.
     """
     completed, given = len(record.table), record.given
-    pulses = f"{given} {'pulse was' if given == 1 else 'pulses were'} given, or may have been"
+    pulses = f"{counted(given, 'pulse was', 'pulses were')} given, or may have been"
     if completed:
-        known = f"{completed} {'has' if completed == 1 else 'have'} an outcome"
+        known = f"{counted(completed, 'has', 'have')} an outcome"
         return f"No estimate can be read{_damage(record)}: {pulses}, {known}."
     if given:
         return f"No outcome can be read{_damage(record)}: {pulses}, none has an outcome."
@@ -64,7 +65,7 @@ def nothing_measured(record: SessionRecord) -> str | None:
     if record.is_silent:
         return f"{NO_MEP} The amplitudes of all {told} trials that count are 0. {_LOOK}"
     if told:
-        count = f"{record.pairs} {'pair of stimuli counts' if record.pairs == 1 else 'pairs of stimuli count'}"
+        count = counted(record.pairs, "pair of stimuli counts", "pairs of stimuli count")
         return f"Too little was measured to speak of a window: {count}, of {given} trials."
     lost = [trial for trial in record.table if trial.reason is not None]
     if not lost:

@@ -25,6 +25,7 @@ from isiw.session.progress import asked, outcome
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.text.commands import command
 from isiw.text.found import SURE, rules_out
+from isiw.text.numbers import counted
 from isiw.window import MIN_EXCESS_MV, Window
 
 __all__ = [
@@ -265,10 +266,10 @@ def counts_sentence(record: SessionRecord) -> str:
     if unknown:
         mistrials["outcome unknown"] += unknown
     told, given = len(record.table.told), record.given
-    pairs = "1 pair of stimuli was delivered" if given == 1 else f"{given} pairs of stimuli were delivered"
+    pairs = counted(given, "pair of stimuli was delivered", "pairs of stimuli were delivered")
     if controls := _controls(record):
         pairs = f"{given} stimuli were delivered, {controls} among them"
-    parts = [f"{pairs}; {told} {'counts' if told == 1 else 'count'}"]
+    parts = [f"{pairs}; {counted(told, 'counts', 'count')}"]
     if mistrials:
         parts.append("mistrials: " + ", ".join(f"{count} {reason}" for reason, count in mistrials.items()))
     if excluded:

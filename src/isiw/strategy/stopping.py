@@ -11,6 +11,7 @@ from typing import Protocol, runtime_checkable
 from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.errors import InvalidValueError
 from isiw.text.found import SURE
+from isiw.text.numbers import counted
 from isiw.window import WindowEstimate
 
 __all__ = [
@@ -105,7 +106,7 @@ class Budget:
         left = self.max_trials - progress.delivered
         if left <= 0:
             return StopDecision(stop=True, reason=f"The budget of {self.max_trials} stimuli is used up.")
-        return StopDecision(stop=False, reason="1 stimulus is left." if left == 1 else f"{left} stimuli are left.")
+        return StopDecision(stop=False, reason=f"{counted(left, 'stimulus is left', 'stimuli are left')}.")
 
 
 @dataclass(frozen=True)

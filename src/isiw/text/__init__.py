@@ -1,4 +1,4 @@
-"""Text: from outside, made harmless; TOML files, checked key by key; words for the stimuli and for what was found."""
+"""Text: from outside, made harmless; TOML files, checked key by key; words for stimuli, numbers and what was found."""
 
 from isiw.text.harmless import one_line, plain
 

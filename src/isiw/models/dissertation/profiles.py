@@ -21,6 +21,7 @@ from scipy.stats import shapiro
 from isiw.checks import number, whole
 from isiw.errors import InvalidValueError
 from isiw.models.dissertation.nonlinear import gaussians_mv, gradient_mv
+from isiw.text.numbers import counted
 from isiw.types import ArrayLike, FloatArray
 
 __all__ = ["MOST_GAUSSIANS", "Normality", "ProfileFit", "best_fit", "normality", "profile_fits"]
@@ -187,7 +188,7 @@ def _least_squares(profile: _Profile, start: FloatArray) -> FloatArray:
 
 def _sum_of_gaussians(profile: _Profile, parameters: FloatArray) -> ProfileFit:
     gaussians = parameters[1:].reshape(-1, 3)
-    name = f"{len(gaussians)} Gaussian{'s' if len(gaussians) > 1 else ''}"
+    name = counted(len(gaussians), "Gaussian")
     curve = partial(_mean_mv, parameters)
     return _scored(name, profile, curve, len(parameters) + 1.0, gaussians)
 

@@ -1,0 +1,30 @@
+"""Where a command finds a log, and where it puts what nobody gave a place."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+__all__ = ["free_beside", "is_log"]
+
+
+def is_log(source: str | Path) -> bool:
+    """Whether there is a log of this name, closed or not.
+
+    Args:
+        source: the log's file, or its unfinished one.
+    """
+    closed = str(source).removesuffix(".part")
+    return Path(closed).is_file() or Path(f"{closed}.part").is_file()
+
+
+def free_beside(log: Path, suffix: str) -> Path:
+    """Where a file of a session goes that nobody gave a place: beside its log, under a name that is free.
+
+    Args:
+        log: the session's log.
+        suffix: of the file, with its dot.
+    """
+    stem = Path(log.name.removesuffix(".part")).stem
+    names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
+    return next(path for path in (log.with_name(f"{name}{suffix}") for name in names) if not path.exists())

@@ -1,0 +1,151 @@
+"""The commands that run a session, and how a session ends on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import isiw
+from isiw.cli.console import NO_DEFAULT, NOT_OVER, SESSIONS, errors_reported, show
+from isiw.cli.files import free_beside, is_log
+from isiw.text.commands import command
+
+if TYPE_CHECKING:
+    from isiw.session.loop import Session
+
+__all__ = ["app"]
+
+app = typer.Typer()
+
+_INTERRUPTED = "Interrupted: the device is disarmed and the log is closed."
+
+Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **NO_DEFAULT)]
+Live = Annotated[
+    bool, typer.Option("--live", help="Show the session in the browser while it runs, and operate it there.")
+]
+
+
+@app.command(rich_help_panel=SESSIONS)
+def run(  # noqa: PLR0913, PLR0917 - an option each
+    config: Annotated[Path | None, typer.Argument(help="A configuration file (TOML).", **NO_DEFAULT)] = None,
+    subject: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="How a person is simulated: simulated, or recorded (simulated MEPs in recorded EMG). The code of the "
+            "person who is examined is visit.subject in CONFIG.",
+            **NO_DEFAULT,
+        ),
+    ] = None,
+    data: Data = None,
+    strategy: Annotated[str | None, typer.Option(help="A name that isiw strategies lists.", **NO_DEFAULT)] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of the person, the trials and the strategy.", **NO_DEFAULT)
+    ] = None,
+    log: Annotated[Path | None, typer.Option(help="The log's file; by default a new one in isiw-sessions.")] = None,
+    lab: Annotated[
+        Path | None, typer.Option("--prior", help="A lab's prior, as isiw prior learn writes it.", **NO_DEFAULT)
+    ] = None,
+    after: Annotated[
+        list[Path] | None,
+        typer.Option(help="The log of an earlier session of the same person; repeat it for several, earliest first."),
+    ] = None,
+    day: Annotated[
+        int | None, typer.Option(help="The number of the person's visit, for the log.", **NO_DEFAULT)
+    ] = None,
+    operator: Annotated[str | None, typer.Option(help="Who runs the session, for the log.", **NO_DEFAULT)] = None,
+    live: Live = False,  # noqa: FBT002 - a flag of the command line
+) -> None:
+    """Run a session with a simulated person, or with the device of a configuration, and say what was found."""
+    with errors_reported():
+        settings = isiw.config.load_config(config).with_overrides(
+            seed=seed,
+            log=log,
+            subject=subject,
+            data=data,
+            strategy=strategy,
+            prior=lab,
+            after=after,
+            day=day,
+            operator=operator,
+        )
+        _run_to_the_end(isiw.config.session_for(settings), config, live=live)
+
+
+@app.command(rich_help_panel=SESSIONS)
+def resume(
+    log: Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)],
+    config: Annotated[
+        Path | None,
+        typer.Argument(help="The configuration with your device; without it, the simulated person of the log is used."),
+    ] = None,
+    data: Data = None,
+    lost_pulses: Annotated[
+        int | None,
+        typer.Option(help="If the end of the log is missing: how many delivered pulses are not in it.", **NO_DEFAULT),
+    ] = None,
+    verify: Annotated[bool, typer.Option(help="Check that the strategy chooses the same ISIs as in the log.")] = True,  # noqa: FBT002 - a flag of the command line
+    live: Live = False,  # noqa: FBT002 - a flag of the command line
+) -> None:
+    """Continue an interrupted session, with its own ISI range and strategy, within the limits in CONFIG."""
+    with errors_reported():
+        record = isiw.config.read_to_resume(log, config)
+        settings = isiw.config.load_config(config) if config else isiw.config.config_of_log(record)
+        isiw.config.require_same_person(settings, [record])
+        changes = isiw.config.changes_on_resume(settings, record) if config else {}
+        device = isiw.config.device_for(settings.with_overrides(data=data))
+        session = isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify, **changes)
+        for difference in isiw.config.differences_on_resume(settings, record) if config else ():
+            show(difference, style="yellow", stderr=True)
+        _run_to_the_end(session, config, live=live, resumed=True)
+
+
+def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resumed: bool = False) -> None:
+    if session.log_path.suffix.lower() == ".png":
+        raise isiw.errors.ConfigError(
+            "the log would be overwritten by its picture", got=str(session.log_path), expected=".mcap"
+        )
+    if session.log_path.name.startswith("-"):
+        raise isiw.errors.ConfigError(
+            "a log's name cannot begin like an option", got=str(session.log_path), remedy="Give --log a file's name."
+        )
+    before, ours = len(session.trials), resumed or not is_log(session.log_path)
+    try:
+        with errors_reported(_INTERRUPTED), _shown_live(session) if live else nullcontext():
+            show(f"log: {session.log_path}")
+            result = session.run(progress=True)
+    except BaseException as end:
+        delivered, refused = len(session.trials) > before, isinstance(end.__cause__, isiw.errors.DeviceError)
+        if delivered or (refused and ours and is_log(session.log_path)):
+            for line in isiw.config.after_error(session, config, end.__cause__, delivered=delivered):
+                show(line)
+        raise
+    record = isiw.read_session(result.log)
+    truth = isiw.config.true_window(record)
+    show(f"\n{isiw.report.final_statement(record, config)}", style="bold")
+    if isiw.config.has_truth(record):
+        show(isiw.report.truth_sentence(record, truth))
+    show(f"log:     {result.log}")
+    try:
+        picture = isiw.plots.save_session_plot(record, free_beside(result.log, ".png"), truth=truth)
+        show(f"picture: {picture}")
+    except OSError as error:
+        later = command("plot", result.log)
+        show(f"The picture cannot be written ({error.strerror}). The log is complete; draw it later with: {later}")
+    if not result.decision.stop:
+        raise typer.Exit(NOT_OVER)
+    more = isiw.config.after_end(session, config, delivered=len(session.trials) > before)
+    if more is not None:
+        show(more)
+
+
+@contextmanager
+def _shown_live(session: Session) -> Iterator[None]:
+    """Within, the session has a page in the browser."""
+    with isiw.watch(session) as page:
+        show(f"live page: {page.url}", style="bold")
+        yield
