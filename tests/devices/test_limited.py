@@ -169,9 +169,10 @@ def test_of_two_threads_only_one_delivers_at_a_time() -> None:
         return Measurement(0.1, stimulus.isi_ms)
 
     inner = ScriptedDevice(answer)
-    limited = LimitedDevice(inner, Limits(0, 200, 0.05, 1000), MonotonicClock())
+    clock = MonotonicClock()
+    limited = LimitedDevice(inner, Limits(0, 200, 0.05, 1000), clock)
     limited.stage()
-    limited._clock.sleep_s(limited.wait_s())  # noqa: SLF001 - the interval before the first one
+    clock.sleep_s(limited.wait_s())  # the interval before the first one
     refused: list[LimitExceededError] = []
 
     def deliver(number: int) -> None:
@@ -189,7 +190,7 @@ def test_of_two_threads_only_one_delivers_at_a_time() -> None:
         for thread in threads:
             thread.join()
         assert len(inner.delivered) == before + 1
-        limited._clock.sleep_s(limited.wait_s())  # noqa: SLF001 - the interval before the next two
+        clock.sleep_s(limited.wait_s())  # the interval before the next two
     assert len(refused) == 20
     assert all("too early" in str(error) for error in refused)
 
@@ -198,11 +199,11 @@ def test_a_limit_cannot_be_loosened_while_the_device_is_in_use(limited: LimitedD
     loose = Limits(0, 1000, 0.0, 1000)
     with pytest.raises(AttributeError):
         limited.limits = loose  # type: ignore[misc]  # which is what is tested
-    mine = Limits(0, 200, 5.0, 3)
-    device = LimitedDevice(inner, mine, VirtualClock())
+    mine, clock = Limits(0, 200, 5.0, 3), VirtualClock()
+    device = LimitedDevice(inner, mine, clock)
     object.__setattr__(mine, "high_ms", 1000.0)
     device.stage()
-    device._clock.sleep_s(5.0)  # noqa: SLF001 - the interval before the first one
+    clock.sleep_s(5.0)  # the interval before the first one
     with pytest.raises(LimitExceededError, match="beyond the limits"):
         device.deliver(Stimulus(0, 500.0), 1.0)
 

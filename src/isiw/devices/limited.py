@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 
 from isiw.devices.clock import ROUNDING_S, Clock, VirtualClock
 from isiw.devices.limits import Limits
+from isiw.devices.pacing import Pacing
 from isiw.devices.protocol import Answer, Device, DeviceInfo, readiness_of, require_staged
 from isiw.errors import DeviceError, LimitExceededError, NotDelivered
 from isiw.trials import Stimulus
@@ -66,12 +67,10 @@ class LimitedDevice:
     ) -> None:
         info = device.describe()
         require_real_time(info, clock)
-        self._device, self._info, self._clock, self._dead_man = device, info, clock, dead_man
+        self._device, self._info, self._dead_man = device, info, dead_man
         self._limits = Limits(**dataclasses.asdict(limits))
         self._delivered = delivered
-        now_s = clock.now_s()
-        self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
-        self._since_s = now_s
+        self._pacing = Pacing(self._limits, clock, earlier_s)
         self._staged = False
         self._one_at_a_time = threading.Lock()
 
@@ -85,14 +84,13 @@ class LimitedDevice:
         """How many deliveries are still allowed."""
         return max(0, self._limits.max_pulses - self._delivered)
 
-    @property
-    def last_s(self) -> float:
-        """When the last delivery ended, by the clock [s]; before the first one, when this device was armed."""
-        return self._times_s[-1] if self._times_s else self._since_s
+    def wait_s(self, interval_s: float = 0.0) -> float:
+        """How long until the interval, the rest and the period allow the next delivery [s].
 
-    def wait_s(self) -> float:
-        """How long until the interval, the rest and the period allow the next delivery [s]."""
-        return max(0.0, self._limits.earliest_s(self._times_s, self._since_s) - self._clock.now_s())
+        Args:
+            interval_s: the least since the last delivery that is asked for beside the limits [s].
+        """
+        return self._pacing.wait_s(interval_s)
 
     def check(self, stimulus: Stimulus) -> None:
         """Raise where this stimulus must not be delivered now.
@@ -135,7 +133,7 @@ class LimitedDevice:
     def stage(self) -> None:
         """Get ready and arm; the next stimulus comes a whole interval later at the earliest."""
         self._device.stage()
-        self._since_s = self._clock.now_s()
+        self._pacing.begin_anew()
         if self._limits.intensity_pct_mso is None:
             self._limits = dataclasses.replace(
                 self._limits, intensity_pct_mso=readiness_of(self._device).intensity_pct_mso
@@ -159,18 +157,12 @@ class LimitedDevice:
             self.check(stimulus)
             require_staged(self._info.name, staged=self._staged)  # the check may take long, and `stop` come meanwhile
             self._delivered += 1
-            self._times_s.append(self._clock.now_s())
             try:
-                answer = self._device.deliver(stimulus, timeout_s)
+                with self._pacing.delivering():
+                    return self._device.deliver(stimulus, timeout_s)
             except (NotDelivered, LimitExceededError):
                 self._delivered -= 1
-                self._times_s.pop()
                 raise
-            except BaseException:
-                self._times_s[-1] = self._clock.now_s()
-                raise
-            self._times_s[-1] = self._clock.now_s()
-            return answer
 
     def stop(self) -> None:
         """Disarm; from here on nothing is delivered until the next `stage`."""

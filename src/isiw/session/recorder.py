@@ -11,6 +11,7 @@ from typing import Self
 
 from isiw.checks import number
 from isiw.devices.clock import ROUNDING_S, Clock
+from isiw.devices.pacing import Pacing
 from isiw.devices.protocol import Readiness
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, warn
 from isiw.log.schema import Event, Header
@@ -59,9 +60,7 @@ class Recorder(Judging):
         self._open.enter_context(self._journal.writing(log))
         self._asked: Stimulus | None = None
         self._lock = threading.RLock()
-        now_s = clock.now_s()
-        self._made_s = now_s
-        self._times_s = [now_s - age_s for age_s in sorted(earlier_s, reverse=True)]
+        self._pacing = Pacing(header.limits, clock, earlier_s)
         self._detection_limit_mv = header.detection_limit_mv
         self._doubts = doubts_of(*self._amplitudes())
 
@@ -79,7 +78,7 @@ class Recorder(Judging):
         """How long `ask` would wait now until limits and protocol allow the next stimulus [s]."""
         if self.asked is not None:
             return 0.0
-        return max(0.0, self._earliest_s(len(self.trials)) - self._clock.now_s())
+        return self._pacing.wait_s(self._protocol.interval_s(len(self.trials), self._seed))
 
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], the same until its outcome; on disk as about to be delivered before this returns.
@@ -125,14 +124,6 @@ class Recorder(Judging):
             self.strategy, self._journal.overruled = relearned(self.strategy, self.trials), False
             if self._journal.is_open:
                 self._log_estimate(len(self.trials) - 1)
-
-    def _earliest_s(self, trial: int) -> float:
-        """When limits and protocol allow a trial, by the clock [s]."""
-        last_s = self._times_s[-1] if self._times_s else self._made_s
-        return max(
-            self._limits.earliest_s(self._times_s, self._made_s),
-            last_s + self._protocol.interval_s(trial, self._seed),
-        )
 
     def tell(
         self,
@@ -271,7 +262,7 @@ class Recorder(Judging):
 
     def _conclude(self, trial: Trial) -> None:
         """Put a trial on disk, then learn it, then put on disk what is believed."""
-        self._times_s.append(self._clock.now_s())
+        self._pacing.came()
         self._journal.trial(trial)
         self._log.sync()
         learn(self.strategy, trial)

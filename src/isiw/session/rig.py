@@ -84,11 +84,6 @@ class Rig:
         """How many deliveries are still allowed."""
         return self._limited.pulses_left
 
-    @property
-    def last_s(self) -> float:
-        """When the last delivery ended, by the clock [s]."""
-        return self._limited.last_s
-
     @contextmanager
     def driven(self) -> Iterator[None]:
         """Within, no other session drives the device, and every signal disarms it.
@@ -132,9 +127,9 @@ class Rig:
         except StillArmedError as error:
             self._end_armed(error)
 
-    def wait_s(self) -> float:
-        """How long until the limits allow the next delivery [s]."""
-        return self._limited.wait_s()
+    def wait_s(self, interval_s: float = 0.0) -> float:
+        """How long until the limits, and an interval since the last delivery [s], allow the next one [s]."""
+        return self._limited.wait_s(interval_s)
 
     def check(self, stimulus: Stimulus) -> None:
         """Raise where this stimulus must not be delivered now, as `LimitedDevice.check` does."""

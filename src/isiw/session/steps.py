@@ -140,8 +140,7 @@ class Steps:
 
     def _wait_s(self) -> float:
         """How long until limits and protocol allow the next stimulus [s]."""
-        due_s = self._rig.last_s + self._header.protocol.interval_s(len(self._journal.trials), self._header.seed)
-        return max(self._rig.wait_s(), due_s - self._rig.clock.now_s())
+        return self._rig.wait_s(self._header.protocol.interval_s(len(self._journal.trials), self._header.seed))
 
     def _concluded(self, trial: Trial) -> StopDecision:
         """Learn from a delivered trial and report; each step is taken once, also where the one after is interrupted."""

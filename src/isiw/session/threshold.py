@@ -12,6 +12,7 @@ from isiw.design import VALVE_SPACE
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limited import require_real_time
 from isiw.devices.limits import Limits
+from isiw.devices.pacing import Pacing
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError, told
 from isiw.log.pulses import pulses_s
@@ -169,8 +170,7 @@ class ThresholdRecorder:
         self.search, self.header, self._log, self._clock = search, header, log, clock
         self._limits = header.limits
         self._outcomes = {outcome.trial: outcome for outcome in earlier}
-        self._made_s = clock.now_s()
-        self._times_s = [self._made_s - age_s for age_s in sorted(ages_s, reverse=True)]
+        self._pacing = Pacing(header.limits, clock, ages_s)
         self._asked: float | None = None
 
     @property
@@ -206,7 +206,7 @@ class ThresholdRecorder:
         if self._asked is None:
             self._require_left()
             intensity = self.search.ask()
-            self._clock.sleep_s(self._limits.earliest_s(self._times_s, self._made_s) - self._clock.now_s())
+            self._clock.sleep_s(self._pacing.wait_s())
             now_s = self._clock.now_s()
             self._log.append(Intent(trial=self.given, isi_ms=None, t_s=now_s, intensity_pct_mso=intensity))
             self._log.sync()
@@ -329,7 +329,7 @@ class ThresholdRecorder:
         self._log.sync()
         self._outcomes[outcome.trial] = outcome
         self._asked = None
-        self._times_s.append(self._clock.now_s())
+        self._pacing.came()
         self._learn()
 
     def _learn(self) -> None:
