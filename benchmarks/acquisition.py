@@ -21,6 +21,7 @@ from rich.progress import Progress
 
 from benchmarks.oracle import SPANS, simulate_oracle
 from benchmarks.provenance import facts_of
+from benchmarks.tables import write_tables
 from benchmarks.zero_trials import fixed_windows
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.metrics import trials_to_criterion
@@ -107,7 +108,6 @@ def reached(table: pd.DataFrame) -> pd.DataFrame:
 
 def write(rows: pd.DataFrame, facts: dict[str, object], out: Path, fixed: pd.DataFrame | None = None) -> None:
     """Tables and picture; `fixed` is what is reached without any trial, where that was measured."""
-    out.parent.mkdir(parents=True, exist_ok=True)
     table = summary(rows)
     tables = {
         "F1 by trial": table,
@@ -117,11 +117,7 @@ def write(rows: pd.DataFrame, facts: dict[str, object], out: Path, fixed: pd.Dat
         "At the stopping rule": at_stopping(rows),
     }
     tables = {title: part for title, part in tables.items() if not part.empty}
-    header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
-    parts = [f"## {title}\n\n{part.to_markdown(index=False, floatfmt='.3f')}\n" for title, part in tables.items()]
-    out.with_suffix(".md").write_text("\n".join([header, "", *parts]))
-    records = {title: json.loads(part.to_json(orient="records", double_precision=6)) for title, part in tables.items()}
-    out.with_suffix(".json").write_text(json.dumps({"facts": facts, **records}, indent=1))
+    write_tables(tables, facts, out)
     save_study_plot(table, out.with_suffix(".png"), overwrite=True)
 
 

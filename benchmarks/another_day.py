@@ -18,8 +18,9 @@ import torch
 import typer
 
 import isiw
-from benchmarks.earlier import logged_session, measured, write
+from benchmarks.earlier import logged_session, measured
 from benchmarks.provenance import facts_of
+from benchmarks.tables import write_table
 from isiw.models.particles.prior import Prior
 from isiw.studies import SimulatedSession, simulate
 from isiw.subjects import cohort
@@ -86,7 +87,7 @@ def main(
     """Measure the same people on another day."""
     units = [Unit(person, seed, earlier_trials, trials) for person in range(people)]
     rows = measured(examine, units, workers, out)
-    write(summary(rows), facts_of("another_day", "torch", "numpy", seed=seed, people=people), out)
+    write_table(summary(rows), facts_of("another_day", "torch", "numpy", seed=seed, people=people), out)
 
 
 if __name__ == "__main__":

@@ -59,17 +59,3 @@ def measured(examine: Callable[[Any], pd.DataFrame], units: Sequence[Any], worke
             pd.concat(tables).to_csv(out.with_suffix(".csv"), index=False)
             progress.advance(bar)
     return pd.concat(tables)
-
-
-def write(table: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
-    """A table under what made it, as Markdown.
-
-    Args:
-        table: the table.
-        facts: command, versions, seed and how many there were.
-        out: path of the result, without suffix.
-    """
-    header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
-    text = f"{header}\n\n{table.to_markdown(index=False, floatfmt='.3f')}\n"
-    out.with_suffix(".md").write_text(text, encoding="utf-8")
-    print(text)

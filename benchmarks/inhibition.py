@@ -26,6 +26,7 @@ import typer
 from benchmarks.inhibition_claims import all_claims, choices_of_curves
 from benchmarks.opposed_oracle import OpposedOracle
 from benchmarks.provenance import facts_of
+from benchmarks.tables import write_tables
 from isiw import DesignSpace, VisitProtocol, make_strategy
 from isiw.metrics import f1
 from isiw.subjects import RecruitmentResponse, SimulatedSubject, cohort
@@ -178,12 +179,7 @@ def main(
     tables = {"By trial": by_trial(rows), "Behind the oracle": behind_oracle(rows), "Curves": curves}
     claims = all_claims(SWEPT, seed, curves)
     facts = facts_of("inhibition", "torch", "numpy", seed=seed, people=people)
-    header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
-    parts = [f"## {title}\n\n{part.to_markdown(index=False, floatfmt='.3f')}\n" for title, part in tables.items()]
-    said = pd.DataFrame(claims).to_markdown(index=False)
-    out.with_suffix(".md").write_text("\n".join([header, "", *parts, f"## The dissertation\n\n{said}\n"]))
-    records = {title: json.loads(part.to_json(orient="records", double_precision=6)) for title, part in tables.items()}
-    out.with_suffix(".json").write_text(json.dumps({"facts": facts, **records, "claims": claims}, indent=1) + "\n")
+    write_tables(tables, facts, out, claims=claims)
     picture(tables["By trial"], curves, example, out)
 
 

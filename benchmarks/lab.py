@@ -27,8 +27,9 @@ import torch
 import typer
 
 import isiw
-from benchmarks.earlier import logged_session, measured, write
+from benchmarks.earlier import logged_session, measured
 from benchmarks.provenance import facts_of
+from benchmarks.tables import write_table
 from isiw.checks import choice
 from isiw.design import VALVE_SPACE
 from isiw.models.particles.laws import Floor, Muscle, NoiseShares
@@ -193,7 +194,7 @@ def main(  # noqa: PLR0913, PLR0917 - the options of the command line
     names = tuple(choice("the prior", name, PRIORS) for name in priors.split(","))
     units = [Unit(kind, s, people, misfits, trials, names, stated) for kind in kinds.split(",") for s in seeds]
     rows = measured(examine, units, workers, out)
-    write(summary(rows), facts_of("lab", "torch", "numpy", seed=seed, people=people), out)
+    write_table(summary(rows), facts_of("lab", "torch", "numpy", seed=seed, people=people), out)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ seeds below 1,000 are for work.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +21,7 @@ from rich.progress import Progress
 
 from benchmarks.acquisition import run, run_oracle, space_of
 from benchmarks.provenance import facts_of
+from benchmarks.tables import write_tables
 from benchmarks.zero_trials import without_any_trial
 from isiw.models.particles.prior import Prior
 from isiw.studies import Study, StudyStrategy
@@ -119,20 +119,13 @@ def main(
         rows = run(study, out.with_suffix(".study"), workers, progress)
         oracle = run_oracle(study, workers, progress)
     tables = {
-        "By trial": by_trial(rows, oracle),
-        "Without any trial": without_any_trial(study.cohorts, people, seed, study.space).set_index("cohort"),
-        "At the stopping rule": at_stopping(rows),
-        "Expected F1": foretold(rows),
+        "By trial": by_trial(rows, oracle).reset_index(),
+        "Without any trial": without_any_trial(study.cohorts, people, seed, study.space),
+        "At the stopping rule": at_stopping(rows).reset_index(),
+        "Expected F1": foretold(rows).reset_index(),
     }
     facts = facts_of("people", "torch", "numpy", seed=seed, people=people)
-    header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
-    parts = [f"## {title}\n\n{part.to_markdown(floatfmt='.3f')}\n" for title, part in tables.items()]
-    out.with_suffix(".md").write_text("\n".join([header, "", *parts]))
-    records = {
-        title: json.loads(part.reset_index().to_json(orient="records", double_precision=6))
-        for title, part in tables.items()
-    }
-    out.with_suffix(".json").write_text(json.dumps({"facts": facts, **records}, indent=1))
+    write_tables(tables, facts, out)
 
 
 if __name__ == "__main__":

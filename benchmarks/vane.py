@@ -13,7 +13,7 @@ import math
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
@@ -21,6 +21,7 @@ import typer
 from matplotlib.figure import Figure
 
 from benchmarks.provenance import facts_of
+from benchmarks.tables import write_tables
 from benchmarks.vane_claims import FULL, claims_of
 from isiw import Rotor, Vane, repeatability
 from isiw.devices.robot.vane.actuator import Load, Supply
@@ -216,27 +217,13 @@ def main(out: Annotated[Path, typer.Option(help="Path of the results, without su
     facts = facts_of("vane", "numpy", "scipy", "pandas", seed=SEED) | {"seconds for 20 x 20": round(sweep_s, 1)}
     names = ("row", "courses", "influences", "accuracy", "strokes")
     claims = claims_of(HEIGHTS_MM, DEPTHS_MM, shares, delays, dict(zip(names, tables.values(), strict=True)))
-    write(out, facts, tables | {"Claim by claim": pd.DataFrame(claims)}, shares, delays)
+    surfaces = {"heights_mm": HEIGHTS_MM, "depths_mm": DEPTHS_MM, "range_share": shares, "delay_ms": delays}
+    of_plane = {name: json.loads(pd.DataFrame(values).to_json(orient="values")) for name, values in surfaces.items()}
+    write_tables(tables, facts, out, floatfmt=".4g", claims=claims, **{"The plane": of_plane})
     save_figure(
         draw(shares, delays, tables["At a depth of 150 mm (Fig. 7.10)"]), out.with_suffix(".png"), overwrite=True
     )
     print(out.with_suffix(".md").read_text("utf-8"))
-
-
-def write(
-    out: Path, facts: dict[str, Any], tables: dict[str, pd.DataFrame], shares: FloatArray, delays: FloatArray
-) -> None:
-    """Tables and figures."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    header = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
-    parts = [f"## {title}\n\n{part.to_markdown(index=False, floatfmt='.4g')}\n" for title, part in tables.items()]
-    out.with_suffix(".md").write_text("\n".join([header, "", *parts]), "utf-8")
-    records = {title: json.loads(part.to_json(orient="records", double_precision=5)) for title, part in tables.items()}
-    claims = records.pop("Claim by claim")
-    surfaces = {"heights_mm": HEIGHTS_MM, "depths_mm": DEPTHS_MM, "range_share": shares, "delay_ms": delays}
-    of_plane = {name: json.loads(pd.DataFrame(values).to_json(orient="values")) for name, values in surfaces.items()}
-    content = {"facts": facts, "claims": claims, **records, "The plane": of_plane}
-    out.with_suffix(".json").write_text(json.dumps(content, indent=1, ensure_ascii=False), "utf-8")
 
 
 if __name__ == "__main__":
