@@ -162,7 +162,7 @@ def run_oracle(study: Study, workers: int, progress: Progress) -> pd.DataFrame:
     if not sessions:
         return pd.DataFrame()
     bar = progress.add_task("oracle", total=len(sessions))
-    return run_study(sessions, workers=workers, run=simulate_oracle, on_done=lambda _s: progress.advance(bar))
+    return run_study(sessions, workers=workers, run=simulate_oracle, on_done=lambda _s, _r: progress.advance(bar))
 
 
 def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments

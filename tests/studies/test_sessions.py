@@ -101,7 +101,7 @@ def test_the_moment_of_stopping_is_kept_with_its_f1_and_coverage() -> None:
 def test_a_study_is_the_same_in_one_process_and_in_two() -> None:
     sessions = [small(strategy, person=person) for strategy in ("even", "random") for person in (0, 1)]
     done: list[SimulatedSession] = []
-    here = run_study(sessions, on_done=done.append)
+    here = run_study(sessions, on_done=lambda session, _rows: done.append(session))
     there = run_study(sessions, workers=2)
     assert done == sessions
     pd.testing.assert_frame_equal(here.drop(columns=TIMES), there.drop(columns=TIMES))

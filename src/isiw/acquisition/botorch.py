@@ -22,14 +22,18 @@ class BotorchAcquisition:
     Args:
         make: from a BoTorch model to a BoTorch acquisition function. The model's input is the ISI [ms], so `grid_ms`
             above is a double tensor of ISIs [ms] of shape (N, 1); its outcome is on the scale of the model.
+        seed: of what BoTorch draws from torch's generator, the same for every posterior: equal posteriors have equal
+            scores, and whatever else draws from that generator is not disturbed.
     """
 
     make: Callable[[Any], Callable[[Tensor], Tensor]]
+    seed: int = 0
     needs: ClassVar[tuple[type, ...]] = (HasBotorchModel,)
 
     def __call__(self, posterior: HasBotorchModel, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs, one at a time, shape (b, t)."""
         inputs = isi_ms.double()[:, None, None]
-        with torch.no_grad():
+        with torch.no_grad(), torch.random.fork_rng(devices=[]):
+            torch.default_generator.manual_seed(self.seed)
             scores = [self.make(posterior.botorch_model(person))(inputs) for person in range(posterior.people)]
         return torch.stack(scores)

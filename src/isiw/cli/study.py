@@ -45,7 +45,7 @@ def run(
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on.", **NO_DEFAULT)] = None,
     retry: Annotated[bool, typer.Option(help="Run what failed again.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
-    """Run a study, or what is left of it."""
+    """Run a study, or what is left of it. The exit code is 1 where sessions failed."""
     with errors_reported():
         studies, store = isiw.studies, _store(source, out)
         folder = store.folder
@@ -55,6 +55,8 @@ def run(
         with errors_reported(kept), _bar(store.left(retry=retry)) as on_done:
             studies.conduct(store.study, folder, executor, retry=retry, on_done=on_done)
         _say_what_is_there(store)
+        if len(store.errors()):
+            raise typer.Exit(1)
 
 
 @app.command()

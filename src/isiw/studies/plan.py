@@ -21,9 +21,10 @@ from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias, get_args
 
 import pandas as pd
+import torch
 
-from isiw.checks import check_choice, check_numbers, check_wholes, whole
-from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.checks import check_choice, check_numbers, check_wholes, text, whole
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.strategy.catalogue import settings_for
 from isiw.strategy.settings.common import settings_values
@@ -76,6 +77,10 @@ class StudyStrategy:
     label: str = ""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.settings, Mapping):
+            raise InvalidValueError(
+                "settings are a mapping of names to values", got=self.settings, expected="such as {'particles': 500}"
+            )
         chosen = settings_values(settings_for(self.name, **self.settings))
         if unset := [key for key in self.settings if key not in chosen]:  # what a rig states could take its place
             raise InvalidValueError(
@@ -86,7 +91,7 @@ class StudyStrategy:
         kept = {key: chosen[key] for key in self.settings}
         object.__setattr__(self, "settings", kept)
         object.__setattr__(self, "label", self.label or self.name)
-        if not re.fullmatch(r"[\w.+-]+", self.label):
+        if not re.fullmatch(r"[\w.+-]+", text("label", self.label)):
             raise InvalidValueError(
                 "a label is part of a file's name", got=self.label, expected="letters, digits, and any of _ . + -"
             )
@@ -127,7 +132,7 @@ class Study:
         trials: how many trials a session has at most.
         marks: after which trials the estimate is recorded, 0 being before any; by default each fifth and the last.
             Trials that were told count, no mistrials.
-        space: the design space.
+        space: the design space; `"valve"` and `"impact"` are those of all benchmarks.
         stopping: whether a strategy's stopping rule is `"ignored"`, or it is `"noted"` when it fires (an estimate
             after each trial), or `"ends"` the session.
         engine: `"single"`, one session at a time, or `"batched"`, people side by side.
@@ -166,6 +171,10 @@ class Study:
         if not self.marks:
             object.__setattr__(self, "marks", (*range(5, self.trials, 5), self.trials))
         check_numbers(self, "amplitude", above=0)
+        if isinstance(self.space, str) and self.space in _SPACES:
+            object.__setattr__(self, "space", _SPACES[self.space])
+        require_space(self.space)
+        _require_torch_device(self.device)
         if list(self.marks) != sorted(set(self.marks)) or not 0 <= self.marks[0] <= self.marks[-1] <= self.trials:
             raise InvalidValueError("marks ascend from 0 to the number of trials", got=self.marks)
         check_choice(self, "stopping", get_args(Stopping))
@@ -219,6 +228,15 @@ class Study:
     def _unit(self, sessions: tuple[SimulatedSession, ...]) -> Unit:
         first, last = sessions[0], f"-{sessions[-1].person:05d}" if self.engine == "batched" else ""
         return Unit(f"{first.label}.{first.cohort}.{first.person:05d}{last}", sessions, self.engine, self.device)
+
+
+def _require_torch_device(device: str) -> None:
+    try:
+        torch.device(text("device", device))
+    except RuntimeError as error:
+        raise InvalidValueError(
+            "torch has no such device", got=device, expected="cpu, or cuda where there is"
+        ) from error
 
 
 def load_study(path: str | Path) -> Study:

@@ -6,12 +6,14 @@ import itertools
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StudyError
+from isiw.studies.code import code_checksum
 from isiw.studies.execution import Executor, Failure, Processes
 from isiw.studies.plan import Study, Unit, run_unit
 from isiw.studies.sessions import TIMES, SimulatedSession, simulate
@@ -38,19 +40,35 @@ def conduct(
         on_done: called after each unit, once it is kept.
 
     Raises:
-        StudyError: the folder is another study's, is being run by another process, or cannot be written, or the
-            executor is lost.
+        InvalidValueError: something else than an executor.
+        StudyError: the folder is another study's or was begun with other code, is being run by another process, or
+            cannot be written, or the executor is lost.
     """
+    if executor is not None and not callable(getattr(executor, "results", None)):
+        raise InvalidValueError("no executor", got=executor, expected="Processes(workers), or a DaskCluster")
     store = begin_store(study, folder)
+    left = store.left(retry=retry)
+    if left:
+        store.require_same_code()
+    run = partial(_run_with, code_checksum())
     # Closed at once where it is interrupted, so that no worker goes on in vain.
-    with (
-        store.locked(),
-        closing((executor or Processes()).results(run_unit, store.left(retry=retry))) as results,
-    ):
+    with store.locked(), closing((executor or Processes()).results(run, left)) as results:
         for unit, result in results:
             store.keep(unit, result)
             on_done(unit, result)
     return store
+
+
+def _run_with(code: str, unit: Unit) -> pd.DataFrame:
+    """Run a unit, where it is handed to, with the code of the process that hands it out."""
+    if code_checksum() != code:
+        raise StudyError(
+            "the worker has other code of isiw than the process that runs the study",
+            got=code_checksum(),
+            expected=code,
+            remedy="Install the same isiw for all workers, then run the study again with --retry.",
+        )
+    return run_unit(unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,30 +137,31 @@ def run_study(
     *,
     workers: int = 1,
     run: Callable[[SimulatedSession], pd.DataFrame] = simulate,
-    on_done: Callable[[SimulatedSession], None] = lambda _session: None,
+    on_done: Callable[[SimulatedSession, pd.DataFrame], None] = lambda _session, _rows: None,
 ) -> pd.DataFrame:
-    """Run sessions to one table, without a folder.
+    """Run sessions to one table, without a folder. One that fails ends none of the others.
 
     Args:
         sessions: the sessions.
         workers: how many processes; 1 runs them here.
         run: runs one session; importable where it is to run in another process.
-        on_done: called after each session, for progress.
+        on_done: called after each session with its rows, for progress, and to keep them.
 
     Returns:
         One row a mark of each session, sorted; columns as in `isiw.studies.sessions.examine`.
 
     Raises:
         InvalidValueError: no sessions, or fewer than one worker.
-        StudyError: a session failed, or `run` gave no rows of it.
+        StudyError: sessions failed, once the others are done, or `run` gave no rows of one.
     """
     if not sessions:
         raise InvalidValueError("a study needs sessions", got=sessions, remedy="paired_sessions(...) makes some.")
     keys = ["strategy", "cohort", "person", "trial"]
-    tables = []
+    tables, failed = list[pd.DataFrame](), list[tuple[SimulatedSession, Failure]]()
     for session, result in Processes(workers).results(run, sessions):
         if isinstance(result, Failure):
-            raise StudyError(f"a session failed: {result.error}", got=session, remedy=result.details)
+            failed.append((session, result))
+            continue
         if not (isinstance(result, pd.DataFrame) and {*keys} <= {*result.columns}):
             raise StudyError(
                 "what runs a session gave no rows of it",
@@ -151,7 +170,14 @@ def run_study(
                 remedy="Return what play(session, player) gives.",
             )
         tables.append(result)
-        on_done(session)
+        on_done(session, result)
+    if failed:
+        session, first = failed[0]
+        raise StudyError(
+            f"{len(failed)} of {len(sessions)} sessions failed, the first with: {first.error}",
+            got=session,
+            remedy=f"on_done was given the rows of the others. {first.details}",
+        )
     return pd.concat(tables, ignore_index=True).sort_values(keys, ignore_index=True)
 
 

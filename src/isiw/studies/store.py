@@ -1,13 +1,14 @@
 """The folder of a study: its configuration, and a part for each unit of work that is finished.
 
-    study.toml                   the study, its checksum, and the versions that it was made with
+    study.toml                   the study, its checksum, and the versions and the code that it was made with
     parts/KEY.CHECKSUM.parquet   the rows of a unit
     errors/KEY.CHECKSUM.parquet  what became of a unit that failed, one row a person
 
 Each file is written beside its place, synced, and renamed into it by the process that runs the study, so that a file
-is whole or not there; its name holds the CRC-32 of its bytes, which tells whether it was damaged later. What is left
-over of a write that was cut off is written over when the unit is run again. One process at a time runs a study: while
-it does, it has `study.toml` locked.
+is whole or not there; its name holds the CRC-32 of its bytes, which tells whether it was damaged later. A part holds
+the checksum of its study, so that no other study takes its rows for its own. What is left over of a write that was
+cut off is written over when the unit is run again. One process at a time runs a study: while it does, it has
+`study.toml` locked.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,6 +33,7 @@ import isiw
 from isiw.errors import StudyError
 from isiw.log.durable import put
 from isiw.log.locks import claim
+from isiw.studies.code import code_checksum
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Study, Unit, study_from, study_values
 from isiw.text.commands import command
@@ -39,6 +42,9 @@ from isiw.text.toml_files import read_toml
 __all__ = ["Store", "begin_store", "open_store"]
 
 _KEYS: Final = ["strategy", "cohort", "person", "trial"]
+
+_OF_STUDY: Final = b"isiw_study"
+"""Where a part names its study."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +83,7 @@ class Store:
         with _disk_errors(self.folder):
             kinds = ["errors"] if failed else ["parts", "errors"]
             outdated = {files[unit.key] for files in map(self._files, kinds) if unit.key in files}
-            written = _write(self.folder / kinds[0], unit.key, rows)
+            written = _write(self.folder / kinds[0], unit.key, rows, self._state)
             for path in outdated - {written}:
                 path.unlink(missing_ok=True)
 
@@ -99,12 +105,13 @@ class Store:
 
     def rows(self) -> pd.DataFrame:
         """All rows of the finished units, sorted; empty where there are none."""
-        return _table(self._files("parts").values(), _KEYS)
+        return _table(self._files("parts").values(), _KEYS, self._state)
 
     def errors(self) -> pd.DataFrame:
         """The people whose units failed: strategy, cohort, person, unit, error, details; sorted."""
         done = self._files("parts")
-        return _table((path for key, path in self._files("errors").items() if key not in done), _KEYS[:3])
+        failed = (path for key, path in self._files("errors").items() if key not in done)
+        return _table(failed, _KEYS[:3], self._state)
 
     def unit(self, key: str) -> Unit:
         """The unit of a key.
@@ -116,6 +123,26 @@ class Store:
             if unit.key == key:
                 return unit
         raise StudyError("the study has no such unit", got=key, remedy="The rows have their units in the column unit.")
+
+    def require_same_code(self) -> None:
+        """Raise where other code would go on than began: its rows do not belong into one table.
+
+        Raises:
+            StudyError: isiw was changed since, though its version was not.
+        """
+        began_with = read_toml(self.folder / "study.toml").get("versions", {}).get("code")
+        if began_with not in {None, code_checksum()}:
+            raise StudyError(
+                f"isiw was changed since {self.folder} was begun: new rows may not belong to those that are there",
+                got=f"code {code_checksum()}",
+                expected=f"code {began_with}",
+                remedy="Go back to that code, or begin in another folder. If you know that the change cannot matter, "
+                "take the line `code` out of study.toml.",
+            )
+
+    @cached_property
+    def _state(self) -> str:
+        return _state(study_values(self.study))
 
     def _files(self, kind: str) -> dict[str, Path]:
         """The files of a kind, by their unit's key, in its order."""
@@ -136,6 +163,11 @@ def begin_store(study: Study, folder: str | Path) -> Store:
     store = Store(study, Path(folder))
     if (store.folder / "study.toml").exists():
         return _same(store, open_store(folder))
+    if any(store.folder.glob("parts/*.parquet")):
+        raise StudyError(
+            f"{folder} has sessions of a study, but not its study.toml",
+            remedy="Put that file back, or choose another folder.",
+        )
     values = study_values(study)
     text = tomli_w.dumps(values | {"checksum": _state(values), "versions": _versions()})
     with _disk_errors(store.folder):
@@ -194,7 +226,7 @@ def _same(store: Store, kept: Store) -> Store:
 
 def _versions() -> dict[str, str]:
     made_with = {module.__name__: str(module.__version__) for module in (isiw, np, torch, pd)}
-    return made_with | {"python": platform.python_version()}
+    return made_with | {"python": platform.python_version(), "code": code_checksum()}
 
 
 def _error_rows(unit: Unit, failure: Failure) -> pd.DataFrame:
@@ -224,31 +256,39 @@ def _disk_errors(folder: Path) -> Iterator[None]:
         ) from error
 
 
-def _table(paths: Iterable[Path], order: Sequence[str]) -> pd.DataFrame:
-    parts = [_read(path) for path in paths]
+def _table(paths: Iterable[Path], order: Sequence[str], state: str) -> pd.DataFrame:
+    parts = [_read(path, state) for path in paths]
     if not parts:
         return pd.DataFrame()
     table: pd.DataFrame = pa.concat_tables(parts).to_pandas()
     return table.sort_values(list(order), ignore_index=True)
 
 
-def _read(path: Path) -> pa.Table:
+def _read(path: Path, state: str) -> pa.Table:
     try:
         content = path.read_bytes()
         if path.suffixes[-2:-1] != [f".{_checksum(content)}"]:
             raise pa.ArrowInvalid("its checksum fails")
-        return pq.read_table(pa.BufferReader(content))
+        part = pq.read_table(pa.BufferReader(content))
     except (pa.ArrowException, OSError) as error:
         raise StudyError(
             f"a part of the study is damaged, or cannot be read: {error}",
             got=str(path),
             remedy="Delete that file and run the study again; only its people are computed anew.",
         ) from error
+    if (part.schema.metadata or {}).get(_OF_STUDY) not in {None, state.encode()}:  # None before parts named it
+        raise StudyError(
+            "a part in the study's folder is of another study",
+            got=str(path),
+            remedy="Move that file away and run the study again.",
+        )
+    return part
 
 
-def _write(folder: Path, key: str, rows: pd.DataFrame) -> Path:
-    sink = pa.BufferOutputStream()
-    pq.write_table(pa.Table.from_pandas(rows, preserve_index=False), sink)
+def _write(folder: Path, key: str, rows: pd.DataFrame, state: str) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)  # version control keeps no empty folders
+    sink, part = pa.BufferOutputStream(), pa.Table.from_pandas(rows, preserve_index=False)
+    pq.write_table(part.replace_schema_metadata({**(part.schema.metadata or {}), _OF_STUDY: state}), sink)
     content = sink.getvalue().to_pybytes()
     path = folder / f"{key}.{_checksum(content)}.parquet"
     put(path, content, replacing=True, through=folder / f"{key}.part")

@@ -17,12 +17,13 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
         errors: the people whose units failed, as `Store.errors` gives them.
 
     Returns:
-        Sorted by cohort, strategy and trial: people; mean F1 and its standard error; shares of the people with a window
-        whose start and end lie in the 90 % intervals; share reported to have no window; mean of the pairs delivered;
-        mean of the pairs after which the stopping rule fired and of the F1 then, over those for whom it did; the same
-        over all, where those for whom it has not count as they stand at this mark (`end_delivered`, `end_f1`; NaN where
-        the rule is ignored); share for whom it did so before the budget was used up; people without rows because they
-        failed; median time of an ask and a tell [ms]. A strategy that failed for everybody has one row, at trial 0.
+        Sorted by cohort, strategy and trial: people; mean F1 and its standard error; shares of the people with
+        a window whose start and end lie in the 90 % intervals; share to whom no window is reported, as where a
+        method has no answer yet; mean of the pairs delivered; mean of the pairs after which the stopping rule
+        fired and of the F1 then, over those for whom it did; the same over all, where those for whom it has not
+        count as they stand at this mark (`end_delivered`, `end_f1`; NaN where the rule is ignored); share for
+        whom it did so before the budget was used up; people without rows because they failed; median time of an
+        ask and a tell [ms]. A strategy that failed for everybody has one row, at trial 0.
     """
     failed = errors.groupby(_GROUP[:2]).size() if len(errors) else pd.Series(dtype="int64")
     table = _means(rows) if len(rows) else pd.DataFrame(columns=[*_GROUP, "people"])
@@ -40,11 +41,7 @@ def _means(rows: pd.DataFrame) -> pd.DataFrame:
         "end_delivered": rows["stop_trial"].mask(going_on & ~ignored, rows["delivered"]),
         "end_f1": rows["stop_f1"].mask(going_on & ~ignored, rows["f1"]),
     }
-    answered = (
-        rows["answered"].fillna(value=True) if "answered" in rows else True
-    )  # studies from before the column have none
-    none = ~rows["reported_window"].astype(bool) & answered
-    groups = rows.assign(**at_end, called_none=none.astype(float)).groupby(_GROUP)
+    groups = rows.assign(**at_end, called_none=~rows["reported_window"].astype(bool)).groupby(_GROUP)
     return pd.DataFrame(
         {
             "people": groups.size(),

@@ -30,6 +30,7 @@ class FittedCurve:
         dof: degrees of freedom of that SD.
         trouble: what went wrong, and what stands in for it, as full sentences; None where nothing did.
         amplitudes_mv: of the Gaussians that the curve is made of, largest first; empty where it is not made of any.
+        fitted: whether trials determine it; where they do not, a curve stands in that says nothing of a window.
     """
 
     grid_ms: FloatArray
@@ -40,6 +41,7 @@ class FittedCurve:
     dof: float = math.inf
     trouble: str | None = None
     amplitudes_mv: tuple[float, ...] = ()
+    fitted: bool = True
 
     def confidence_mv(self, level: float) -> tuple[FloatArray, FloatArray]:
         """The interval that holds the expected MEP with this confidence [mV], each shape (t,)."""

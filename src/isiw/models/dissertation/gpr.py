@@ -90,6 +90,7 @@ class GaussianProcessRegression:
             samples_mv=np.stack([np.interp(grid, support, curve) for curve in drawn]) * scale_mv,
             noise_sd_mv=noise * scale_mv,
             trouble=trouble,
+            fitted=len(isi_ms) > 0,
         )
 
     def _process(self, isi: FloatArray, scaled: FloatArray) -> tuple[Any, float, str | None]:

@@ -73,6 +73,7 @@ class _Estimate(NamedTuple):
     noise_sd_mv: float
     dof: float = math.inf
     trouble: str | None = None
+    fitted: bool = True
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,7 @@ class NonlinearRegression:
             dof=estimate.dof,
             trouble=estimate.trouble,
             amplitudes_mv=tuple(sorted(estimate.parameters[::3].tolist(), reverse=True)),
+            fitted=estimate.fitted,
         )
 
     def _beliefs(self, space: DesignSpace, amplitude_mv: float, rng: np.random.Generator) -> _Beliefs:
@@ -174,7 +176,7 @@ class NonlinearRegression:
         if free < 1:
             flat = beliefs.start * np.tile([0.0, 1.0, 1.0], self.peaks)
             trouble = f"{len(isi_ms)} trials do not determine {len(flat)} parameters: a flat curve stands in."
-            return _Estimate(flat, np.diag(beliefs.sd**2), float(beliefs.sd[0]), trouble=trouble)
+            return _Estimate(flat, np.diag(beliefs.sd**2), float(beliefs.sd[0]), trouble=trouble, fitted=False)
         found = least_squares(
             partial(_residuals_mv, isi_ms, excess_mv),
             beliefs.start,

@@ -177,7 +177,9 @@ class RegressionPosterior:
         return low + self.floors_mv[person], high + self.floors_mv[person]
 
     def estimate(self, person: int = 0) -> WindowEstimate:
-        """The window of one person."""
+        """The window of one person; there is no answer yet where no curve is fitted."""
+        if not self.curves[person].fitted:
+            return WindowEstimate(probability=None, window=None)
         curve, floor_mv = self.curves[person], float(self.floors_mv[person])
         low, high = curve.confidence_mv(0.9)
         return WindowEstimate(

@@ -53,7 +53,7 @@ class SupportVectorRegression:
         if not len(isi_ms):
             flat = np.zeros(len(grid))
             trouble = "There are no trials to fit yet: a flat curve stands in."
-            return FittedCurve(grid, flat, flat, np.tile(flat, (self.committee, 1)), 0.0, trouble=trouble)
+            return FittedCurve(grid, flat, flat, np.tile(flat, (self.committee, 1)), 0.0, trouble=trouble, fitted=False)
         scale_mv = max(float(np.abs(excess_mv).max()), LEAST_SCALE_MV)
         regression = SVR(C=self.c, epsilon=self.epsilon, gamma=0.5 / self.length_ms**2)
         isi, scaled = isi_ms[:, None], excess_mv / scale_mv
