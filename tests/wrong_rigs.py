@@ -13,13 +13,15 @@ from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import SimulatedDevice
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Channel, Stimulus, Sweep
+from isiw.types import Reference
 
 SPACE = DesignSpace(0, 320, reference="impact")
 
 
 def tapper(seed: int = 0, *, accelerometer: bool = True, name: str = "gaussian") -> Tapper:
     person = cohort(name, seed + 1, 700)[seed].begin(seed)
-    settings = TapperSettings(accelerometer=accelerometer, rate_hz=3000.0)
+    reference: Reference = "impact" if accelerometer else "valve"
+    settings = TapperSettings(reference=reference, accelerometer=accelerometer, rate_hz=3000.0)
     return Tapper(lambda isi_ms: person.respond(isi_ms, "impact"), "subject1", settings, seed=seed)
 
 

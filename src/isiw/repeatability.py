@@ -11,6 +11,7 @@ of those SDs away. So there are two presets of the cushion. `cushion` has Gaussi
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -122,8 +123,8 @@ def hit_delay_ms(study: TimingStudy) -> tuple[float, float] | None:
     """From the valve command to the impact, as a strategy can be told [ms]; None where no impact was found.
 
     Returns:
-        The mean, and the SD of another person's about it: what people differ by on the tapping robot, and the standard
-        error of the mean.
+        The mean, and the SD of another person's about it: what two people differ by on the tapping robot, and the
+        standard error of the mean.
     """
     if not isinstance(study.events, TapEvents):
         return None
@@ -131,7 +132,7 @@ def hit_delay_ms(study: TimingStudy) -> tuple[float, float] | None:
     if not hits_ms.size:
         return None
     error_ms = hits_ms.std(ddof=1) / np.sqrt(hits_ms.size) if hits_ms.size > 1 else 0.0
-    return float(hits_ms.mean()), float(np.hypot(HIT_DELAY_SD_MS, error_ms))
+    return float(hits_ms.mean()), float(np.hypot(math.sqrt(2.0) * HIT_DELAY_SD_MS, error_ms))
 
 
 def event_table(events: TapEvents | RotationEvents) -> pd.DataFrame:

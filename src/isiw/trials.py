@@ -128,7 +128,8 @@ class Sweep:
         t_valve_ms: the valve command [ms]; None where unknown.
         t_tms_ms: the magnetic pulse [ms]; None where unknown.
         t_hit_ms: the impact, where the device measures it [ms]; None to have it found in the waveforms.
-        isi_sd_ms: SD of the realised ISI where the impact is not measured [ms].
+        isi_sd_ms: SD of the realised ISI where the impact is not measured [ms]: of what varies from trial to trial. An
+            error that all trials share is none of it; count from the valve command where the impact is not known.
 
     Raises:
         InvalidValueError: channels that are none, a time that is not finite, or an SD that is negative or larger than
@@ -160,7 +161,7 @@ class Measurement:
     Args:
         mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 means below the detection limit.
         isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone.
-        isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
+        isi_sd_ms: SD of the realised ISI, of what varies from trial to trial [ms]; 0 where it was measured.
         background_rms_uv: EMG before the pulse [µV RMS], where known.
         t_valve_ms: time of the valve command [ms], where known.
         t_hit_ms: time of the impact [ms], where known.

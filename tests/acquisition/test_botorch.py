@@ -10,6 +10,7 @@ import pytest
 import torch
 from botorch.acquisition.active_learning import qNegIntegratedPosteriorVariance
 from botorch.acquisition.analytic import AnalyticAcquisitionFunction, LogExpectedImprovement
+from botorch.acquisition.max_value_entropy_search import qMaxValueEntropy
 
 from isiw.acquisition.botorch import BotorchAcquisition
 from isiw.design import VALVE_SPACE
@@ -87,6 +88,13 @@ def test_expected_improvement_is_at_the_peak() -> None:
 
     scores = BotorchAcquisition(improvement)(one_peak(26), CANDIDATES)[0]
     assert 200 <= CANDIDATES[scores.argmax()] <= 300
+
+
+def test_what_botorch_draws_is_the_same_each_time_and_disturbs_nobody() -> None:
+    acquisition = BotorchAcquisition(lambda model: qMaxValueEntropy(model, GRID_MS))
+    posterior, state = one_peak(12), torch.get_rng_state()
+    torch.testing.assert_close(acquisition(posterior, CANDIDATES), acquisition(posterior, CANDIDATES), rtol=0, atol=0)
+    assert torch.equal(torch.get_rng_state(), state)
 
 
 def test_a_strategy_asks_by_it() -> None:

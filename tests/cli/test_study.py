@@ -133,6 +133,8 @@ def test_sessions_that_failed_are_told_by_their_error(folder: Path) -> None:
     result = study("summary", folder)
     assert "2 sessions failed:" in result.output
     assert "even: RuntimeError: stuck (1 sessions)" in result.output
+    assert study("run", folder).exit_code == 1
+    assert study("run", folder, "--retry").exit_code == 0
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,8 @@ def faults_of(device: SimulatedDevice, isis_ms: Sequence[float | None] = ISIS_MS
     device.stage()
     stimuli = [Stimulus(trial, isi_ms) for trial, isi_ms in enumerate(isis_ms)]
     sweeps = [instance(Sweep, device.deliver(stimulus, 1.0)) for stimulus in stimuli]
-    return [likely_fault(sweep, judge(sweep, stimulus, SPACE)) for sweep, stimulus in zip(sweeps, stimuli, strict=True)]
+    space = replace(SPACE, reference=device.describe().reference)
+    return [likely_fault(sweep, judge(sweep, stimulus, space)) for sweep, stimulus in zip(sweeps, stimuli, strict=True)]
 
 
 @pytest.mark.parametrize("wrong", WRONG)

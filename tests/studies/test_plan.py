@@ -148,3 +148,21 @@ def test_what_the_rig_states_is_told_where_a_study_says_so() -> None:
     assert settings("stated", IMPACT_SPACE) == [{}, {"conditioning": "electrical"}]
     delay = {"hit_delay_ms": (180.0, 6.0)}
     assert settings("stated", VALVE_SPACE) == [delay, delay | {"conditioning": "electrical"}]
+
+
+def test_spaces_have_names_in_python_too() -> None:
+    assert tiny(space="impact").space == IMPACT_SPACE
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"space": "impacts"}, {"space": None}, {"device": "tpu"}, {"device": 5}, {"strategies": ("even", 5)}]
+)
+def test_what_no_session_could_run_with_is_refused_at_once(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InvalidValueError):
+        tiny(**wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"label": 5}, {"settings": 5}, {"settings": [("particles", 5)]}])
+def test_a_strategy_with_an_impossible_label_or_settings_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InvalidValueError):
+        StudyStrategy("nr", **wrong)

@@ -17,7 +17,7 @@ import psutil
 import pytest
 
 from disks import no_room
-from isiw.errors import ConfigError, StudyError
+from isiw.errors import ConfigError, InvalidValueError, StudyError
 from isiw.log import durable
 from isiw.studies import (
     Processes,
@@ -28,10 +28,12 @@ from isiw.studies import (
     load_study,
     open_store,
     replay,
+    run_unit,
     sessions,
     unit_of_row,
 )
 from isiw.studies import plan as plan_module
+from isiw.studies import running as running_module
 from isiw.studies import store as store_module
 from isiw.studies.plan import Engine, Unit
 from isiw.studies.sessions import SimulatedSession
@@ -97,6 +99,30 @@ def test_a_folder_of_another_version_is_refused(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace('isiw = "', 'isiw = "9.'))
     with pytest.raises(StudyError, match="another version of isiw; got '9"):
         begin_store(tiny(), tmp_path)
+
+
+def test_other_code_adds_no_rows_to_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = begin_store(tiny(), tmp_path)
+    unit = begun.left()[0]
+    begun.keep(unit, run_unit(unit))
+    monkeypatch.setattr(store_module, "code_checksum", lambda: "00000000")
+    with pytest.raises(StudyError, match="was changed since"):
+        conduct(tiny(), tmp_path)
+    assert open_store(tmp_path).rows().equals(begun.rows())
+
+
+def test_a_worker_with_other_code_fails_its_units(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    checksums = iter(["11111111"])  # of who hands out; then that of the worker
+    monkeypatch.setattr(running_module, "code_checksum", lambda: next(checksums, "22222222"))
+    store = conduct(tiny(), tmp_path)
+    assert not len(store.rows())
+    assert set(store.errors()["error"].str.contains("the worker has other code")) == {True}
+
+
+def test_what_is_no_executor_is_refused_before_anything_is_made(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match="Processes"):
+        conduct(tiny(), tmp_path / "s", 2)  # type: ignore[arg-type] # which is what is tested
+    assert not (tmp_path / "s").exists()
 
 
 def test_a_folder_without_a_study_is_an_error(tmp_path: Path) -> None:

@@ -98,6 +98,20 @@ def test_the_moment_of_stopping_is_kept_with_its_f1_and_coverage() -> None:
     assert early["stop_start_covered"] == late["stop_start_covered"] == early["start_covered"]
 
 
+def test_a_session_that_fails_ends_none_of_the_others() -> None:
+    sessions = [small(person=person) for person in range(3)]
+    kept: dict[int, pd.DataFrame] = {}
+
+    def run(session: SimulatedSession) -> pd.DataFrame:
+        if session.person == 1:
+            raise RuntimeError("the sweep is stuck")
+        return simulate(session)
+
+    with pytest.raises(StudyError, match="1 of 3 sessions failed, the first with: RuntimeError: the sweep is stuck"):
+        run_study(sessions, run=run, on_done=lambda session, rows: kept.update({session.person: rows}))
+    assert {person: set(rows["person"]) for person, rows in kept.items()} == {0: {0}, 2: {2}}
+
+
 def test_a_study_is_the_same_in_one_process_and_in_two() -> None:
     sessions = [small(strategy, person=person) for strategy in ("even", "random") for person in (0, 1)]
     done: list[SimulatedSession] = []

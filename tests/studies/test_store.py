@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -94,3 +96,43 @@ def test_a_folder_of_before_there_was_a_checksum_can_be_opened(store: Store) -> 
     file = store.folder / "study.toml"
     file.write_text(re.sub(r"(?m)^checksum = .*$", "", file.read_text()))
     assert open_store(store.folder).study == store.study
+
+
+def test_a_part_of_another_study_is_refused(store: Store, tmp_path: Path) -> None:
+    other = begin_store(replace(store.study, seed=store.study.seed + 1), tmp_path / "other")
+    unit = other.left()[0]
+    other.keep(unit, rows_of(unit))
+    (part,) = (other.folder / "parts").iterdir()
+    shutil.copy(part, store.folder / "parts")
+    with pytest.raises(StudyError, match="is of another study") as refused:
+        store.rows()
+    assert part.name in str(refused.value)
+    assert len(other.rows()) == 2
+
+
+def test_sessions_without_their_study_are_not_taken_for_another_ones(store: Store) -> None:
+    unit = store.left()[0]
+    store.keep(unit, rows_of(unit))
+    (store.folder / "study.toml").unlink()
+    with pytest.raises(StudyError, match=r"not its study\.toml"):
+        begin_store(store.study, store.folder)
+
+
+def test_empty_folders_that_version_control_left_out_are_made_again(store: Store) -> None:
+    for kind in ("parts", "errors"):
+        (store.folder / kind).rmdir()
+    kept, failed = store.left()[:2]
+    store.keep(kept, rows_of(kept))
+    store.keep(failed, Failure("ValueError: no air"))
+    again = open_store(store.folder)
+    assert (len(again.rows()), len(again.errors())) == (2, 1)
+
+
+def test_a_folder_that_other_code_began_is_read_and_not_gone_on_with(store: Store) -> None:
+    path = store.folder / "study.toml"
+    path.write_text(re.sub(r'code = "\w+"', 'code = "00000000"', path.read_text()))
+    again = open_store(store.folder)
+    with pytest.raises(StudyError, match="was changed since"):
+        again.require_same_code()
+    path.write_text(re.sub(r'code = "\w+"\n', "", path.read_text()))
+    again.require_same_code()

@@ -51,8 +51,9 @@ def mutual_information(posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
 def window_information(posterior: ForeseesWindows, isi_ms: Tensor, cells: int = 5) -> Tensor:
     """Mutual information of the next MEP and the window alone [nat], shape (b, t).
 
-    The window is described as precisely as the samples allow: the quantile cell of its start and of its end, or that
-    there is none. Whatever else differs among the samples of a cell is averaged out.
+    The window is described as precisely as the samples allow: the quantile cell of its start and of its end, or
+    that there is none. Whatever else differs among the samples of a cell is averaged out, as far as a cell has
+    many: with few samples the value is too high, by .01 to .04 nat with 192, and good for comparing ISIs only.
 
     Args:
         posterior: what is believed.

@@ -23,6 +23,7 @@ from isiw.models.protocol import (
     SamplesProfiles,
     SamplesWindows,
 )
+from isiw.strategy.catalogue import make_strategy
 from isiw.types import FloatArray
 from known import known
 from models.told_trials import bell_mv, observation, told, trials_of
@@ -118,6 +119,15 @@ def test_an_estimate_claims_no_probability_and_no_posterior_of_the_edges() -> No
     estimate = told(NR, NOISY).estimate()
     assert estimate.probability is None
     assert estimate.interval() is None
+
+
+@pytest.mark.parametrize(("name", "answers_from"), [("nr", 4), ("nr2", 7), ("svmr", 1), ("gpr", 1)])
+def test_there_is_no_answer_before_trials_determine_a_curve(name: str, answers_from: int) -> None:
+    strategy = make_strategy(name)
+    for trial in range(answers_from):
+        assert not strategy.estimate().has_answer, trial
+        strategy.tell(strategy.ask(), 0.01 + 0.001 * (trial % 3))
+    assert strategy.estimate().has_answer
 
 
 def test_a_response_without_its_amplitude_is_refused() -> None:

@@ -44,7 +44,7 @@ class TapperSettings:
     Args:
         reference: the event that commanded ISIs count from.
         trigger: "open-loop" schedules the pulse from the predicted impact, "impact" triggers it by the detected one.
-        accelerometer: whether the hammer has one; without it the impact is predicted, never measured.
+        accelerometer: whether the hammer has one; without it ISIs count from the valve command.
         rate_hz: sampling rate of all channels [Hz].
         expected_hit_ms: what is known of a person's hit delay before the first tap [ms].
         expected_hit_sd_ms: its SD from person to person [ms].
@@ -53,8 +53,8 @@ class TapperSettings:
             recorded all the same.
 
     Raises:
-        InvalidValueError: an unknown reference or trigger, a value that is not positive, a negative jitter, or an
-            impact trigger without accelerometer.
+        InvalidValueError: an unknown reference or trigger, a value that is not positive, a negative jitter, or without
+            an accelerometer ISIs that count from the impact, or a pulse that it triggers.
     """
 
     reference: Reference = "impact"
@@ -73,12 +73,12 @@ class TapperSettings:
         check_numbers(self, "pulse_jitter_ms", least=0)
         if self.trigger == "impact" and not self.accelerometer:
             raise InvalidValueError("the impact cannot trigger a pulse without an accelerometer to find it")
-
-    @property
-    def blind_isi_sd_ms(self) -> float:
-        """SD of an ISI whose impact is not measured [ms]; from the valve command only the taps vary, not the person."""
-        person_ms = self.expected_hit_sd_ms if self.reference == "impact" else 0.0
-        return math.hypot(person_ms, self.expected_tap_sd_ms)
+        if self.reference == "impact" and not self.accelerometer:
+            raise InvalidValueError(
+                "without an accelerometer ISIs cannot count from the impact: when the hammer hits this person is not "
+                "known, and every ISI would be wrong by the same",
+                remedy='Count from the valve command: TapperSettings(reference="valve", accelerometer=False).',
+            )
 
 
 class HitDelay:
@@ -207,7 +207,7 @@ class Tapper:
             t_valve_ms=VALVE_MS,
             t_tms_ms=None if pulse_ms is None else VALVE_MS + pulse_ms,
             t_hit_ms=VALVE_MS + predicted_ms if blind else None,
-            isi_sd_ms=self.settings.blind_isi_sd_ms if blind else 0.0,
+            isi_sd_ms=self.settings.expected_tap_sd_ms if blind else 0.0,
         )
 
     def _jitter_ms(self, rng: np.random.Generator) -> float:

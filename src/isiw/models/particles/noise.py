@@ -121,7 +121,7 @@ def log_gain(response: Response, order: Tensor) -> Tensor:
 
     Args:
         response: response parameters, fields of shape (..., p).
-        order: how many trials came before each, shape (..., 1 or p, n).
+        order: how many trials were told before each, shape (..., 1 or p, n).
 
     Returns:
         Shape (..., p, n).

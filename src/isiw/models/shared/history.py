@@ -24,7 +24,7 @@ class History:
         isi_sd_ms: their SDs [ms], shape (b, n).
         log_mep: lower end of the log MEP, shape (b, n).
         log_mep_high: upper end, shape (b, n).
-        order: how many trials came before each, shape (b, n).
+        order: how many trials were told before each, shape (b, n).
     """
 
     isi_ms: Tensor

@@ -28,7 +28,8 @@ class Answer:
 
 
 def tapper(*, accelerometer: bool = True) -> Tapper:
-    return Tapper(lambda _: Answer(), "subject3", TapperSettings(accelerometer=accelerometer))
+    settings = TapperSettings("impact" if accelerometer else "valve", accelerometer=accelerometer)
+    return Tapper(lambda _: Answer(), "subject3", settings)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +79,7 @@ def test_what_it_adds_changes_nothing_of_the_taps_own_sweep(robot: isiw.Rotating
 
 
 def test_without_an_accelerometer_it_turns_after_the_predicted_tap() -> None:
-    assert begins_ms(isiw.RotatingTapper(tapper(accelerometer=False)).answer(Stimulus(0, 50.0))) > 680 + 60
+    assert begins_ms(isiw.RotatingTapper(tapper(accelerometer=False)).answer(Stimulus(0, 230.0))) > 680 + 60
 
 
 def test_the_wrist_is_turned_after_a_tap_alone_and_not_after_tms_alone(robot: isiw.RotatingTapper) -> None:
