@@ -11,10 +11,13 @@ import torch
 from isiw.design import IMPACT_SPACE
 from isiw.errors import InvalidValueError, StrategyError, StudyError
 from isiw.metrics import f1
+from isiw.signals.judgement import wrong_isi
 from isiw.strategy.catalogue import make_strategy
 from isiw.studies import SimulatedSession, paired_sessions, play, run_study, simulate
 from isiw.studies.batch import simulate_batch
 from isiw.subjects import SimulatedSubject, cohort
+from isiw.subjects.subject import Responder, Response
+from isiw.types import Reference
 from isiw.window import Window
 from known import known
 
@@ -204,6 +207,58 @@ def test_what_a_session_would_reject_is_delivered_again_and_not_told() -> None:
     assert all(abs(known(isi_ms) - 250.0) <= 2.0 for isi_ms, _ in player.told)
     assert row["mistrials"] > 0
     assert row["delivered"] == 40 + row["mistrials"]
+
+
+class Late(SimulatedSession):
+    """Sessions with somebody whom the hammer hits now and then much too late."""
+
+    def subject(self) -> SimulatedSubject:
+        return replace(super().subject(), hit_delay_sd_ms=25.0)
+
+
+@pytest.mark.parametrize("run", [simulate, lambda session: simulate_batch([session])])
+def test_a_session_with_mistrials_ends_where_its_budget_is_used_up(run: Callable[[SimulatedSession], Any]) -> None:
+    settings = (("max_trials", 12), ("particles", 40))
+    session = Late("even", "gaussian", 2, 5, 40, (0, 5, 40), IMPACT_SPACE, settings, stopping="ends")
+    rows = run(session)
+    assert rows["trial"].tolist() == [0, 5, 40]
+    last = rows.iloc[-1]
+    assert last["mistrials"] > 0
+    assert last["delivered"] == last["stop_trial"] == 12
+    assert last["stop_reason"] == "The budget of 12 stimuli is used up."
+
+
+def test_where_trials_are_lost_a_study_asks_what_a_session_asks(monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = (("max_trials", 12), ("particles", 40))
+    session = Late("even", "gaussian", 2, 5, 40, (40,), IMPACT_SPACE, settings, stopping="ends")
+    delivered, usual = list[tuple[float, Response]](), Responder.respond
+
+    def respond(responder: Responder, isi_ms: float | None, reference: Reference) -> Response:
+        response = usual(responder, isi_ms, reference)
+        delivered.append((known(isi_ms), response))
+        return response
+
+    monkeypatch.setattr(Responder, "respond", respond)
+    simulate(session)
+    strategy, lost = session.player(), 0
+    for isi_ms, response in delivered[:12]:
+        assert strategy.ask() == isi_ms
+        if wrong_isi(known(response.isi_ms), isi_ms, session.space) is None:
+            strategy.tell(response.isi_ms, response.mep_mv)
+        else:
+            strategy.count_mistrial()
+            lost += 1
+    assert lost > 2
+    assert strategy.decision().stop
+
+
+def test_what_is_lost_leaves_the_noise_of_later_trials_as_it_is() -> None:
+    person = replace(cohort("gaussian", 1, 5)[0], hit_delay_sd_ms=0.0)
+    usual, with_loss = person.begin(3), person.begin(3)
+    first = usual.respond(100.0, "impact")
+    assert with_loss.respond(100.0, "impact") == first
+    assert with_loss.respond_instead(100.0, "impact") != first
+    assert usual.respond(120.0, "impact") == with_loss.respond(120.0, "impact")
 
 
 def test_a_space_that_no_realised_isi_keeps_is_refused() -> None:

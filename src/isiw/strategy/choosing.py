@@ -14,7 +14,10 @@ from isiw.acquisition.protocol import AcquisitionFunction, best_candidate, requi
 from isiw.design import DesignSpace
 from isiw.models.protocol import DTYPE, Posterior, Tensor
 
-__all__ = ["Choice", "ChosenBy", "Cost", "best_choices", "candidate_isis", "evenly_spaced"]
+__all__ = ["Choice", "ChosenBy", "Cost", "best_choices", "candidate_isis", "evenly_spaced", "instead_of_lost"]
+
+ASKED_AGAIN = 2
+"""So often a lost trial is asked again at the same ISI; then another ISI stands in for it."""
 
 MAX_CANDIDATES = 101
 """At most so many ISIs are scored, so that the cost of an ask does not grow with the range."""
@@ -100,3 +103,17 @@ def evenly_spaced(space: DesignSpace, told: int) -> float:
     """
     candidates = candidate_isis(space)
     return space.snap(float(candidates[golden_index(told, len(candidates))]))
+
+
+def instead_of_lost(space: DesignSpace, lost: int, delivered: int) -> Choice | None:
+    """What is asked instead of an ISI that was lost again and again; None where it is asked once more.
+
+    Args:
+        space: the ISIs that may be asked.
+        lost: how many trials were lost in a row.
+        delivered: how many stimuli were delivered, mistrials included.
+    """
+    if lost <= ASKED_AGAIN:
+        return None
+    reason = f"The trial was lost {lost} times in a row: an evenly spaced ISI instead."
+    return Choice(evenly_spaced(space, delivered), reason, by="fallback")

@@ -19,7 +19,7 @@ from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
 from isiw.signals.doubts import Doubts, doubt_of, doubt_of_isi, is_silent
 from isiw.signals.plausibility import off_by, require_isi_sd, require_plausible
-from isiw.strategy.choosing import Choice, Cost, evenly_spaced
+from isiw.strategy.choosing import Choice, Cost, evenly_spaced, instead_of_lost
 from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision, StoppingRule
 from isiw.text.found import NO_MEP
@@ -29,9 +29,6 @@ from isiw.window import WindowEstimate
 __all__ = ["Recipe", "Strategy"]
 
 _T = TypeVar("_T")
-
-ASKED_AGAIN = 2
-"""How often an ISI whose trial was lost is asked again before another one."""
 
 MOST_OF_A_BATCH = 1000
 """ISIs to be delivered before anything is told; more than any session has."""
@@ -332,10 +329,9 @@ class Strategy:
         self._mistrials += 1
         self._lost += 1
         self._choice = None if self._choice is None else replace(self._choice, by="again")
-        if self._lost > ASKED_AGAIN and not self._course.plans_ahead:
-            reason = f"The trial was lost {self._lost} times in a row: an evenly spaced ISI instead."
-            isi_ms = evenly_spaced(self.space, self._course.told + self._mistrials)
-            self._choice, self._fallback_reason, self._lost = Choice(isi_ms, reason, by="fallback"), reason, 0
+        other = instead_of_lost(self.space, self._lost, self._course.told + self._mistrials)
+        if other is not None and not self._course.plans_ahead:
+            self._choice, self._fallback_reason, self._lost = other, other.fallback, 0
 
     def count_excluded(self) -> None:
         """Count a delivered stimulus whose outcome an operator excluded: it uses up budget, and was not lost."""

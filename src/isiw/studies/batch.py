@@ -16,7 +16,7 @@ import torch
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.errors import StudyError
 from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel, Tensor
-from isiw.strategy.choosing import Choice
+from isiw.strategy.choosing import Choice, instead_of_lost
 from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision
 from isiw.studies.sessions import SimulatedSession, examine
@@ -53,7 +53,7 @@ class _Batch:
         method = Method(first.space, model, acquisition, first.stopping, first.initial_ms, first.cost)
         self.stopping = first.stopping
         self.course = method.begin(first.seed, len(players))
-        self.mistrials = [0] * len(players)
+        self.mistrials, self.lost = [0] * len(players), [0] * len(players)
 
     def ask(self) -> Sequence[Choice]:
         return self.course.choices
@@ -62,9 +62,17 @@ class _Batch:
         isis_ms = [self.course.method.space.check_realised(r.isi_ms) for r in responses if r.isi_ms is not None]
         meps_mv, sds_ms = [r.mep_mv for r in responses], [r.isi_sd_ms for r in responses]
         self.course = self.course.after(Observation.of(isis_ms, meps_mv, sds_ms))
+        self.lost = [0] * len(responses)
 
-    def count_mistrial(self, person: int) -> None:
+    def count_mistrial(self, person: int, lost: Choice) -> Choice:
         self.mistrials[person] += 1
+        self.lost[person] += 1
+        delivered = self.course.told + self.mistrials[person]
+        other = instead_of_lost(self.course.method.space, self.lost[person], delivered)
+        if other is None or self.course.plans_ahead:
+            return lost
+        self.lost[person] = 0
+        return other
 
     def estimate(self, person: int) -> WindowEstimate:
         return self.course.estimate(person)

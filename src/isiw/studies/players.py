@@ -49,8 +49,8 @@ class Crowd(Protocol):
     def tell(self, responses: Sequence[Response]) -> None:
         """Learn from one trial of each person."""
 
-    def count_mistrial(self, person: int) -> None:
-        """Count a pair of stimuli that was delivered in vain."""
+    def count_mistrial(self, person: int, lost: Choice) -> Choice:
+        """Count a pair of stimuli that was delivered in vain, and say what is asked of the person instead."""
 
     def estimate(self, person: int) -> Reported:
         """What is believed about the window of a person."""
@@ -89,9 +89,10 @@ class _StrategyAlone:
         (told,) = responses
         self.strategy.learn(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
 
-    def count_mistrial(self, person: int) -> None:
-        del person
+    def count_mistrial(self, person: int, lost: Choice) -> Choice:
+        del person, lost
         self.strategy.count_mistrial()
+        return self.ask()[0]
 
     def estimate(self, person: int) -> Reported:
         del person
@@ -122,8 +123,9 @@ class _PlayerAlone:
         (told,) = responses
         self.player.tell(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
 
-    def count_mistrial(self, person: int) -> None:
+    def count_mistrial(self, person: int, lost: Choice) -> Choice:
         del person
+        return lost
 
     def estimate(self, person: int) -> Reported:
         del person

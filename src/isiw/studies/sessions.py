@@ -188,13 +188,13 @@ def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
         began_s = time.perf_counter()
         choices = crowd.ask()
         asked_s = time.perf_counter()
-        responses = [person.respond(choice) for person, choice in zip(people, choices, strict=True)]
+        responses = [person.respond(trial, choice) for person, choice in zip(people, choices, strict=True)]
         answered_s = time.perf_counter()
         crowd.tell(responses)
         told_s = time.perf_counter()
         spent_ms = [1e3 * spent_s / len(people) for spent_s in (asked_s - began_s, told_s - answered_s)]
-        for person, choice in zip(people, choices, strict=True):
-            person.note(trial, choice, dict(zip(TIMES, spent_ms, strict=True)))
+        for person in people:
+            person.note(trial, dict(zip(TIMES, spent_ms, strict=True)))
         if all(person.ended for person in people):
             break
     return pd.DataFrame([row for person in people for row in person.rows])
@@ -219,15 +219,18 @@ class _Person:
     def ended(self) -> bool:
         return self.session.stopping == "ends" and not math.isnan(self.stop["stop_trial"])
 
-    def respond(self, choice: Choice) -> Response:
-        """Deliver the pair, again where its ISI makes it a mistrial: a session asks for the same ISI again."""
-        space = self.session.space
+    def respond(self, trial: int, choice: Choice) -> Response:
+        """Deliver the pair, and where its ISI makes it a mistrial what is asked instead, until one can be told.
+
+        The first delivery of a trial has the same noise with every strategy; what comes instead has noise of its own.
+        """
+        space, respond = self.session.space, self.responder.respond
         for _ in range(_MOST_DELIVERIES):
-            response = self.responder.respond(choice.isi_ms, space.reference)
+            response = respond(choice.isi_ms, space.reference)
             if response.isi_ms is not None and wrong_isi(response.isi_ms, choice.isi_ms, space) is None:
+                self.fallbacks += choice.fallback is not None and not self.ended
                 return response
-            self.mistrials += not self.ended
-            self.crowd.count_mistrial(self.number)
+            choice, respond = self._after_mistrial(trial, choice), self.responder.respond_instead
         raise StudyError(
             "a person's realised ISIs are hardly ever near enough to the commanded one",
             got=f"{_MOST_DELIVERIES} mistrials in a row at {choice.isi_ms:g} ms",
@@ -235,24 +238,38 @@ class _Person:
             remedy="Give the space a wider tolerance_ms.",
         )
 
+    def _after_mistrial(self, trial: int, lost: Choice) -> Choice:
+        going_on = not self.ended
+        self.mistrials += going_on
+        choice = self.crowd.count_mistrial(self.number, lost)
+        if going_on:
+            self._note_stop(trial - 1 + self.mistrials)
+            self._note_marks(trial, dict.fromkeys(TIMES, math.nan), reached=False)
+        return choice
+
     def note_before(self) -> None:
         if 0 in self.session.marks:
             self.rows.append(self._row(0) | dict.fromkeys(TIMES, math.nan))
 
-    def note(self, trial: int, choice: Choice, spent_ms: dict[str, float]) -> None:
+    def note(self, trial: int, spent_ms: dict[str, float]) -> None:
         if self.ended:
             return
         trouble = self.crowd.trouble()
-        self.fallbacks += choice.fallback is not None
         self.troubles += math.nan if trouble is None else trouble
-        delivered = trial + self.mistrials
-        if self.session.stopping != "ignored" and math.isnan(self.stop["stop_trial"]):
-            self._note_stop(delivered)
-        if marks := [mark for mark in self.session.marks if mark == trial or (self.ended and mark > trial)]:
-            row = self._row(delivered) | spent_ms
+        self._note_stop(trial + self.mistrials)
+        self._note_marks(trial, spent_ms, reached=True)
+
+    def _note_marks(self, trial: int, spent_ms: dict[str, float], *, reached: bool) -> None:
+        """Note a trial that was told (`reached`), and where the session has ended all that would have come."""
+        marks = [m for m in self.session.marks if (reached and m == trial) or (self.ended and m >= trial + reached)]
+        if marks:
+            row = self._row(trial - (not reached) + self.mistrials) | spent_ms
             self.rows += [row | {"trial": mark} for mark in marks]
 
     def _note_stop(self, delivered: int) -> None:
+        """Note where the rule fires first; it is not asked where it is ignored."""
+        if self.session.stopping == "ignored" or not math.isnan(self.stop["stop_trial"]):
+            return
         rule = self.crowd.stopping
         if rule is not None and (decision := self.crowd.decision(self.number)).stop:
             left = stimuli_left(rule, delivered)

@@ -182,7 +182,8 @@ class Responder:
 
     def __init__(self, subject: SimulatedSubject, seed: int) -> None:
         self.subject = subject
-        self._rng = np.random.default_rng(whole("the seed", seed, least=0))
+        self._seed = whole("the seed", seed, least=0)
+        self._rng = np.random.default_rng(self._seed)
         self._trials = 0
         self._input_z = self._rng.standard_normal()
         self._walk = 0.0
@@ -211,6 +212,22 @@ class Responder:
             mep_mv = rng.uniform(*OUTLIERS_MV)
         unseen_ms = 0.0 if subject.jitter_told or isi_ms is None else subject.isi_jitter_ms
         return Response(told_ms, float(subject.scale * mep_mv), unseen_ms)
+
+    def respond_instead(self, isi_ms: float | None, reference: Reference) -> Response:
+        """Answer one pair of stimuli that is given because another was lost; see `respond`.
+
+        Its noise is drawn apart, so that what was lost does not move the noise of all later trials. What it does to the
+        person, such as drift, goes on.
+
+        Args:
+            isi_ms: the commanded ISI on the reference [ms]; None for TMS alone.
+            reference: the event that the ISI counts from.
+        """
+        usual, self._rng = self._rng, np.random.default_rng([self._seed, 1, self._trials])
+        try:
+            return self.respond(isi_ms, reference)
+        finally:
+            self._rng = usual
 
     def _stimulate(self, isi_ms: float, reference: Reference) -> tuple[float, float]:
         subject, rng = self.subject, self._rng
