@@ -326,7 +326,7 @@ def timing_report(study: TimingStudy) -> str:
             "",
             "For ISIs that count from the valve command, tell the strategy when the tap hits:",
             f"    hit_delay_ms = [{mean_ms:.1f}, {sd_ms:.1f}]",
-            "It is a setting of the strategy and an argument of DeviceInfo.",
+            "Write it into the DeviceInfo of your rig, or under [strategy.settings] of a configuration.",
         ]
     return "\n".join(lines)
 

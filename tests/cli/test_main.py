@@ -51,3 +51,13 @@ def test_what_the_operating_system_refuses_is_a_message(isiw: Command, log: Path
     assert result.exit_code == 1
     assert "error: " in result.output
     assert "picture.png" in result.output
+
+
+def test_a_sign_that_the_output_lacks_ends_nothing(short: Path, tmp_path: Path) -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    ended = subprocess.run(  # noqa: S603
+        [sys.executable, "-m", "isiw", "run", short, "--log", "s.mcap"],
+        cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    assert "picture: s.png" in ended.stdout

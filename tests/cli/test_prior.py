@@ -41,7 +41,7 @@ def lab(isiw: Command, logs: Any, folder: Path) -> Any:
         result = isiw("prior", "learn", *logs, "-o", "lab.toml")
         assert result.exit_code == 0, result.output
         assert "Learnt from 2 sessions with 6 trials" in result.output
-        assert "isiw run --prior lab.toml" in result.output
+        assert "isiw run CONFIG --prior lab.toml" in result.output
     return folder / "lab.toml"
 
 

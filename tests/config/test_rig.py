@@ -12,7 +12,7 @@ from isiw import priors
 from isiw.config import device_for, load_config, session_for
 from isiw.config.rig import TEMPLATE_FILES, device_from_factory, write_rig_template
 from isiw.design import IMPACT_SPACE
-from isiw.errors import ConfigError
+from isiw.errors import ConfigError, LimitExceededError
 from isiw.log.reader import read_session
 from isiw.visit import Visit
 from known import known
@@ -37,6 +37,14 @@ def imported(file: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def test_the_starting_point_passes_its_own_check(template: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     imported(template / "test_rig.py", monkeypatch).test_the_rig_conforms()
+
+
+def test_its_check_is_of_what_its_configuration_says(template: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (template / "session.toml").read_text(encoding="utf-8")
+    text = text.replace("max_pulses = 100", "max_pulses = 100\nmax_coil_c = 40.0")
+    (template / "session.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(LimitExceededError, match="the coil is too hot, or its temperature is not known"):
+        imported(template / "test_rig.py", monkeypatch).test_the_rig_conforms()
 
 
 def test_the_starting_point_is_short(template: Path) -> None:
@@ -86,7 +94,9 @@ def test_a_session_runs_with_the_users_own_rig_and_the_log_does_not_name_it(temp
 
 def test_settings_of_the_configuration_reach_the_factory(template: Path) -> None:
     text = (template / "session.toml").read_text(encoding="utf-8")
-    (template / "session.toml").write_text(text.replace("simulated = true", 'port = "COM3"'), encoding="utf-8")
+    (template / "session.toml").write_text(
+        text.replace("simulated = true", 'simulated = true\nport = "COM3"'), encoding="utf-8"
+    )
     device: Any = device_for(load_config(template / "session.toml"))
     assert device.port == "COM3"
 

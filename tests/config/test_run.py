@@ -265,7 +265,7 @@ def test_a_log_holds_the_configuration_it_was_run_with(tmp_path: Path, config_fi
 @pytest.mark.parametrize("config", [{}, {"rig": "A"}, {"seed": 3}])
 def test_a_log_of_other_software_has_no_configuration(tmp_path: Path, config: dict[str, Any]) -> None:
     Session(ScriptedDevice(), scripted_strategy(1), log=tmp_path / "s.mcap", config=config).run()
-    with pytest.raises(ConfigError, match=r"not run by isiw run.*isiw.resume"):
+    with pytest.raises(ConfigError, match=r"device is not known here.*isiw.resume"):
         config_of_log(read_session(tmp_path / "s.mcap"))
 
 

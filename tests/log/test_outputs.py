@@ -49,7 +49,8 @@ def test_what_cannot_be_written_as_a_whole_leaves_what_was_there(
 ) -> None:
     path = write_output(tmp_path / "s.png", b"first")
     monkeypatch.setattr(os, "fsync", no_room)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OSError, match="No space left") as error:
         write_output(path, b"second", overwrite=True)
+    assert error.value.filename == str(path)
     assert path.read_bytes() == b"first"
     assert list(tmp_path.iterdir()) == [path]

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.session.progress import COLUMNS, PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
 from isiw.session.updates import SessionUpdate
@@ -108,3 +109,22 @@ def test_progress_is_shown_in_a_terminal_and_can_be_turned_off_and_on(
     session.run(progress=progress, keys=False)
     assert len(capsys.readouterr().out.splitlines()) == rows
     assert len(seen) == (3 if own else 0)
+
+
+@pytest.mark.parametrize("error", [UnicodeEncodeError("ascii", "µ", 0, 1, "not there"), BrokenPipeError()])
+def test_a_table_that_cannot_be_shown_any_more_ends_no_session(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    rows: list[object] = []
+
+    def show(row: object) -> None:
+        rows.append(row)
+        if len(rows) == 2:
+            raise error
+
+    monkeypatch.setattr("isiw.session.loop.show_progress", show)
+    session = Session(ScriptedDevice(), scripted_strategy(5), log=tmp_path / "s.mcap")
+    session.run(progress=True, keys=False)
+    record = read_session(tmp_path / "s.mcap")
+    assert (len(rows), len(record.table)) == (2, 5)
+    assert ["cannot be shown any more" in event.text for event in record.events if event.kind == "fault"] == [True]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import re
+import select
 import threading
 
 import pytest
 
-from isiw.session.terminal import ERASED, Keys, Screen, typed
+from isiw.session.terminal import ERASED, Keys, Screen, drop_typed_ahead, typed
 
 
 def seen(written: str) -> list[str]:
@@ -101,3 +102,17 @@ class Ascii:
 
     def flush(self) -> None:
         """Nothing is held back."""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX terminals")
+def test_what_was_typed_before_a_question_is_no_answer_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    operator, terminal = os.openpty()
+    with os.fdopen(terminal, encoding="utf-8") as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        os.write(operator, b"0.08\n")
+        while not select.select([terminal], [], [], 0.1)[0]:
+            pass
+        drop_typed_ahead()
+        os.write(operator, b"0.05\n")
+        assert stdin.readline() == "0.05\n"
+    os.close(operator)

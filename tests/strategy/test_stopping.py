@@ -80,7 +80,7 @@ def test_an_edge_beyond_the_range_for_certain_is_known() -> None:
 def test_an_edge_that_may_lie_beyond_the_range_has_no_narrow_interval(start_ms: list[float]) -> None:
     decision = CredibleWidth(30)(progress(edges_ms=[(start, 100.0) for start in start_ms]))
     assert not decision.stop
-    assert "span inf and 0 ms" in decision.reason
+    assert "span more than the range and 0 ms" in decision.reason
 
 
 @pytest.mark.parametrize(("doubters", "stop"), [(1, True), (2, False), (30, False)])
@@ -92,7 +92,7 @@ def test_a_hypothesis_that_is_still_likely_must_agree(doubters: int, *, stop: bo
     )
     decision = CredibleWidth(30)(Progress(3, 3, estimate))
     assert decision.stop == stop
-    assert f"span 0 and {0 if stop else 40} ms under every likely hypothesis" in decision.reason
+    assert f"span 0 ms and {0 if stop else 40} ms under every likely hypothesis" in decision.reason
 
 
 def test_without_intervals_the_edges_are_not_known() -> None:

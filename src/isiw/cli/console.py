@@ -95,7 +95,8 @@ def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
         show(f"error: {error}", style="red", stderr=True)
         raise typer.Exit(DAMAGED if isinstance(error, isiw.errors.DamagedLogError) else 1) from error
     except OSError as error:
-        show(f"error: {error}", style="red", stderr=True)
+        text = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+        show(f"error: {text}", style="red", stderr=True)
         raise typer.Exit(1) from error
     except KeyboardInterrupt as error:
         show(interrupted, style="red", stderr=True)

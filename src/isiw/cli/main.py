@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import sys
 from typing import Annotated
 
 import typer
@@ -40,3 +42,6 @@ def main(
 ) -> None:
     """Find the inter-stimulus intervals at which a tap enhances the MEP, with as few stimuli as possible."""
     del version  # shown by its callback
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a sign that a terminal lacks must end no session

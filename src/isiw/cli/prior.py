@@ -48,7 +48,8 @@ def learn(
             lab = isiw.priors.learn(logs, again=again, damaged=damaged, seed=seed, on_done=note)
         isiw.priors.write_lab_prior(lab, output, overwrite=overwrite)
         _print(lab)
-        show(f"prior: {output}\nRun a session with it: {command('run', '--prior', output)}")
+        show(f"prior: {output}")
+        show(f"Run a session with it, and with your rig's CONFIG: {command('run', 'CONFIG', '--prior', output)}")
         exit_if_damaged(losses)
 
 

@@ -49,7 +49,7 @@ def serve(
 
 def _token(file: Path) -> str:
     try:
-        return file.read_text(encoding="utf-8").strip()
+        return file.read_text(encoding="utf-8-sig").strip()  # with the mark that Windows puts first
     except UnicodeDecodeError as error:
         raise isiw.errors.ConfigError(
             "the token file is not text", got=str(file), remedy="Write the token into a file of its own."

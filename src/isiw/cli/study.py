@@ -83,7 +83,10 @@ def summary(folder: Folder) -> None:
     """Print the table of a study, and write it and its pictures into the folder."""
     with errors_reported():
         store = isiw.studies.open_store(folder)
-        table = isiw.studies.summarise(store.rows(), store.errors())
+        if not len(rows := store.rows()):
+            _say_what_is_there(store)
+            raise typer.Exit(1)
+        table = isiw.studies.summarise(rows, store.errors())
         show(table.to_string(index=False, float_format=lambda value: f"{value:.3f}"))
         table.to_csv(folder / "summary.csv", index=False)
         _say_what_is_there(store)

@@ -111,7 +111,13 @@ def _run(recorder: ThresholdRecorder) -> None:
         if recorder.header.device.simulated:
             isiw.session.run_simulated(recorder, show)
         else:
-            isiw.session.run_by_hand(recorder, Console(highlight=False, markup=False).input, show)
+            isiw.session.run_by_hand(recorder, _typed, show)
+
+
+def _typed(question: str) -> str:
+    """What is typed once it is asked for: what came before was not about this pulse."""
+    isiw.session.terminal.drop_typed_ahead()
+    return Console(highlight=False, markup=False).input(question)
 
 
 def _say_what_is_there(log: Path) -> None:

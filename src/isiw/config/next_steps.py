@@ -61,7 +61,7 @@ def after_end(session: Session, config: Path | None, *, delivered: bool) -> str 
         return f"For more pulses set a higher max_pulses under [limits] {where}, then go on with: {command}"
     if delivered:
         return None
-    same = "" if config else ", with the configuration of this one if it had one"
+    same = "" if config else ", with the same configuration if there was one"
     more = f"For more trials with this person begin a new session{same}: {_anew(session, config)}"
     return f"The session is over, so no stimulus was delivered. {more}"
 

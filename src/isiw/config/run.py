@@ -180,11 +180,11 @@ def config_of_log(record: SessionRecord) -> RunConfig:
     """
     if RUN_KEY not in record.header.config:
         raise ConfigError(
-            "the session was not run by isiw run with a simulated person, so its device is not known here",
+            "the session's device is not known here",
             got=record.header.device.name,
-            remedy=f"Name the configuration that has your device, CONFIG: {command('resume', record.path, 'CONFIG')}. "
-            "From other software: isiw.resume(path, device).run(), or for a loop of your own "
-            "isiw.open_session(strategy, path, resume=True).",
+            remedy="Go on where it was run: with the configuration that has your device, CONFIG, "
+            f"{command('resume', record.path, 'CONFIG')}; in your own software by isiw.resume(path, device).run(), or "
+            "for a loop of your own by isiw.open_session(strategy, path, resume=True).",
         )
     return _validated(record.header.config[RUN_KEY], str(record.path))
 

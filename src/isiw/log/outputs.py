@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 from typing import Final
 
@@ -24,6 +26,7 @@ def write_output(path: str | Path, content: bytes, *, overwrite: bool = False) -
 
     Raises:
         InvalidValueError: there is a file that is not to be replaced, or a folder, or no folder can be made for it.
+        OSError: it cannot be written.
     """
     target = Path(path)
     check_output(target, overwrite=overwrite)
@@ -32,6 +35,8 @@ def write_output(path: str | Path, content: bytes, *, overwrite: bool = False) -
         put(target, content, replacing=overwrite)
     except FileExistsError as error:
         raise _taken(target) from error
+    except OSError as error:  # which names what is written first, and not the file that was asked for
+        raise OSError(error.errno, error.strerror, str(target)) from error
     return target
 
 
@@ -44,8 +49,11 @@ def check_output(path: str | Path, *, overwrite: bool = False) -> None:
 
     Raises:
         InvalidValueError: there is a file that is not to be replaced, or a folder.
+        PermissionError: its folder is read-only.
     """
     target = Path(path)
+    if target.parent.is_dir() and not os.access(target.parent, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))
     if target.is_dir():
         raise InvalidValueError("there is a folder of this name", got=str(target), remedy="Name a file.")
     if overwrite and is_log(target):

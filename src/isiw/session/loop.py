@@ -16,7 +16,7 @@ from isiw.checks import deadline, number, text
 from isiw.devices.clock import Clock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
-from isiw.errors import InvalidValueError, NotDelivered, StrategyError
+from isiw.errors import InvalidValueError, NotDelivered, StrategyError, told
 from isiw.log.pulses import earlier_pulses_s
 from isiw.log.schema import Event, Header, Record
 from isiw.log.writer import LogWriter
@@ -244,9 +244,14 @@ class Session(Judging):
             show_legend()
 
         def report(update: SessionUpdate) -> None:
+            nonlocal shown
             self._followers.updated(update)
             if shown:
-                self._show(update)
+                try:
+                    self._show(update)
+                except (OSError, UnicodeError) as error:  # a full disk, a reader who has gone, a sign that is lacking
+                    self._rig.faults.append(f"the table of trials cannot be shown any more: {told(error)}")
+                    shown = False
             if self._on_trial is not None:
                 self._on_trial(update)
 

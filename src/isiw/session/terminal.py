@@ -25,7 +25,17 @@ else:
     import termios
     import tty
 
-__all__ = ["ERASED", "ESCAPE", "Keys", "Screen", "is_terminal", "restore", "somebody_there", "typed"]
+__all__ = [
+    "ERASED",
+    "ESCAPE",
+    "Keys",
+    "Screen",
+    "drop_typed_ahead",
+    "is_terminal",
+    "restore",
+    "somebody_there",
+    "typed",
+]
 
 _GLANCE_S = 0.1
 _LAST_WORDS_S = 1.0
@@ -53,6 +63,18 @@ def somebody_there() -> bool:
     """Whether an operator at a terminal sees what is shown, and can press keys."""
     here = threading.current_thread() is threading.main_thread()  # a program with threads of its own has its own keys
     return here and is_terminal(sys.stdin) and is_terminal(sys.stderr)
+
+
+def drop_typed_ahead() -> None:
+    """Forget what was typed before it was asked for, where somebody sits at a terminal."""
+    if not is_terminal(sys.stdin):
+        return
+    if sys.platform == "win32":
+        while msvcrt.kbhit():
+            msvcrt.getwch()
+    else:
+        with suppress(OSError, termios.error):  # the terminal is gone
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
 
 
 def restore() -> None:

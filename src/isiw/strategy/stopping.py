@@ -5,6 +5,7 @@ A rule is a frozen settings object called with a `Progress`. Rules compose with 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -146,12 +147,18 @@ class CredibleWidth:
         # An edge that lies beyond the range for certain is an answer: its interval has no width.
         widths = [0.0 if low == high else high - low for low, high in intervals]
         known = (progress.estimate.probability or 0.0) >= self.min_probability and max(widths) <= self.width_ms
-        spans = f"the {100 * self.level:.0f} % intervals of start and end span {widths[0]:.0f} and {widths[1]:.0f} ms"
+        spans = (
+            f"the {100 * self.level:.0f} % intervals of start and end span {_span(widths[0])} and {_span(widths[1])}"
+        )
         if progress.estimate.hypotheses is not None:
             spans += " under every likely hypothesis"
         if known:
             return StopDecision(stop=True, reason=f"The window is known: {spans}.")
         return StopDecision(stop=False, reason=f"The window is not known well enough yet: {spans}.")
+
+
+def _span(width_ms: float) -> str:
+    return f"{width_ms:.0f} ms" if math.isfinite(width_ms) else "more than the range"
 
 
 @dataclass(frozen=True)
@@ -247,7 +254,7 @@ class SmallGain:
         now, earlier = progress.estimate, progress.past[-self.last - 1 :]
         before = earlier[0].expected_f1 if len(earlier) > self.last else None
         if now.expected_f1 is None or now.probability is None or before is None:
-            return StopDecision(stop=False, reason=f"What {self.last} stimuli add is not known yet.")
+            return StopDecision(stop=False, reason=f"It is too early to say what {self.last} more stimuli would add.")
         added = f"the last {self.last} stimuli added {now.expected_f1 - before:.2f} to the expected F1"
         small = self.gain > 0 and now.expected_f1 - before < self.gain and now.probability >= self.min_probability
         if small and progress.told >= self.min_told:

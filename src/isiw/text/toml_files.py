@@ -47,9 +47,10 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         ) from error
     except UnicodeDecodeError as error:
         raise ConfigError(
-            "this is not a TOML file, which is text",
+            "this is not a TOML file, or it is not saved as UTF-8",
             got=str(path),
-            remedy="To see what a session's log holds use isiw show, to continue the session isiw resume.",
+            remedy="Save it as UTF-8, as editors offer. To see what a session's log holds use isiw show, to continue "
+            "the session isiw resume.",
         ) from error
     except (ValueError, RecursionError) as error:  # not TOML, or nested without end
         raise ConfigError(f"{path} is not valid TOML: {error}", remedy="Correct the line that it names.") from error
