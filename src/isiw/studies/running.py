@@ -46,16 +46,15 @@ def conduct(
     """
     if executor is not None and not callable(getattr(executor, "results", None)):
         raise InvalidValueError("no executor", got=executor, expected="Processes(workers), or a DaskCluster")
-    store = begin_store(study, folder)
-    left = store.left(retry=retry)
-    if left:
-        store.require_same_code()
-    run = partial(_run_with, code_checksum())
-    # Closed at once where it is interrupted, so that no worker goes on in vain.
-    with store.locked(), closing((executor or Processes()).results(run, left)) as results:
-        for unit, result in results:
-            store.keep(unit, result)
-            on_done(unit, result)
+    store, run = begin_store(study, folder), partial(_run_with, code_checksum())
+    with store.locked():
+        if left := store.left(retry=retry):
+            store.require_same_code()
+        # Closed at once where it is interrupted, so that no worker goes on in vain.
+        with closing((executor or Processes()).results(run, left)) as results:
+            for unit, result in results:
+                store.keep(unit, result)
+                on_done(unit, result)
     return store
 
 
