@@ -110,13 +110,26 @@ class Channel:
     t0_ms: float = 0.0
 
     def __post_init__(self) -> None:
-        values = np.asarray(self.values, dtype=np.float64)
+        values = _samples(self.values)
         if values.ndim != 1:
             raise InvalidValueError("a channel holds one waveform", got=values.shape, expected="shape (w,)")
         check_numbers(self, "rate_hz", above=0)
         check_numbers(self, "t0_ms")
         check_texts(self, "unit")
         object.__setattr__(self, "values", values)
+
+
+def _samples(values: object) -> FloatArray:
+    try:
+        samples = np.asarray(values)
+        real = samples if np.iscomplexobj(samples) else samples.astype(np.float64, copy=False)
+    except (TypeError, ValueError) as error:
+        raise InvalidValueError(
+            "the samples of a channel are not numbers", got=values, expected="a vector of numbers"
+        ) from error
+    if np.iscomplexobj(samples):
+        raise InvalidValueError("the samples of a channel are real numbers", got="complex ones")
+    return real
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +158,12 @@ class Sweep:
     def __post_init__(self) -> None:
         check_numbers(self, "t_valve_ms", "t_tms_ms", "t_hit_ms", optional=True)
         check_numbers(self, "isi_sd_ms", least=0, most=MOST_ISI_SD_MS)
+        if not isinstance(self.channels, Mapping):
+            raise InvalidValueError(
+                "a sweep has channels by name",
+                got=type(self.channels).__name__,
+                expected='such as {"emg": Channel(...)}',
+            )
         for name, channel in self.channels.items():
             if not isinstance(channel, Channel):
                 raise InvalidValueError(

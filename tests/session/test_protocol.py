@@ -153,7 +153,7 @@ def test_a_lost_control_costs_neither_budget_nor_a_retry(log: Path) -> None:
 
     def answer(stimulus: Stimulus) -> Measurement:
         loud = 500.0 if stimulus.isi_ms is None else 1.0
-        return Measurement(0.1 + (stimulus.isi_ms or 0) / 1e4, stimulus.isi_ms, background_rms_uv=loud)
+        return Measurement(0.1 + (stimulus.isi_ms or 0) / 1e3, stimulus.isi_ms, background_rms_uv=loud)
 
     rig.answer = answer
     result = Session(rig, scripted_strategy(10), log=log, protocol=protocol).run()

@@ -26,7 +26,8 @@ def believed(strategy: Strategy, trial: int, decision: StopDecision, next_isi_ms
         next_isi_ms: what is asked next [ms]; None where nothing was asked.
     """
     record = Estimate.of(trial, strategy.estimate(), decision, next_isi_ms)
-    return record.model_copy(update=_predicted(strategy) | ({} if next_isi_ms is None else _chosen(strategy)))
+    predicted = _predicted(strategy) if record.grid_ms else {}
+    return record.model_copy(update=predicted | ({} if next_isi_ms is None else _chosen(strategy)))
 
 
 def _predicted(strategy: Strategy) -> dict[str, Any]:

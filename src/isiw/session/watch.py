@@ -6,15 +6,30 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+import numpy as np
+
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer
-from isiw.signals.doubts import DoubtKind, Doubts, doubt_of, doubts_of
+from isiw.signals.doubts import Doubt, DoubtKind, Doubts, doubt_of, doubts_of
 from isiw.signals.faults import Fault, likely_fault, remedy_for, too_early_by_chance
 from isiw.signals.limits import SignalLimits
-from isiw.signals.misplaced import Misplaced, asks_about_place, doubt_of_place, misplaced_after
+from isiw.signals.misplaced import (
+    Misplaced,
+    asks_about_place,
+    doubt_of_artefact,
+    doubt_of_place,
+    is_artefact,
+    misplaced_after,
+)
 from isiw.trials import MistrialReason, Sweep, Trial, TrialTable
+from isiw.types import FloatArray
 
 __all__ = ["Watch"]
+
+REPEATED: Final = Doubt(
+    DoubtKind.REPEATED,
+    "The EMG of the last trial is that of the one before, sample by sample. Does the rig wait for the new recording?",
+)
 
 EARLY_IN_A_ROW: Final = 9
 """By chance a pulse is early at one ISI a few times in a row; after three, strategies that may choose ask elsewhere."""
@@ -35,6 +50,8 @@ class Watch:
         meps_mv: the amplitudes told [mV].
         isis_ms: the ISIs of the same trials [ms]; None for TMS alone.
         misplaced: responses outside the MEP window, since the last one within it.
+        artefacts: how many trials in a row had an artefact in it.
+        emg: samples of the last sweep; None where there are none.
         doubts: which doubts about the amplitudes were raised, and which the last trial raised.
         seen_reasons: why it paused before, as a person has seen; of trials that count, the same fault is said once.
         reason: why to pause now, and what to do; None where there is no reason.
@@ -50,6 +67,8 @@ class Watch:
     meps_mv: tuple[float, ...] = ()
     isis_ms: tuple[float | None, ...] = ()
     misplaced: tuple[Misplaced, ...] = ()
+    artefacts: int = 0
+    emg: FloatArray | None = field(default=None, compare=False, repr=False)
     doubts: Doubts = field(default_factory=Doubts)
     seen_reasons: frozenset[str] = frozenset()
     reason: str | None = None
@@ -94,9 +113,17 @@ class Watch:
             learned = replace(learned, early_ms=None, early=0)
         if trial.mep_mv is None or not trial.told:
             return learned
+        repeated = None
         if isinstance(answer, Sweep):
-            learned = replace(learned, misplaced=misplaced_after(learned.misplaced, answer, trial, self.signals))
-        return _with_amplitude(learned, trial.mep_mv, trial.isi_ms)
+            emg, before_emg = answer.channels["emg"].values, learned.emg
+            repeated = None if before_emg is None or not np.array_equal(emg, before_emg) else REPEATED
+            learned = replace(
+                learned,
+                misplaced=misplaced_after(learned.misplaced, answer, trial, self.signals),
+                artefacts=learned.artefacts + 1 if is_artefact(answer, trial, self.signals) else 0,
+                emg=emg,
+            )
+        return _with_amplitude(learned, trial.mep_mv, trial.isi_ms, repeated)
 
 
 def _said(fault: Fault, count: int) -> str:
@@ -105,10 +132,11 @@ def _said(fault: Fault, count: int) -> str:
     return f"Something was wrong in {count} trials in a row, in the last one: {fault}"
 
 
-def _with_amplitude(watch: Watch, mep_mv: float, isi_ms: float | None) -> Watch:
+def _with_amplitude(watch: Watch, mep_mv: float, isi_ms: float | None, repeated: Doubt | None) -> Watch:
     watch = replace(watch, meps_mv=(*watch.meps_mv, mep_mv), isis_ms=(*watch.isis_ms, isi_ms))
     odd = doubt_of(watch.meps_mv, watch.detection_limit_mv, watch.isis_ms)
-    doubts = watch.doubts.after(odd, doubt_of_place(watch.misplaced, watch.signals))
+    artefact = doubt_of_artefact(watch.artefacts, watch.signals)
+    doubts = watch.doubts.after(repeated, odd, doubt_of_place(watch.misplaced, watch.signals), artefact)
     reason = watch.reason or (None if doubts.new is None else doubts.new.text)
     return replace(watch, doubts=doubts, reason=reason)
 

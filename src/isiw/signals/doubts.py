@@ -34,10 +34,9 @@ STOPPED_IN_A_ROW = 10
 STOPPED_BY_CHANCE = 1e-4
 """So many pulses without an answer, after some with one, are due to chance less often than this."""
 
-ALIKE_IN_A_ROW = 6
-ALIKE_CV = 0.015
-"""From pulse to pulse MEPs have a CV of .3 and more; what a stimulator itself puts into the EMG has less than this. So
-may mains hum, which is smaller than a response where the muscle counts as at rest."""
+ALIKE = ((6, 0.015), (8, 0.05))
+"""So many in a row with a CV below this: from pulse to pulse MEPs have a CV of .3 and more; what a stimulator itself
+puts into the EMG has less. So may mains hum, which is smaller than a response where the muscle counts as at rest."""
 
 MANY_BELOW_MV = 0.02
 """Of a detection limit from here on, amplitudes of 0 are usual: most pulses below the threshold evoke less."""
@@ -54,6 +53,8 @@ class DoubtKind(StrEnum):
     LARGE = "large amplitudes"
     JUMP = "a jump of the scale"
     MISPLACED = "a response outside the MEP window"
+    ARTEFACT = "an artefact in the MEP window"
+    REPEATED = "the same sweep again"
 
 
 @dataclass(frozen=True)
@@ -135,14 +136,16 @@ def _doubt_of_equals(meps_mv: Sequence[float]) -> Doubt | None:
     """What is odd about amplitudes that are one like the other."""
     last = list(meps_mv[-EQUAL_IN_A_ROW:])
     if len(last) == EQUAL_IN_A_ROW and len(set(last)) == 1 and last[0] > 0:
-        text = f"The last {EQUAL_IN_A_ROW} amplitudes are exactly equal ({last[0]:g} mV). Is the EMG still recorded?"
+        text = f"The last {EQUAL_IN_A_ROW} amplitudes are exactly equal ({last[0]:g} mV). Is the EMG still "
+        text += "recorded, or are amplitudes rounded too coarsely?"
         return Doubt(DoubtKind.EQUAL, text)
-    last = list(meps_mv[-ALIKE_IN_A_ROW:])
-    mean_mv = statistics.fmean(last) if len(last) == ALIKE_IN_A_ROW else 0.0
-    if mean_mv < RESPONSE_MV or statistics.stdev(last) >= ALIKE_CV * mean_mv:
-        return None
-    text = f"The last {ALIKE_IN_A_ROW} amplitudes are almost equal ({mean_mv:.3g} mV), and MEPs vary more. Is it an "
-    return Doubt(DoubtKind.EQUAL, f"{text}artefact of the stimulator? Is the pulse's time right?")
+    for in_a_row, cv in ALIKE:
+        last = list(meps_mv[-in_a_row:])
+        mean_mv = statistics.fmean(last) if len(last) == in_a_row else 0.0
+        if mean_mv >= RESPONSE_MV and statistics.stdev(last) < cv * mean_mv:
+            text = f"The last {in_a_row} amplitudes are almost equal ({mean_mv:.3g} mV), and MEPs vary more. Is it an "
+            return Doubt(DoubtKind.EQUAL, f"{text}artefact of the stimulator? Is the pulse's time right?")
+    return None
 
 
 def doubts_of(

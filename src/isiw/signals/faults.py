@@ -42,6 +42,14 @@ JOLT_MS = 60.0
 LATEST_HIT_MS = 300.0
 """From the valve command to the impact, in any rig that is believed in."""
 
+BLANKED_MS = 12.0
+"""How long amplifiers are blanked after a pulse, at most; the end of that is an edge, too."""
+
+SHARP_MS = 1.0
+LEAST_RATE_HZ = 2000.0
+"""An edge that is steep for no longer than this is an artefact, since an MEP rises for some milliseconds. From this
+rate on there are samples enough to say so."""
+
 CLEAR = 20.0
 
 
@@ -132,11 +140,13 @@ def _fault_of_sweep(sweep: Sweep, trial: Trial) -> Fault | None:
 def _fault_of_start(sweep: Sweep, trial: Trial) -> Fault | None:
     """A pulse whose ISI cannot be counted, with nothing that the hit could be found in."""
     is_missing = trial.reason is MistrialReason.MISSING_CHANNEL and sweep.t_tms_ms is not None
-    if not is_missing or "acceleration" in sweep.channels or trial.isi_ms is not None or trial.commanded_isi_ms is None:
+    has_impact = "acceleration" in sweep.channels and sweep.t_valve_ms is not None
+    if not is_missing or has_impact or trial.isi_ms is not None or trial.commanded_isi_ms is None:
         return None
     return Fault(
         "the sweep has no time of the event that ISIs count from",
-        "Where it is the impact, give t_hit_ms or the acceleration; where it is the valve command, t_valve_ms.",
+        "Where it is the impact, give t_hit_ms, or the acceleration with t_valve_ms; where it is the valve command, "
+        "t_valve_ms.",
     )
 
 
@@ -145,6 +155,10 @@ def _fault_of_hammer(sweep: Sweep, emg: Channel, acceleration: Channel | None) -
         return None
     if _driven_impact(emg, sweep.t_valve_ms) is not None:
         return Fault("EMG and acceleration are swapped", "The impact is in the channel emg: swap the two inputs.")
+    if not np.isfinite(acceleration.values).all():
+        return Fault(
+            "the acceleration has samples that are no numbers", "Look at how the rig converts what it records."
+        )
     if not is_recording(acceleration.values):
         return Fault("the acceleration is a flat line", "Is the accelerometer powered, and its cable plugged in?")
     upright, inverted = (_driven_impact(acceleration, sweep.t_valve_ms, sign) for sign in (1.0, -1.0))
@@ -174,8 +188,11 @@ def _fault_of_rate(emg: Channel, trial: Trial) -> Fault | None:
         return None
     steepest_ms = steepest_edge(emg)
     evoked_ms = (trial.t_tms_ms + EVOKED_SPAN_MS[0], trial.t_tms_ms + EVOKED_SPAN_MS[1])
-    spans = [span for span in (evoked_ms, tap_span_ms(trial)) if span is not None]
-    if steepest_ms is None or any(first <= steepest_ms <= last for first, last in spans):
+    tap_ms = tap_span_ms(trial)
+    if steepest_ms is None or (tap_ms is not None and tap_ms[0] <= steepest_ms <= tap_ms[1]):
+        return None
+    may_be_evoked = steepest_ms <= trial.t_tms_ms + BLANKED_MS or not _is_sharp(emg)
+    if evoked_ms[0] <= steepest_ms <= evoked_ms[1] and may_be_evoked:
         return None
     return Fault(
         f"the steepest edge of the EMG is at {steepest_ms:.0f} ms, but the device reports the pulse at "
@@ -208,6 +225,13 @@ def steepest_edge(emg: Channel) -> float | None:
     if usual == 0 or steps.max() <= CLEAR * usual or (steps > 0.5 * steps.max()).mean() >= 0.01:
         return None
     return emg.t0_ms + 1000 * float(steps.argmax()) / emg.rate_hz
+
+
+def _is_sharp(emg: Channel) -> bool:
+    """Whether the EMG is steep within a millisecond only, as an artefact is and no MEP; few samples cannot say."""
+    steps = np.abs(np.diff(emg.values))
+    steep = np.flatnonzero(steps > 0.5 * steps.max())
+    return emg.rate_hz >= LEAST_RATE_HZ and bool(1000 * (steep[-1] - steep[0]) / emg.rate_hz <= SHARP_MS)
 
 
 def _emg_unit(answer: Sweep | Measurement) -> str | None:

@@ -12,7 +12,10 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.signals.mep import MEP_WINDOW_MS
 
-__all__ = ["SignalLimits"]
+__all__ = ["ARTEFACT_MS", "SignalLimits"]
+
+ARTEFACT_MS: Final = 3.0
+"""How long after the pulse its own artefact lasts, at least [ms]."""
 
 LEAST_WINDOW_MS: Final = 1.0
 LEAST_BACKGROUND_UV: Final = 0.2
@@ -53,6 +56,22 @@ class SignalLimits:
                 got=self.background_uv,
                 expected="µV RMS, such as 10",
                 remedy="Is it in mV? Multiply by 1000.",
+            )
+
+    def require_effect(self) -> None:
+        """Raise where the window would hold the pulse's own artefact.
+
+        It is for limits that somebody states: those of earlier logs stay readable.
+
+        Raises:
+            InvalidValueError: the MEP window begins less than 3 ms after the pulse, as also where its first ms is in s.
+        """
+        if self.mep_window_ms[0] < ARTEFACT_MS:
+            raise InvalidValueError(
+                "SignalLimits.mep_window_ms begins in the pulse's artefact, which would be measured as an MEP",
+                got=self.mep_window_ms,
+                expected=f"from {ARTEFACT_MS:g} ms after the pulse on, such as {MEP_WINDOW_MS}",
+                remedy="Set when MEPs of this muscle begin [ms].",
             )
 
     def tolerance_ms(self, space: DesignSpace) -> float:

@@ -15,14 +15,14 @@ import numpy as np
 
 from isiw.signals.doubts import Doubt, DoubtKind
 from isiw.signals.faults import tap_span_ms
-from isiw.signals.limits import SignalLimits
+from isiw.signals.limits import ARTEFACT_MS, SignalLimits
 from isiw.signals.units import EMG_UNITS_MV
 from isiw.trials import Sweep, Trial
 from isiw.types import BoolArray, FloatArray
 
-__all__ = ["Misplaced", "asks_about_place", "doubt_of_place", "misplaced_after"]
+__all__ = ["Misplaced", "asks_about_place", "doubt_of_artefact", "doubt_of_place", "is_artefact", "misplaced_after"]
 
-SOUGHT_MS = (3.0, 80.0)
+SOUGHT_MS = (ARTEFACT_MS, 80.0)
 """Where a response is looked for [ms after the pulse]: behind the pulse's artefact, and before the person moves."""
 
 QUIET = 8.0
@@ -107,6 +107,41 @@ def doubt_of_place(misplaced: Sequence[Misplaced], limits: SignalLimits) -> Doub
     return Doubt(DoubtKind.MISPLACED, f"{text} {_ASK}")
 
 
+def is_artefact(sweep: Sweep, trial: Trial, limits: SignalLimits) -> bool:
+    """Whether what is in the MEP window comes out of something larger before it: the end of the pulse's artefact.
+
+    Args:
+        sweep: the trial's sweep.
+        trial: as it was judged.
+        limits: say where the window is.
+    """
+    rest_mv = (trial.background_rms_uv or 0.0) / 1000
+    if trial.mep_mv is None or trial.t_tms_ms is None or trial.mep_mv <= QUIET * rest_mv:
+        return False
+    emg_mv, since_ms, tap = _since_pulse(sweep, trial)
+    first_ms, last_ms = limits.mep_window_ms
+    before = (since_ms >= SOUGHT_MS[0]) & (since_ms < first_ms) & ~tap
+    within = (since_ms >= first_ms) & (since_ms <= last_ms)
+    return _is_tail(emg_mv, within, before)
+
+
+def doubt_of_artefact(in_a_row: int, limits: SignalLimits) -> Doubt | None:
+    """What is odd about artefacts in the MEP window; None where there are few.
+
+    Args:
+        in_a_row: how many trials in a row had one.
+        limits: say where the window is.
+    """
+    if in_a_row < IN_A_ROW:
+        return None
+    text = (
+        f"In {in_a_row} trials in a row the EMG is much larger {SOUGHT_MS[0]:g}–{limits.mep_window_ms[0]:g} ms after "
+        "the pulse than in the MEP window behind it. Does the stimulator's artefact reach into the window? Or do "
+        "MEPs begin earlier?"
+    )
+    return Doubt(DoubtKind.ARTEFACT, text)
+
+
 def asks_about_place(reason: str) -> bool:
     """Whether this doubt is the reason of a pause."""
     return _ASK in reason
@@ -130,18 +165,23 @@ def _follow_the_pulse(misplaced: Sequence[Misplaced]) -> bool:
 
 def _outside(sweep: Sweep, trial: Trial, window_ms: tuple[float, float]) -> Misplaced | None:
     """The largest response outside the window; None where nothing can be told from pulse and tap."""
-    emg = sweep.channels["emg"]
-    times_ms = emg.t0_ms + np.arange(emg.values.size) * 1000 / emg.rate_hz
-    since_ms = times_ms - (trial.t_tms_ms or 0.0)
-    tap = _of_tap(times_ms, trial)
-    at_rest = (since_ms < -1.0) & ~tap
-    emg_mv = EMG_UNITS_MV[emg.unit] * (emg.values - np.median(emg.values[at_rest] if at_rest.any() else emg.values))
+    emg_mv, since_ms, tap = _since_pulse(sweep, trial)
     before = (since_ms >= SOUGHT_MS[0]) & (since_ms < window_ms[0]) & ~tap
     behind = (since_ms > window_ms[1]) & (since_ms <= SOUGHT_MS[1]) & ~tap
     artefact = (since_ms >= -1.0) & (since_ms < SOUGHT_MS[0])
     found = [] if _is_tail(emg_mv, before, artefact) else [_largest(emg_mv, since_ms, before, trial)]
     found.append(_largest(emg_mv, since_ms, behind, trial))
     return max((one for one in found if one is not None), key=lambda one: one.size_mv, default=None)
+
+
+def _since_pulse(sweep: Sweep, trial: Trial) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """The EMG about its level at rest [mV], its times [ms after the pulse], and which samples may show the tap."""
+    emg = sweep.channels["emg"]
+    times_ms = emg.t0_ms + np.arange(emg.values.size) * 1000 / emg.rate_hz
+    since_ms, tap = times_ms - (trial.t_tms_ms or 0.0), _of_tap(times_ms, trial)
+    at_rest = (since_ms < -1.0) & ~tap
+    level = np.median(emg.values[at_rest] if at_rest.any() else emg.values)
+    return EMG_UNITS_MV[emg.unit] * (emg.values - level), since_ms, tap
 
 
 def _of_tap(times_ms: FloatArray, trial: Trial) -> BoolArray:

@@ -50,7 +50,12 @@ class Crowd(Protocol):
         """Learn from one trial of each person."""
 
     def count_mistrial(self, person: int, lost: Choice) -> Choice:
-        """Count a pair of stimuli that was delivered in vain, and say what is asked of the person instead."""
+        """Count a pair of stimuli that was delivered in vain, and say what is asked of the person instead.
+
+        Args:
+            person: which one.
+            lost: what was asked.
+        """
 
     def estimate(self, person: int) -> Reported:
         """What is believed about the window of a person."""

@@ -125,10 +125,14 @@ def _check_capabilities(posterior: Posterior, space: DesignSpace, people: int, w
 
 
 def _check_prediction(posterior: Any, person: int, when: str) -> None:
-    grid_ms = posterior.estimate(person).grid_ms
+    if (grid_ms := posterior.estimate(person).grid_ms) is None:  # no answer yet
+        return
     wide, narrow = (np.stack(posterior.prediction_mv(level, person)) for level in (0.9, 0.5))
-    shape = None if grid_ms is None else (2, len(grid_ms))
-    require(wide.shape == shape, f"prediction_mv is at the ISIs of the estimate {when}", f"{wide.shape}, not {shape}")
+    require(
+        wide.shape == (2, len(grid_ms)),
+        f"prediction_mv is at the ISIs of the estimate {when}",
+        f"{wide.shape[-1]}, not {len(grid_ms)}",
+    )
     require(bool(np.isfinite(wide).all()), f"prediction_mv is finite {when}")
     nested = bool((np.diff([wide[0], narrow[0], narrow[1], wide[1]], axis=0) >= -1e-9).all())
     require(nested, f"a band of prediction_mv holds those of smaller probability {when}")

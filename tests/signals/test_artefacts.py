@@ -1,0 +1,106 @@
+"""Artefacts that would be measured as MEPs, and sweeps that come twice, pause a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.session.watch import Watch
+from isiw.signals import SignalLimits, judge
+from isiw.signals.doubts import doubt_of
+from isiw.signals.faults import likely_fault
+from isiw.trials import Channel, Stimulus, Sweep
+from isiw.types import FloatArray
+
+SPACE, LIMITS = DesignSpace(0, 320, reference="impact"), SignalLimits()
+RATE_HZ, BEFORE_MS = 5000.0, 600.0
+SINCE_PULSE_MS = np.arange(-BEFORE_MS, 115.0, 1000 / RATE_HZ)
+
+Change = Callable[[FloatArray, np.random.Generator], FloatArray]
+
+
+def sweep_of(trial: int, change: Change = lambda emg, _: emg, pulse_ms: float = 0.0) -> tuple[Stimulus, Sweep]:
+    """A sweep with an MEP at 25 ms and the pulse's artefact, changed, whose pulse is reported at another time."""
+    rng = np.random.default_rng(trial)
+    mep_mv = 0.1 * rng.gamma(4.0, 0.25) * np.exp(-0.5 * ((SINCE_PULSE_MS - 25.0) / 2.0) ** 2)
+    artefact_mv = 0.3 * (np.abs(SINCE_PULSE_MS) < 0.3)
+    emg_mv = change(mep_mv + artefact_mv + 0.002 * rng.standard_normal(SINCE_PULSE_MS.size), rng)
+    stimulus = Stimulus(trial, 40.0 + 20.0 * trial)
+    channel = Channel(emg_mv, RATE_HZ, "mV", t0_ms=-BEFORE_MS)
+    return stimulus, Sweep({"emg": channel}, t_tms_ms=pulse_ms, t_hit_ms=pulse_ms - 40.0 - 20.0 * trial)
+
+
+def reasons(sweeps: list[tuple[Stimulus, Sweep]]) -> list[str]:
+    """Why a session would have paused after some of these sweeps."""
+    watch, found = Watch(SPACE, LIMITS, 3), []
+    for stimulus, sweep in sweeps:
+        watch = watch.after(judge(sweep, stimulus, SPACE), sweep)
+        if watch.reason is not None:
+            found.append(watch.reason)
+            watch = watch.seen()
+    return found
+
+
+def test_right_sweeps_are_not_doubted() -> None:
+    assert reasons([sweep_of(trial) for trial in range(10)]) == []
+
+
+@pytest.mark.parametrize("late_ms", [14.0, 20.0, 28.0])
+def test_a_pulse_that_is_reported_too_early_shows_by_its_artefact(late_ms: float) -> None:
+    stimulus, sweep = sweep_of(2, pulse_ms=-late_ms)
+    fault = likely_fault(sweep, judge(sweep, stimulus, SPACE))
+    assert f"the device reports the pulse at -{late_ms:.0f} ms" in str(fault)
+
+
+@pytest.mark.parametrize("lasting_ms", [6.0, 10.0])
+def test_an_artefact_that_lasts_into_the_window_is_doubted_once(lasting_ms: float) -> None:
+    def decaying(emg_mv: FloatArray, rng: np.random.Generator) -> FloatArray:
+        since_ms = np.maximum(SINCE_PULSE_MS, 0.0)
+        size_mv = 5.0 * (1.0 + 0.1 * rng.standard_normal())
+        return np.asarray(emg_mv + size_mv * np.exp(-since_ms / lasting_ms) * (SINCE_PULSE_MS >= 0))
+
+    found = reasons([sweep_of(trial, decaying) for trial in range(8)])
+    assert len([reason for reason in found if "artefact reach into the window" in reason]) == 1
+
+
+def test_a_sweep_that_comes_twice_is_doubted_once() -> None:
+    sweeps = [sweep_of(trial) for trial in range(6)]
+    again = [
+        (stimulus, replace(sweep, channels=sweeps[stimulus.trial // 2 * 2][1].channels)) for stimulus, sweep in sweeps
+    ]
+    assert [reason for reason in reasons(again) if "sample by sample" in reason] != []
+    assert len(reasons(again)) == 1
+
+
+def test_amplitudes_that_hardly_vary_are_doubted() -> None:
+    rng = np.random.default_rng(1)
+    steady_mv = (0.3 * (1.0 + 0.03 * rng.uniform(-1, 1, 8))).tolist()
+    assert doubt_of(steady_mv[:7]) is None
+    assert "almost equal" in str(doubt_of(steady_mv))
+    assert doubt_of((0.3 * (1.0 + 0.3 * rng.standard_normal(8))).tolist()) is None
+
+
+@pytest.mark.parametrize("window_ms", [(0.0, 50.0), (0.015, 35.0)])
+def test_a_window_that_begins_in_the_pulses_artefact_is_refused_where_it_is_stated(
+    window_ms: tuple[float, float],
+) -> None:
+    stated = SignalLimits(mep_window_ms=window_ms)
+    with pytest.raises(InvalidValueError, match="begins in the pulse's artefact"):
+        stated.require_effect()
+    LIMITS.require_effect()
+
+
+@pytest.mark.parametrize("values", [["1,5", "2,5"], [[1.0, 2.0], [1.0]], [1j, 2j]])
+def test_samples_that_are_no_real_numbers_are_refused(values: object) -> None:
+    with pytest.raises(InvalidValueError, match="samples of a channel"):
+        Channel(values, RATE_HZ, "mV")  # type: ignore[arg-type]  # which is what is tested
+
+
+def test_a_sweep_without_channels_by_name_is_refused() -> None:
+    with pytest.raises(InvalidValueError, match="channels by name"):
+        Sweep(None, t_tms_ms=0.0)  # type: ignore[arg-type]  # which is what is tested
