@@ -5,11 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import isiw
 from isiw.errors import LogError
-from isiw.report.evidence import contradiction, no_comparison, nothing_stood_out
+from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_stood_out
 from isiw.strategy.stopping import StopDecision
 from isiw.text.found import NO_MEP
 from isiw.trials import Status, Trial
@@ -46,6 +47,36 @@ def test_without_a_probability_it_is_said_too_that_meps_are_not_clearly_larger()
     assert said.startswith("The data hardly bear this out: the MEPs inside are not clearly larger")
     clear = trials([0.08, 0.05, 0.04, 0.06], [0.02, 0.022, 0.021, 0.02])
     assert contradiction(WINDOW, clear, without_probability=True) is None
+
+
+@pytest.mark.parametrize(("factor", "word"), [(1.05, "grew"), (0.95, "shrank"), (1.0, None)])
+def test_amplitudes_that_change_with_time_whatever_the_isi_are_told(factor: float, word: str | None) -> None:
+    rng = np.random.default_rng(4)
+    isis_ms = rng.uniform(50, 200, 50)
+    meps_mv = 0.05 * factor ** np.arange(50) * np.exp(0.4 * rng.standard_normal(50))
+    session = [
+        Trial(k, Status.ACCEPTED, float(isi), isi_ms=float(isi), mep_mv=float(mep))
+        for k, (isi, mep) in enumerate(zip(isis_ms, meps_mv, strict=True))
+    ]
+    said = changed_with_time(WINDOW, session)
+    assert said is None if word is None else f"The amplitudes {word} during the session" in str(said)
+    assert changed_with_time(None, session) is None
+    assert changed_with_time(WINDOW, session[:4]) is None
+
+
+@pytest.mark.parametrize("cohort", ["recruitment", "gaussian"])
+def test_a_usual_person_whose_isis_are_asked_by_the_default_has_no_change_with_time(cohort: str) -> None:
+    said = 0
+    for person in range(6):
+        subject = isiw.subjects.cohort(cohort, person + 1, seed=30)[person]
+        strategy, responder = isiw.make_strategy(seed=person, particles=200), subject.begin(person)
+        told = list[Trial]()
+        for k in range(30):
+            outcome = responder.respond(strategy.ask(), "valve")
+            strategy.tell(outcome.isi_ms, outcome.mep_mv)
+            told.append(Trial(k, Status.ACCEPTED, outcome.isi_ms, isi_ms=outcome.isi_ms, mep_mv=outcome.mep_mv))
+        said += changed_with_time(subject.window(isiw.DesignSpace(0, 500)), told) is not None
+    assert said == 0
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Final, Literal
 
-from scipy.stats import mannwhitneyu
+import numpy as np
+from scipy.stats import combine_pvalues, kendalltau, mannwhitneyu
 
 from isiw.log.reader import SessionRecord
 from isiw.signals.doubts import stopped_after
@@ -23,6 +27,11 @@ NO_LARGER = 0.5
 
 NOT_CLEARLY = 0.05
 """From this one on they are not clearly larger, which is said where the method itself says nothing of its certainty."""
+
+BY_CHANCE = 0.00135
+"""A change with time is said below this p-value, three standard errors."""
+
+CHANGES: Final[Mapping[str, Literal["greater", "less"]]] = MappingProxyType({"grew": "greater", "shrank": "less"})
 
 OF_REST = 8.0
 """Peak-to-peak amplitude of EMG at rest over its RMS, at most: some 6 within the window of an MEP."""
@@ -108,6 +117,33 @@ def contradiction(window: Window | None, trials: Sequence[Trial], *, without_pro
             "The data hardly bear this out: the MEPs inside are not clearly larger than those outside "
             f"({figures}, p = {p:.2f})."
         )
+    return None
+
+
+def changed_with_time(window: Window | None, trials: Sequence[Trial]) -> str | None:
+    """That amplitudes grew or shrank from trial to trial, whatever the ISI; None where they did not clearly.
+
+    A window can be found in that alone, as ISIs are not asked in random order. Kendall's test of amplitude against
+    order, within and outside the window, combined by Stouffer's method.
+
+    Args:
+        window: the reported window; None where none is.
+        trials: the trials that count.
+    """
+    if window is None:
+        return None
+    strata = [meps_mv for meps_mv in _inside_and_outside(window, trials) if len(set(meps_mv)) >= ENOUGH_ON_EACH_SIDE]
+    if not strata:
+        return None
+    for word, alternative in CHANGES.items():
+        found = [kendalltau(np.arange(len(s)), s, alternative=alternative).pvalue for s in strata]
+        p = float(combine_pvalues(found, method="stouffer", weights=[math.sqrt(len(s)) for s in strata]).pvalue)
+        if p < BY_CHANCE:
+            return (
+                f"The amplitudes {word} during the session, within the window and outside it (Kendall's test, "
+                f"p = {p:.1g}), and a window may be due to that. Was the intensity changed, did the coil move, or did the "
+                "person tire?"
+            )
     return None
 
 

@@ -14,6 +14,7 @@ from isiw.log.schema import RUN_KEY, SERVED_KEY, Estimate
 from isiw.metrics import f1
 from isiw.report.depression import depression_sentence
 from isiw.report.evidence import (
+    changed_with_time,
     contradiction,
     no_comparison,
     nothing_estimated,
@@ -128,6 +129,7 @@ def finding_sentences(record: SessionRecord) -> list[str]:
         _edges(estimate, space),
         contradiction(estimate.window, record.table.told, without_probability=estimate.probability is None) or "",
         no_comparison(estimate.window, record.table.told) or "",
+        changed_with_time(estimate.window, record.table.told) or "",
         nothing_stood_out(record.table.told, _mep_window_ms(record)) or "",
         *(f"Doubt since trial {event.trial}: {event.text}" for event in record.events if event.kind == "doubt"),
         _best_isi(estimate),
