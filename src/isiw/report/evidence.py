@@ -141,8 +141,8 @@ def changed_with_time(window: Window | None, trials: Sequence[Trial]) -> str | N
         if p < BY_CHANCE:
             return (
                 f"The amplitudes {word} during the session, within the window and outside it (Kendall's test, "
-                f"p = {p:.1g}), and a window may be due to that. Was the intensity changed, did the coil move, or did the "
-                "person tire?"
+                f"p = {p:.1g}), and a window may be due to that. Was the intensity changed, did the coil move, or did "
+                "the person tire?"
             )
     return None
 
