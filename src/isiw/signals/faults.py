@@ -75,8 +75,8 @@ _REMEDIES: Mapping[MistrialReason, str] = MappingProxyType(
         MistrialReason.NO_PULSE: "Check that the stimulator is charged and armed, and that its trigger is recorded.",
         MistrialReason.TMS_BEFORE_IMPACT: "Check the hit delay that the rig assumes, and the sampling rate.",
         MistrialReason.BACKGROUND_ACTIVITY: (
-            "Ask the person to relax the muscle; check the electrodes and the ground, and look for mains hum. Where the "
-            "tap alone evokes a reflex before the pulse, begin the space at larger ISIs."
+            "Ask the person to relax the muscle; check the electrodes and the ground, and look for mains hum. Where "
+            "the tap alone evokes a reflex before the pulse, begin the space at larger ISIs."
         ),
         MistrialReason.SATURATION: "Lower the amplifier's gain, or keep cables away from the coil.",
         MistrialReason.MISSING_CHANNEL: (
