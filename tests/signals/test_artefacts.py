@@ -14,7 +14,7 @@ from isiw.session.watch import Watch
 from isiw.signals import SignalLimits, judge
 from isiw.signals.doubts import doubt_of
 from isiw.signals.faults import likely_fault
-from isiw.trials import Channel, Stimulus, Sweep
+from isiw.trials import Channel, Stimulus, Sweep, TrialTable
 from isiw.types import FloatArray
 
 SPACE, LIMITS = DesignSpace(0, 320, reference="impact"), SignalLimits()
@@ -66,6 +66,49 @@ def test_an_artefact_that_lasts_into_the_window_is_doubted_once(lasting_ms: floa
 
     found = reasons([sweep_of(trial, decaying) for trial in range(8)])
     assert len([reason for reason in found if "artefact reach into the window" in reason]) == 1
+
+
+@pytest.mark.parametrize("lasting_ms", [0.5, 1.5])
+def test_an_artefact_that_ends_before_the_window_is_none(lasting_ms: float) -> None:
+    def decaying(emg_mv: FloatArray, rng: np.random.Generator) -> FloatArray:
+        del rng
+        return np.asarray(emg_mv + 5.0 * np.exp(-np.maximum(SINCE_PULSE_MS, 0.0) / lasting_ms) * (SINCE_PULSE_MS >= 0))
+
+    assert reasons([sweep_of(trial, decaying) for trial in range(10)]) == []
+
+
+def test_what_was_asked_before_a_session_was_resumed_is_not_asked_again() -> None:
+    def lasting(emg_mv: FloatArray, rng: np.random.Generator) -> FloatArray:
+        size_mv = 5.0 * (1.0 + 0.1 * rng.standard_normal())
+        return np.asarray(emg_mv + size_mv * np.exp(-np.maximum(SINCE_PULSE_MS, 0.0) / 8.0) * (SINCE_PULSE_MS >= 0))
+
+    sweeps = [sweep_of(trial, lasting) for trial in range(8)]
+    asked = reasons(sweeps)
+    watch = Watch(SPACE, LIMITS, 3).resumed(TrialTable(()), asked)
+    for stimulus, sweep in sweeps:
+        watch = watch.after(judge(sweep, stimulus, SPACE), sweep)
+        assert watch.reason is None
+
+
+@pytest.mark.parametrize("rate_hz", [2000.0, 2048.0, 4000.0, 5000.0])
+@pytest.mark.parametrize("between_peaks_ms", [2.4, 4.0])
+def test_a_short_mep_is_no_artefact(rate_hz: float, between_peaks_ms: float) -> None:
+    since_ms = np.arange(-600.0, 115.0, 1000 / rate_hz)
+    sd_ms, rng = 0.5 * between_peaks_ms, np.random.default_rng(2)
+    biphasic = -(since_ms - 20.0) / sd_ms * np.exp(0.5 - 0.5 * ((since_ms - 20.0) / sd_ms) ** 2)
+    emg = Channel(0.3 * biphasic + 0.002 * rng.standard_normal(since_ms.size), rate_hz, "mV", t0_ms=-600.0)
+    sweep, stimulus = Sweep({"emg": emg}, t_tms_ms=0.0, t_hit_ms=-100.0), Stimulus(0, 100.0)
+    assert likely_fault(sweep, judge(sweep, stimulus, SPACE)) is None
+
+
+def test_a_buffer_that_is_filled_again_and_again_is_no_repetition() -> None:
+    buffer, watch = np.zeros(SINCE_PULSE_MS.size), Watch(SPACE, LIMITS, 3)
+    for trial in range(6):
+        stimulus, sweep = sweep_of(trial)
+        buffer[:] = sweep.channels["emg"].values
+        in_place = replace(sweep, channels={"emg": Channel(buffer, RATE_HZ, "mV", t0_ms=-BEFORE_MS)})
+        watch = watch.after(judge(in_place, stimulus, SPACE), in_place)
+        assert watch.reason is None
 
 
 def test_a_sweep_that_comes_twice_is_doubted_once() -> None:

@@ -13,7 +13,7 @@ from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import Simulation
 from isiw.signals import SignalLimits, judge
 from isiw.signals.doubts import Doubt, DoubtKind
-from isiw.signals.misplaced import Misplaced, asks_about_place, doubt_of_place, misplaced_after
+from isiw.signals.misplaced import Misplaced, doubt_of_place, kinds_asked, misplaced_after
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Channel, Stimulus, Sweep
 from isiw.types import Reference
@@ -71,7 +71,7 @@ def test_an_mep_outside_its_window_is_doubted(late_ms: float, seen_ms: str, isis
     assert doubt.kind is DoubtKind.MISPLACED
     assert f"In 4 trials the EMG has a response at about {seen_ms} after the pulse" in doubt.text
     assert "outside the MEP window of 15–35 ms, and none within it. Is the time of the pulse right?" in doubt.text
-    assert asks_about_place(f"The session is paused: {doubt.text}")
+    assert kinds_asked([f"The session is paused: {doubt.text}"]) == {doubt.kind}
     assert doubt_after(sweeps[:3], isis_ms[:3]) is None
 
 

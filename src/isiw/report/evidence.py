@@ -28,8 +28,8 @@ NO_LARGER = 0.5
 NOT_CLEARLY = 0.05
 """From this one on they are not clearly larger, which is said where the method itself says nothing of its certainty."""
 
-BY_CHANCE = 0.00135
-"""A change with time is said below this p-value, three standard errors."""
+BY_CHANCE, IN_EACH = 0.00135, 0.05
+"""A change with time is said below this p-value, three standard errors, and below the other one on each side."""
 
 CHANGES: Final[Mapping[str, Literal["greater", "less"]]] = MappingProxyType({"grew": "greater", "shrank": "less"})
 
@@ -132,13 +132,13 @@ def changed_with_time(window: Window | None, trials: Sequence[Trial]) -> str | N
     """
     if window is None:
         return None
-    strata = [meps_mv for meps_mv in _inside_and_outside(window, trials) if len(set(meps_mv)) >= ENOUGH_ON_EACH_SIDE]
-    if not strata:
+    strata = _inside_and_outside(window, trials)
+    if min(len(set(meps_mv)) for meps_mv in strata) < ENOUGH_ON_EACH_SIDE:
         return None
     for word, alternative in CHANGES.items():
         found = [kendalltau(np.arange(len(s)), s, alternative=alternative).pvalue for s in strata]
         p = float(combine_pvalues(found, method="stouffer", weights=[math.sqrt(len(s)) for s in strata]).pvalue)
-        if p < BY_CHANCE:
+        if p < BY_CHANCE and max(found) < IN_EACH:
             return (
                 f"The amplitudes {word} during the session, within the window and outside it (Kendall's test, "
                 f"p = {p:.1g}), and a window may be due to that. Was the intensity changed, did the coil move, or did "

@@ -15,10 +15,10 @@ from isiw.signals.faults import Fault, likely_fault, remedy_for, too_early_by_ch
 from isiw.signals.limits import SignalLimits
 from isiw.signals.misplaced import (
     Misplaced,
-    asks_about_place,
     doubt_of_artefact,
     doubt_of_place,
     is_artefact,
+    kinds_asked,
     misplaced_after,
 )
 from isiw.trials import MistrialReason, Sweep, Trial, TrialTable
@@ -82,8 +82,10 @@ class Watch:
         """
         meps_mv, isis_ms = trials.amplitudes
         seen, doubts = frozenset(reasons), doubts_of(meps_mv, self.detection_limit_mv, isis_ms)
-        if any(asks_about_place(reason) for reason in seen):  # which no amplitude shows
-            doubts = replace(doubts, raised=doubts.raised | {DoubtKind.MISPLACED})
+        known = kinds_asked(seen) | (
+            {DoubtKind.REPEATED} if REPEATED.text in seen else set()
+        )  # no amplitude shows them
+        doubts = replace(doubts, raised=doubts.raised | known)
         return replace(self, meps_mv=meps_mv, isis_ms=isis_ms, doubts=doubts, seen_reasons=seen)
 
     def seen(self) -> Watch:
@@ -121,7 +123,7 @@ class Watch:
                 learned,
                 misplaced=misplaced_after(learned.misplaced, answer, trial, self.signals),
                 artefacts=learned.artefacts + 1 if is_artefact(answer, trial, self.signals) else 0,
-                emg=emg,
+                emg=emg.copy(),  # a device may fill one buffer again and again
             )
         return _with_amplitude(learned, trial.mep_mv, trial.isi_ms, repeated)
 

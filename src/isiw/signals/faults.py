@@ -231,8 +231,8 @@ def steepest_edge(emg: Channel) -> float | None:
 def _is_sharp(emg: Channel) -> bool:
     """Whether the EMG is steep within a millisecond only, as an artefact is and no MEP; few samples cannot say."""
     steps = np.abs(np.diff(emg.values))
-    steep = np.flatnonzero(steps > 0.5 * steps.max())
-    return emg.rate_hz >= LEAST_RATE_HZ and bool(1000 * (steep[-1] - steep[0]) / emg.rate_hz <= SHARP_MS)
+    steep = np.flatnonzero(steps > 0.3 * steps.max())  # all flanks of an MEP, if it is one
+    return emg.rate_hz >= LEAST_RATE_HZ and bool(1000 * (steep[-1] - steep[0] + 1) / emg.rate_hz <= SHARP_MS)
 
 
 def _emg_unit(answer: Sweep | Measurement) -> str | None:

@@ -8,7 +8,7 @@ they are taken for the MEP.
 from __future__ import annotations
 
 import statistics
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from isiw.signals.units import EMG_UNITS_MV
 from isiw.trials import Sweep, Trial
 from isiw.types import BoolArray, FloatArray
 
-__all__ = ["Misplaced", "asks_about_place", "doubt_of_artefact", "doubt_of_place", "is_artefact", "misplaced_after"]
+__all__ = ["Misplaced", "doubt_of_artefact", "doubt_of_place", "is_artefact", "kinds_asked", "misplaced_after"]
 
 SOUGHT_MS = (ARTEFACT_MS, 80.0)
 """Where a response is looked for [ms after the pulse]: behind the pulse's artefact, and before the person moves."""
@@ -37,6 +37,9 @@ SPAN_MS = 10.0
 TAIL = 1.5
 """Before the window nothing counts where the pulse's own artefact is larger by this factor: it may be its end."""
 
+NEAR_MS = 5.0
+"""So near the window an artefact that is larger than what is within it has not ended yet."""
+
 IN_A_ROW = 4
 ALIKE_MS = 4.0
 DIFFERING_MS = 15.0
@@ -45,6 +48,7 @@ DIFFERING_MS = 15.0
 VARIES = 1.5
 """From the smallest to the largest of several MEPs it is more than this; the end of an artefact is always the same."""
 
+_ASK_OF_ARTEFACT = "Does the stimulator's artefact reach into the window? Or do MEPs begin earlier?"
 _ASK = "Is the time of the pulse right? Does the window fit the muscle? Or is it the stimulator's artefact?"
 
 
@@ -120,7 +124,7 @@ def is_artefact(sweep: Sweep, trial: Trial, limits: SignalLimits) -> bool:
         return False
     emg_mv, since_ms, tap = _since_pulse(sweep, trial)
     first_ms, last_ms = limits.mep_window_ms
-    before = (since_ms >= SOUGHT_MS[0]) & (since_ms < first_ms) & ~tap
+    before = (since_ms >= max(SOUGHT_MS[0], first_ms - NEAR_MS)) & (since_ms < first_ms) & ~tap
     within = (since_ms >= first_ms) & (since_ms <= last_ms)
     return _is_tail(emg_mv, within, before)
 
@@ -135,16 +139,20 @@ def doubt_of_artefact(in_a_row: int, limits: SignalLimits) -> Doubt | None:
     if in_a_row < IN_A_ROW:
         return None
     text = (
-        f"In {in_a_row} trials in a row the EMG is much larger {SOUGHT_MS[0]:g}–{limits.mep_window_ms[0]:g} ms after "
-        "the pulse than in the MEP window behind it. Does the stimulator's artefact reach into the window? Or do "
-        "MEPs begin earlier?"
+        f"In {in_a_row} trials in a row the EMG is much larger just before the MEP window, which begins "
+        f"{limits.mep_window_ms[0]:g} ms after the pulse, than within it. {_ASK_OF_ARTEFACT}"
     )
     return Doubt(DoubtKind.ARTEFACT, text)
 
 
-def asks_about_place(reason: str) -> bool:
-    """Whether this doubt is the reason of a pause."""
-    return _ASK in reason
+def kinds_asked(reasons: Iterable[str]) -> frozenset[DoubtKind]:
+    """Which of these doubts were the reason of a pause.
+
+    Args:
+        reasons: why a session paused.
+    """
+    asked = {_ASK: DoubtKind.MISPLACED, _ASK_OF_ARTEFACT: DoubtKind.ARTEFACT}
+    return frozenset(kind for reason in reasons for ask, kind in asked.items() if ask in reason)
 
 
 def _last_alike(misplaced: Sequence[Misplaced]) -> list[Misplaced]:
