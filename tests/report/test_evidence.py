@@ -60,7 +60,8 @@ def test_amplitudes_that_change_with_time_whatever_the_isi_are_told(factor: floa
     ]
     said = changed_with_time(WINDOW, session)
     assert said is None if word is None else f"The amplitudes {word} during the session" in str(said)
-    inside_only = [t if 90 < (t.isi_ms or 0) < 150 else replace(t, mep_mv=0.05 - 1e-5 * t.index) for t in session]
+    contrary = 1e-5 if factor < 1 else -1e-5
+    inside_only = [t if 90 < (t.isi_ms or 0) < 150 else replace(t, mep_mv=0.05 + contrary * t.index) for t in session]
     assert changed_with_time(WINDOW, inside_only) is None
     assert changed_with_time(None, session) is None
     assert changed_with_time(WINDOW, session[:4]) is None
