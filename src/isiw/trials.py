@@ -122,14 +122,13 @@ class Channel:
 def _samples(values: object) -> FloatArray:
     try:
         samples = np.asarray(values)
-        real = samples if np.iscomplexobj(samples) else samples.astype(np.float64, copy=False)
+        if np.isrealobj(samples):
+            return samples.astype(np.float64, copy=False)
     except (TypeError, ValueError) as error:
         raise InvalidValueError(
             "the samples of a channel are not numbers", got=values, expected="a vector of numbers"
         ) from error
-    if np.iscomplexobj(samples):
-        raise InvalidValueError("the samples of a channel are real numbers", got="complex ones")
-    return real
+    raise InvalidValueError("the samples of a channel are real numbers", got="complex ones")
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Answer
-from isiw.signals.doubts import Doubt, DoubtKind, Doubts, doubt_of, doubts_of
+from isiw.signals.doubts import REPEATED, Doubt, Doubts, doubt_of, doubts_of
 from isiw.signals.faults import Fault, likely_fault, remedy_for, too_early_by_chance
 from isiw.signals.limits import SignalLimits
 from isiw.signals.misplaced import (
@@ -25,11 +25,6 @@ from isiw.trials import MistrialReason, Sweep, Trial, TrialTable
 from isiw.types import FloatArray
 
 __all__ = ["Watch"]
-
-REPEATED: Final = Doubt(
-    DoubtKind.REPEATED,
-    "The EMG of the last trial is that of the one before, sample by sample. Does the rig wait for the new recording?",
-)
 
 EARLY_IN_A_ROW: Final = 9
 """By chance a pulse is early at one ISI a few times in a row; after three, strategies that may choose ask elsewhere."""
@@ -82,10 +77,7 @@ class Watch:
         """
         meps_mv, isis_ms = trials.amplitudes
         seen, doubts = frozenset(reasons), doubts_of(meps_mv, self.detection_limit_mv, isis_ms)
-        known = kinds_asked(seen) | (
-            {DoubtKind.REPEATED} if REPEATED.text in seen else set()
-        )  # no amplitude shows them
-        doubts = replace(doubts, raised=doubts.raised | known)
+        doubts = replace(doubts, raised=doubts.raised | kinds_asked(seen))  # those that no amplitude shows
         return replace(self, meps_mv=meps_mv, isis_ms=isis_ms, doubts=doubts, seen_reasons=seen)
 
     def seen(self) -> Watch:

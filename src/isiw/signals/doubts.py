@@ -18,7 +18,17 @@ from isiw.signals.plausibility import off_by
 from isiw.text.found import ENOUGH_PAIRS
 from isiw.trials import RESPONSE_MV
 
-__all__ = ["Doubt", "DoubtKind", "Doubts", "doubt_of", "doubt_of_isi", "doubts_of", "is_silent", "stopped_after"]
+__all__ = [
+    "REPEATED",
+    "Doubt",
+    "DoubtKind",
+    "Doubts",
+    "doubt_of",
+    "doubt_of_isi",
+    "doubts_of",
+    "is_silent",
+    "stopped_after",
+]
 
 SMALL_MV, LARGE_MV = 8e-4, 4.0
 """Of several in a row, the largest is never smaller, and their geometric mean is hardly ever larger from the start."""
@@ -68,6 +78,13 @@ class Doubt:
 
     kind: DoubtKind
     text: str
+
+
+REPEATED = Doubt(
+    DoubtKind.REPEATED,
+    "The EMG of the last trial is that of the one before, sample by sample. Does the rig wait for the new recording?",
+)
+"""What is odd about a sweep that is the one before."""
 
 
 @dataclass(frozen=True)

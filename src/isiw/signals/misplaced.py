@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from isiw.signals.doubts import Doubt, DoubtKind
+from isiw.signals.doubts import REPEATED, Doubt, DoubtKind
 from isiw.signals.faults import tap_span_ms
 from isiw.signals.limits import ARTEFACT_MS, SignalLimits
 from isiw.signals.units import EMG_UNITS_MV
@@ -146,12 +146,12 @@ def doubt_of_artefact(in_a_row: int, limits: SignalLimits) -> Doubt | None:
 
 
 def kinds_asked(reasons: Iterable[str]) -> frozenset[DoubtKind]:
-    """Which of these doubts were the reason of a pause.
+    """Which doubts about sweeps were the reason of a pause; no amplitude shows them again.
 
     Args:
         reasons: why a session paused.
     """
-    asked = {_ASK: DoubtKind.MISPLACED, _ASK_OF_ARTEFACT: DoubtKind.ARTEFACT}
+    asked = {_ASK: DoubtKind.MISPLACED, _ASK_OF_ARTEFACT: DoubtKind.ARTEFACT, REPEATED.text: DoubtKind.REPEATED}
     return frozenset(kind for reason in reasons for ask, kind in asked.items() if ask in reason)
 
 
