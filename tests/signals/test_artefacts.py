@@ -134,8 +134,8 @@ def test_a_window_that_begins_in_the_pulses_artefact_is_refused_where_it_is_stat
 ) -> None:
     stated = SignalLimits(mep_window_ms=window_ms)
     with pytest.raises(InvalidValueError, match="begins in the pulse's artefact"):
-        stated.require_effect()
-    LIMITS.require_effect()
+        stated.require_behind_artefact()
+    LIMITS.require_behind_artefact()
 
 
 @pytest.mark.parametrize("values", [["1,5", "2,5"], [[1.0, 2.0], [1.0]], [1j, 2j]])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -49,11 +50,7 @@ def plot(
 ) -> None:
     """Draw a session: profile, trials, window, and how the edges developed."""
     with errors_reported():
-        record = isiw.read_session(log)
-        truth = isiw.config.true_window(record)
-        target = output or free_beside(record.path, ".png")
-        show(f"picture: {isiw.plots.save_session_plot(record, target, truth=truth, overwrite=overwrite)}")
-        exit_if_damaged(record.losses)
+        _save("picture", isiw.plots.save_session_plot, log, output, ".png", overwrite=overwrite)
 
 
 @app.command(rich_help_panel=LOGS)
@@ -66,11 +63,18 @@ def report(
 ) -> None:
     """Write a page about a session: what was found and how, trial by trial, for any browser, without a network."""
     with errors_reported():
-        record = isiw.read_session(log)
-        truth = isiw.config.true_window(record)
-        target = output or free_beside(record.path, ".html")
-        show(f"report: {isiw.report.save_report(record, target, truth=truth, overwrite=overwrite)}")
-        exit_if_damaged(record.losses)
+        _save("report", isiw.report.save_report, log, output, ".html", overwrite=overwrite)
+
+
+def _save(
+    what: str, save: Callable[..., Path], log: Path, output: Path | None, suffix: str, *, overwrite: bool
+) -> None:
+    """Save what is made of a log, beside it where nobody gave a place, and say where it is."""
+    record = isiw.read_session(log)
+    truth = isiw.config.true_window(record)
+    target = output or free_beside(record.path, suffix)
+    show(f"{what}: {save(record, target, truth=truth, overwrite=overwrite)}")
+    exit_if_damaged(record.losses)
 
 
 @app.command(rich_help_panel=LOGS)

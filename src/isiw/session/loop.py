@@ -337,7 +337,7 @@ class Session(Judging):
         if not self._resumed:  # what an earlier log says goes on as it was
             self._limits.require_effect()
             self._header.protocol.require_effect(self._limits.min_iti_s)
-            self._header.signals.require_effect()
+            self._header.signals.require_behind_artefact()
 
     def _earlier_s(self) -> list[float]:
         """How long ago each earlier stimulus was to the same person, as far as the logs to look at know [s]."""

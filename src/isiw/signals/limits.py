@@ -58,7 +58,7 @@ class SignalLimits:
                 remedy="Is it in mV? Multiply by 1000.",
             )
 
-    def require_effect(self) -> None:
+    def require_behind_artefact(self) -> None:
         """Raise where the window would hold the pulse's own artefact.
 
         It is for limits that somebody states: those of earlier logs stay readable.
