@@ -22,7 +22,7 @@ def test_every_block_of_a_log_is_found_by_its_mark(finished_log: object) -> None
     unpacking = Unpacking(len(data))
     first = unpacking.records(found[0][1], found[0][0])
     assert len(found) > 8
-    assert [data[start - 9] for start, _ in found[:3]] == [6, 6, 6]  # the code of a block
+    assert [data[start] for start, _ in found[:3]] == [6, 6, 6]  # the code of a block
     assert first
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,14 @@ from log.written import write_trials
 
 def sample(below: int, size: int) -> list[int]:
     return [int(place) for place in np.random.default_rng(20).choice(below, size, replace=False)]
+
+
+def record_starts(data: bytes) -> Iterator[int]:
+    """Where the records of a whole file begin."""
+    at, magic = 8, 8
+    while at < len(data) - magic:
+        yield at
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
 
 
 def content(record: SessionRecord) -> tuple[object, ...]:
@@ -53,6 +62,18 @@ def test_a_flipped_bit_costs_no_more_than_its_own_block(finished_log: Path) -> N
         finished_log.write_bytes(flipped)
         kept = {trial.index for trial in read_session(finished_log).table}
         assert len(all_trials - kept) <= 1
+
+
+def test_a_record_taken_for_another_kind_costs_no_more_than_itself(finished_log: Path) -> None:
+    whole, all_trials = finished_log.read_bytes(), set(range(8))
+    for start in record_starts(whole):
+        for bit in range(8):
+            flipped = bytearray(whole)
+            flipped[start] ^= 1 << bit
+            finished_log.write_bytes(flipped)
+            record = read_session(finished_log)
+            assert record.losses
+            assert len(all_trials - {trial.index for trial in record.table}) <= 1
 
 
 def test_a_length_that_swallows_other_blocks_costs_none_of_them(finished_log: Path) -> None:

@@ -14,6 +14,7 @@ from typing import Final
 import zstandard
 from mcap import records as mcap
 from mcap.exceptions import McapError
+from mcap.opcode import Opcode
 from mcap.stream_reader import breakup_chunk
 
 __all__ = ["UNREADABLE", "LostBlockError", "Unpacking", "marked"]
@@ -28,12 +29,15 @@ MOST_RECORDS: Final = 500_000
 """What a log may hold; two thousand trials of ten channels come to 30,000."""
 
 _MARK = b"\x04\x00\x00\x00zstd"
-_MARK_AT = 8 + 8 + 8 + 4  # behind a block's two times, size and checksum
-_HEAD: Final = struct.Struct("<QQQI4x4xQ")
-"""A block's two times, size and checksum, then the mark, and the length of its data."""
+_MARK_AT = 1 + 8 + 8 + 8 + 8 + 4  # behind the record's head, and the block's two times, size and checksum
+_HEAD: Final = struct.Struct("<BQQQQI4x4xQ")
+"""What a record is and its length, a block's two times, size and checksum, then the mark, and its data's length."""
 
 _RECORD_HEAD: Final = struct.Struct("<BQ")
 """What a record is, and its length."""
+
+_PACKED = b"\x28\xb5\x2f\xfd"
+"""What a block's data begin with (RFC 8878, section 3.1.1)."""
 
 
 class LostBlockError(Exception):
@@ -41,7 +45,10 @@ class LostBlockError(Exception):
 
 
 def marked(data: bytes, size: int) -> Iterator[tuple[int, mcap.Chunk]]:
-    """All blocks that are there as a whole, and where; a torn one shows in the numbers of its records.
+    """All blocks that are there as a whole, and where each record begins; a torn one shows in its records' numbers.
+
+    The index at the end of a file bears the same marks. A mark is taken to be the index's where no packed data follow
+    it and no record of the right length holds it; one flipped bit cannot make a block look so.
 
     Args:
         data: what to search.
@@ -53,10 +60,14 @@ def marked(data: bytes, size: int) -> Iterator[tuple[int, mcap.Chunk]]:
         begin = start + _HEAD.size
         if start < 0 or begin > len(data):
             continue
-        first, last, unpacked, checksum, length = _HEAD.unpack_from(data, start)
-        if begin + length > len(data) or (copied := copied + length) > _most_unpacked(size):
+        kind, record_length, first, last, unpacked, checksum, length = _HEAD.unpack_from(data, start)
+        end = begin + length
+        is_headed = kind == Opcode.CHUNK and start + _RECORD_HEAD.size + record_length == end
+        if end > len(data) or not (is_headed or data.startswith(_PACKED, begin)):
             continue
-        yield start, mcap.Chunk("zstd", data[begin : begin + length], last, first, checksum, unpacked)
+        if (copied := copied + length) > _most_unpacked(size):
+            continue
+        yield start, mcap.Chunk("zstd", data[begin:end], last, first, checksum, unpacked)
 
 
 class Unpacking:

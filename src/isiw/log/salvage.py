@@ -195,7 +195,9 @@ class _Reading:
         """Whether the end of the records was reached."""
         self.whole = False
         """Whether everything up to there agrees with its checksum."""
-        self._readable_to = self._chunks = 0
+        self._readable_to = 0
+        self._met: set[int] = set()
+        """Where the chunks are that were met."""
         self._unpacking = Unpacking(found.size)
 
     def read(self) -> None:
@@ -206,13 +208,15 @@ class _Reading:
             self.whole = True
         except CRCValidationError:
             found.finished = self.sealed = True
-            self._search_swallowed()
+            if self._has_missed_some():
+                self._search()
             if not found.losses:
                 found.losses.append("The checksum of the whole file fails, though every record's own is good.")
         except UNREADABLE as error:
-            self.whole = self.sealed
+            at_a_records_end = isinstance(error, EndOfFile) and self.file.tell() == self._readable_to
+            self.sealed = self.whole = self.sealed and not self._has_missed_some()
             if not self.sealed:
-                self._read_torn(at_a_records_end=isinstance(error, EndOfFile) and self.file.tell() == self._readable_to)
+                self._read_torn(at_a_records_end=at_a_records_end)
             elif found.path.suffix != ".part":  # a session that was killed while it closed its log has lost nothing
                 found.losses.append("The index at the end of the file is damaged. No record is affected.")
         if found.finished and not self.sealed:
@@ -229,7 +233,7 @@ class _Reading:
         """Keep what a record that has just been read holds."""
         found = self.found
         if isinstance(record, mcap.Chunk):
-            self._chunks += 1
+            self._met.add(self._readable_to)
             self._unpack(record, self._readable_to)
         elif isinstance(record, mcap.Attachment):
             _keep_attachment(record, self.file, self._readable_to, found)
@@ -241,7 +245,7 @@ class _Reading:
     def _read_torn(self, *, at_a_records_end: bool) -> None:
         """Read a file that ends before its records do."""
         found, closed = self.found, self.found.path.suffix != ".part"
-        if at_a_records_end and self._chunks == sum(1 for _ in self._marked()):  # no chunk was taken for something else
+        if at_a_records_end and not self._has_missed_some():
             if closed:
                 found.losses.append(
                     f"The log ends at byte {found.size} without the mark that closes it: it was cut off, and nobody "
@@ -251,26 +255,21 @@ class _Reading:
         self._search()
         found.losses.insert(0, f"The log is torn or damaged at byte {self._readable_to} of {found.size}.")
 
-    def _search_swallowed(self) -> None:
-        """Read all chunks again where fewer were met than there are: a damaged length has swallowed some."""
-        if self._chunks < sum(1 for _ in self._marked(self._readable_to)):
-            self._search(self._readable_to)
+    def _has_missed_some(self) -> bool:
+        """Whether there are chunks that were not met, as a damaged record was taken for another or for a longer one."""
+        return not self._met.issuperset(start for start, _ in self._marked())
 
-    def _search(self, size: int = -1) -> None:
+    def _search(self) -> None:
         """Read all chunks of a file in which the records' lengths can no longer be followed from one to the next."""
         self.found.messages.clear()
         self.found.losses.clear()
         self._unpacking = Unpacking(self.found.size)
-        for start, chunk in self._marked(size):
+        for start, chunk in self._marked():
             self._unpack(chunk, start)
 
-    def _marked(self, size: int = -1) -> Iterator[tuple[int, mcap.Chunk]]:
-        """All chunks that are there as a whole, and where.
-
-        Behind the first `size` bytes nothing is searched: the index at the end of a file looks like chunks.
-        """
+    def _marked(self) -> Iterator[tuple[int, mcap.Chunk]]:
         self.file.seek(0)
-        return marked(self.file.read(size), self.found.size)
+        return marked(self.file.read(), self.found.size)
 
     def _unpack(self, chunk: mcap.Chunk, offset: int) -> None:
         """Keep what a chunk holds, or say why not."""
