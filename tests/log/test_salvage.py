@@ -21,7 +21,7 @@ def sample(below: int, size: int) -> list[int]:
     return [int(place) for place in np.random.default_rng(20).choice(below, size, replace=False)]
 
 
-def record_starts(data: bytes) -> Iterator[int]:
+def record_starts(data: bytes | bytearray) -> Iterator[int]:
     """Where the records of a whole file begin."""
     at, magic = 8, 8
     while at < len(data) - magic:
@@ -74,6 +74,16 @@ def test_a_record_taken_for_another_kind_costs_no_more_than_itself(finished_log:
             record = read_session(finished_log)
             assert record.losses
             assert len(all_trials - {trial.index for trial in record.table}) <= 1
+
+
+def test_a_wrong_length_of_the_mark_behind_the_records_is_told(finished_log: Path) -> None:
+    whole = bytearray(finished_log.read_bytes())
+    (mark,) = (start for start in record_starts(whole) if whole[start] == 15)
+    whole[mark + 1] ^= 4  # a length of none, where the checksum follows nonetheless
+    finished_log.write_bytes(whole)
+    record = read_session(finished_log)
+    assert record.losses == ("The mark behind the last record is damaged. No record is affected.",)
+    assert len(record.table) == 8
 
 
 def test_a_length_that_swallows_other_blocks_costs_none_of_them(finished_log: Path) -> None:

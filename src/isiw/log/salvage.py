@@ -239,8 +239,17 @@ class _Reading:
             _keep_attachment(record, self.file, self._readable_to, found)
         elif isinstance(record, mcap.Metadata) and record.name.startswith(ANNOUNCEMENT):
             found.topics[int(record.metadata["id"])] = record.metadata["topic"]
-        self.sealed = self.sealed or isinstance(record, mcap.DataEnd)
+        elif isinstance(record, mcap.DataEnd):
+            self.sealed = self.sealed or self._is_as_long_as_it_says()
         found.finished = found.finished or isinstance(record, mcap.Footer)
+
+    def _is_as_long_as_it_says(self) -> bool:
+        """Whether the record that has just been read has the length that it states."""
+        end = self.file.tell()
+        self.file.seek(self._readable_to + 1)
+        length = int.from_bytes(self.file.read(8), "little")
+        self.file.seek(end)
+        return self._readable_to + RECORD_HEAD_BYTES + length == end
 
     def _read_torn(self, *, at_a_records_end: bool) -> None:
         """Read a file that ends before its records do."""
