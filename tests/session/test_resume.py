@@ -338,6 +338,36 @@ def test_an_exclusion_counts_from_where_it_stands(interrupted: Path, uninterrupt
     assert again.trials == session.trials
 
 
+def test_the_trial_that_was_excluded_last_is_known_after_an_interruption(interrupted: Path) -> None:
+    exclude(interrupted, 3, "sneezed")
+    exclude(interrupted, 1, "moved")
+    seen: list[int | None] = []
+
+    def undo(update: SessionUpdate) -> None:
+        if update.trial.index == 4:
+            for _ in range(2):
+                seen.append(session.last_excluded)
+                session.include(seen[-1] if seen[-1] is not None else -1)
+            seen.append(session.last_excluded)
+
+    session = resume(interrupted, ScriptedDevice(), scripted_strategy(10), on_trial=undo)
+    session.run()
+    assert seen == [1, 3, None]
+    with open_session(scripted_strategy(10), own_loop_log(interrupted.parent), resume=True) as recorder:
+        assert recorder.last_excluded == 0
+
+
+def own_loop_log(folder: Path) -> Path:
+    """The log of a loop of one's own, with two trials, both excluded, the first one last."""
+    log = folder / "own.mcap"
+    with open_session(scripted_strategy(10), log) as recorder:
+        for mep_mv in (0.1, 0.2):
+            recorder.tell(recorder.ask(), mep_mv)
+        recorder.exclude(1)
+        recorder.exclude(0)
+    return log
+
+
 @pytest.mark.parametrize("trial", [-1, 4, 99])
 def test_only_a_trial_that_counts_can_be_excluded(interrupted: Path, trial: int) -> None:
     with pytest.raises(InvalidValueError, match="cannot exclude this trial"):

@@ -13,7 +13,7 @@ from isiw.log.schema import Event, EventKind
 from isiw.signals.plausibility import implausible_amplitude
 from isiw.trials import MistrialReason, Trial, TrialTable
 
-__all__ = ["LOOKED_AT", "VERDICTS", "acceptance", "exclusion", "inclusion", "under", "under_all"]
+__all__ = ["LOOKED_AT", "VERDICTS", "acceptance", "excluded_by", "exclusion", "inclusion", "under", "under_all"]
 
 VERDICTS: Final[dict[EventKind, Callable[[Trial], Trial]]] = {
     "exclusion": lambda trial: dataclasses.replace(trial, excluded=True),
@@ -50,6 +50,21 @@ def under_all(trials: TrialTable, events: Iterable[Event]) -> TrialTable:
         if event.kind in VERDICTS:
             trials = trials.changed(lambda trial, event=event: under(trial, event))  # type: ignore[misc]
     return trials
+
+
+def excluded_by(events: Iterable[Event]) -> list[int]:
+    """The trials that some events leave excluded, the one that was excluded last at the end.
+
+    Args:
+        events: what happened.
+    """
+    excluded: list[int] = []
+    for event in events:
+        if event.kind in VERDICTS and event.trial is not None:
+            excluded = [number for number in excluded if number != event.trial]
+            if event.kind == "exclusion":
+                excluded.append(event.trial)
+    return excluded
 
 
 def exclusion(trials: TrialTable, number: int, reason: str = "") -> Event:

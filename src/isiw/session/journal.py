@@ -11,7 +11,7 @@ from isiw import checks
 from isiw.devices.protocol import Answer
 from isiw.errors import InvalidValueError, LimitExceededError, told
 from isiw.log.schema import Event, EventKind, Intent, Waveform
-from isiw.log.verdicts import under_all
+from isiw.log.verdicts import excluded_by, under_all
 from isiw.log.writer import LogWriter
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus, Sweep, Trial, TrialTable
@@ -54,17 +54,30 @@ class Journal:
 
     Args:
         trials: what was delivered before.
-
-    `excluded` are the trials that do not count, the one that was excluded last at the end.
+        events: what happened meanwhile.
     """
 
-    def __init__(self, trials: TrialTable | None = None) -> None:
-        self.trials = trials or TrialTable()
-        self.excluded = [trial.index for trial in self.trials if trial.excluded]
+    def __init__(self, trials: TrialTable | None = None, events: Iterable[Event] = ()) -> None:
+        self.begin_after(trials or TrialTable(), events)
         self.unconcluded: Trial | None = None
         self.overruled = False
         self._log: LogWriter | None = None
         self._lock = threading.RLock()
+
+    def begin_after(self, trials: TrialTable, events: Iterable[Event]) -> None:
+        """Begin where another run ended.
+
+        Args:
+            trials: what was delivered before.
+            events: what happened meanwhile.
+        """
+        self.trials, self._events = trials, list(events)
+
+    @property
+    def last_excluded(self) -> int | None:
+        """The trial that was excluded last, of those that are; None where none is."""
+        excluded = excluded_by(self._events)
+        return excluded[-1] if excluded else None
 
     @property
     def log(self) -> LogWriter:
@@ -133,9 +146,7 @@ class Journal:
             event = verdict(self.trials)
             self.log.append(event)
             self.trials = under_all(self.trials, [event])
-            self.excluded = [number for number in self.excluded if number != event.trial]
-            if event.trial is not None and event.kind == "exclusion":
-                self.excluded.append(event.trial)
+            self._events.append(event)
             self.overruled = True
         self.log.sync()
 

@@ -43,7 +43,7 @@ class Judging(ABC):
     @property
     def last_excluded(self) -> int | None:
         """The trial that was excluded last, of those that are; None where none is."""
-        return self._journal.excluded[-1] if self._journal.excluded else None
+        return self._journal.last_excluded
 
     def exclude(self, trial: int, reason: str = "") -> None:
         """Let a trial not count from here on: an event is appended, and the strategy learns anew without it.

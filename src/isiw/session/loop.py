@@ -171,7 +171,7 @@ class Session(Judging):
         open_log: Callable[[Header], LogWriter],
         first_records: Sequence[Record],
         earlier_s: Callable[[], Sequence[float]] = tuple,
-        pauses: Sequence[str] = (),
+        events: Sequence[Event] = (),
     ) -> None:
         """Begin where another run ended; `isiw.resume` does this for you.
 
@@ -181,11 +181,13 @@ class Session(Judging):
             open_log: opens the log that goes on, with that header.
             first_records: what it holds next.
             earlier_s: says how long ago each stimulus before was [s].
-            pauses: why it paused before.
+            events: what happened before.
         """
-        self._journal.trials, self._header = trials, header
+        self._journal.begin_after(trials, events)
+        self._header = header
         self._open_log, self._first_records = open_log, first_records
         self._own_earlier_s, self._resumed = earlier_s, True
+        pauses = [event.text for event in events if event.kind == "pause"]
         self._steps.delivery.watch = self._steps.delivery.watch.resumed(trials, pauses)
 
     def run(self, *, progress: bool | None = None, keys: bool = True) -> SessionResult:

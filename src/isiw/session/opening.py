@@ -145,7 +145,7 @@ def _resumed(
         strategy = replayed.strategy
         writer.append(believed(strategy, len(replayed.trials) - 1, strategy.decision(), None))
     writer.sync()
-    return Recorder(replayed.strategy, writer, header, clock, replayed.trials, ages, on_doubt)
+    return Recorder(replayed.strategy, writer, header, clock, replayed.trials, record.events, ages, on_doubt)
 
 
 def _require_reported(limits: Limits) -> None:

@@ -39,6 +39,7 @@ class Recorder(Judging):
         header: what the session is: its limits and its protocol.
         clock: tells the time, and waits.
         trials: what was delivered before; the strategy has learned it.
+        events: what happened meanwhile.
         earlier_s: how long ago each of these was [s].
         on_doubt: as for `open_session`.
     """
@@ -50,10 +51,11 @@ class Recorder(Judging):
         header: Header,
         clock: Clock,
         trials: TrialTable | None = None,
+        events: Sequence[Event] = (),
         earlier_s: Sequence[float] = (),
         on_doubt: Callable[[str], None] | None = None,
     ) -> None:
-        self.strategy, self._journal, self._space = strategy, Journal(trials), strategy.space
+        self.strategy, self._journal, self._space = strategy, Journal(trials, events), strategy.space
         self._log, self._clock, self._on_doubt = log, clock, on_doubt
         self._limits, self._protocol, self._seed = header.limits, header.protocol, header.seed
         self._open = ExitStack()

@@ -116,7 +116,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
         partial(LogWriter.continuing, path, salvaged, header),
         (*replayed.unknown, resumption(record, replayed, limits)),
         partial(ages_s, salvaged, len(replayed.trials)),
-        [event.text for event in record.events if event.kind == "pause"],
+        record.events,
     )
     return session
 
