@@ -11,6 +11,7 @@ from isiw.interval.task import answer, session_blocks
 from isiw.log.production import Block
 from isiw.log.reader import read_session
 from isiw.log.writer import LogWriter
+from isiw.strategy.threshold import IntensityRange
 from log.written import make_header
 
 BLOCKS = session_blocks(3, trials=4)
@@ -98,9 +99,19 @@ def test_readers_of_sessions_refuse_it_and_say_what_reads_it(tmp_path: Path) -> 
         read_session(written(tmp_path / "a.mcap", 1))
 
 
-def test_a_session_is_refused_with_what_reads_it(tmp_path: Path) -> None:
-    LogWriter.create(tmp_path / "s.mcap", make_header()).close()
-    with pytest.raises(LogError, match=r"of a session.*isiw show LOG"):
+@pytest.mark.parametrize(
+    ("intensities", "match"),
+    [
+        (None, r"search for a window, not (.|\n)*isiw show \S*s\.mcap"),
+        (IntensityRange(20, 90), r"search for a motor threshold, not (.|\n)*isiw threshold \S*s\.mcap --show"),
+    ],
+)
+def test_a_log_with_stimuli_is_refused_with_what_shows_it(
+    tmp_path: Path, intensities: IntensityRange | None, match: str
+) -> None:
+    header = make_header().model_copy(update={"intensities": intensities})
+    LogWriter.create(tmp_path / "s.mcap", header).close()
+    with pytest.raises(LogError, match=match):
         read_productions(tmp_path / "s.mcap")
 
 

@@ -36,7 +36,8 @@ class Limits:
         max_coil_c: highest temperature of the coil at which to deliver [°C]; the device must report it.
         intensity_pct_mso: the only intensity at which to deliver [% of the maximum stimulator output]; the device must
             report it. Where None, one that is reported when the device is staged may not change any more.
-        max_consecutive_mistrials: after so many mistrials in a row a session pauses, so that a person can look.
+        max_consecutive_mistrials: after so many trials in a row that are rejected, or show a faulty rig, a
+            session pauses, so that a person can look.
 
     Raises:
         InvalidValueError: values that are not finite or limit nothing, or a number that is not whole.

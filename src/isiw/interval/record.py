@@ -13,11 +13,12 @@ import pandas as pd
 
 import isiw
 from isiw.checks import text, whole
-from isiw.errors import InvalidValueError, LogError
+from isiw.errors import InvalidValueError
+from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.production import PRODUCTION_VERSION, Block, Production, ProductionHeader
 from isiw.log.records import Records
 from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import Event
+from isiw.log.schema import SCHEMA_VERSION, Event, Header
 from isiw.log.writer import LogWriter
 
 __all__ = ["NEAR_MS", "ProductionRecord", "begin_log", "continue_log", "read_productions"]
@@ -123,7 +124,9 @@ def continue_log(path: str | Path) -> tuple[ProductionRecord, LogWriter]:
     record = _record_of(found)
     if not record.left:
         raise InvalidValueError(
-            "this task is complete", got=str(record.path), remedy="Look at it with: isiw interval LOG --show"
+            "this task is complete",
+            got=str(record.path),
+            remedy=f"Look at it with: {LogKind.PRODUCTION.shown_by(record.path)}",
         )
     log = LogWriter.continuing(path, found, record.header)
     log.append(Event(kind="resume", trial=None, text=f"Resumed before trial {record.left[0][0]}."))
@@ -144,13 +147,10 @@ def read_productions(path: str | Path) -> ProductionRecord:
 
 
 def _record_of(found: Salvage) -> ProductionRecord:
-    if any(message.topic == "/header" for message in found.messages):
-        raise LogError(
-            "this log is of a session, and not of an interval production task",
-            got=str(found.path),
-            remedy="Look at it with: isiw show LOG",
-        )
     records = Records.of(found)
+    if any(message.topic == "/header" for message in found.messages):
+        kind = kind_of(records.header_of(Header, SCHEMA_VERSION))
+        raise of_another_kind(found.path, kind, LogKind.PRODUCTION)
     return ProductionRecord(
         found.path,
         records.header_of(ProductionHeader, PRODUCTION_VERSION),

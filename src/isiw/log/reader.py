@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from isiw.errors import DamagedLogError, InvalidValueError, LogError
+from isiw.errors import DamagedLogError, InvalidValueError
 from isiw.log.frames import trial_frame
+from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.onsets import Onset
 from isiw.log.records import Records
 from isiw.log.salvage import Salvage, salvage
@@ -202,12 +203,8 @@ def read_salvaged(salvaged: Salvage) -> SessionRecord:
         DamagedLogError: not even the header can be read.
     """
     record = read_any(salvaged)
-    if record.header.intensities is not None:
-        raise LogError(
-            "the log is of a motor threshold, not of a search for a window",
-            got=str(record.path),
-            remedy=f"{command('threshold', record.path, '--show')} says what was found.",
-        )
+    if (kind := kind_of(record.header)) is not LogKind.SEARCH:
+        raise of_another_kind(record.path, kind, LogKind.SEARCH)
     return record
 
 
@@ -222,11 +219,7 @@ def read_any(salvaged: Salvage) -> SessionRecord:
         DamagedLogError: not even the header can be read.
     """
     if of_production(salvaged):
-        raise LogError(
-            "the log is of an interval production task, not of a search for a window",
-            got=str(salvaged.path),
-            remedy=f"{command('interval', salvaged.path, '--show')} says what was produced.",
-        )
+        raise of_another_kind(salvaged.path, LogKind.PRODUCTION, LogKind.SEARCH)
     records = Records.of(salvaged)
     return SessionRecord(
         salvaged.path,
@@ -268,7 +261,7 @@ def _standing(history: Sequence[Record]) -> dict[int, Intent]:
 
 
 def require_records(records: Iterable[object]) -> None:
-    """Check that sessions were read, and are not their paths.
+    """Raise where these are no records of sessions, but the paths of their logs, say.
 
     Args:
         records: what should be records of sessions.

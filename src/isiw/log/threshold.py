@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from isiw.errors import LogError
+from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.reader import SessionRecord, read_any
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import PulseOutcome
-from isiw.text.commands import command
 
 __all__ = ["outcomes", "pulses_given", "read_threshold", "read_threshold_salvaged"]
 
@@ -36,12 +35,8 @@ def read_threshold_salvaged(salvaged: Salvage) -> SessionRecord:
         LogError: the log is of something else.
     """
     record = read_any(salvaged)
-    if record.header.intensities is None:
-        raise LogError(
-            "the log is of a search for a window, not of a motor threshold",
-            got=str(record.path),
-            remedy=f"{command('show', record.path)} says what was found.",
-        )
+    if (kind := kind_of(record.header)) is not LogKind.THRESHOLD:
+        raise of_another_kind(record.path, kind, LogKind.THRESHOLD)
     return record
 
 

@@ -146,8 +146,8 @@ class Recorder(Judging):
 
         Raises:
             InvalidValueError: nothing was asked, a value that cannot be, a slip of unit or order, a pulse before the
-                impact, or an ISI that is too uncertain; the outcome is not
-                logged, and the right value can be told. TMS alone counts as given from the first try on.
+                impact, or an ISI that is too uncertain; the outcome is not logged, and the right value can be told.
+                TMS alone counts as given from the first try on.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             LogError: the log cannot be written.
 

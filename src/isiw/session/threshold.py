@@ -15,6 +15,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.pacing import Pacing
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError, told
+from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import salvage
@@ -127,10 +128,15 @@ def search_of(record: SessionRecord, search: ThresholdSearch | None = None) -> T
 
     Raises:
         InvalidValueError: as for `resume_threshold`.
+        LogError: the log is of something else.
     """
     recipe, space = record.header.strategy, record.header.intensities
-    if space is None or (search is not None and search.space != space):
-        raise InvalidValueError("the log has another range of intensities", got=space)
+    if space is None:
+        raise of_another_kind(record.path, LogKind.SEARCH, LogKind.THRESHOLD)
+    if search is not None and search.space != space:
+        raise InvalidValueError(
+            "the search has another range of intensities than the log", got=search.space, expected=str(space)
+        )
     search = search or make_threshold_search(recipe.name.removeprefix("threshold/"), space, **recipe.settings)
     search.pulses = tuple(_pulse(each) for each in outcomes(record) if not each.reason)
     return search

@@ -61,7 +61,7 @@ class Recipe:
 
 
 class Strategy:
-    """Proposes the next ISI and learns from each outcome. One of the two objects that change over time.
+    """Proposes the next ISI and learns from each outcome; it changes with each.
 
     Args:
         space: the ISIs that may be asked.
@@ -290,7 +290,7 @@ class Strategy:
             StrategyError: a kind of outcome that the model cannot learn from.
         """
         if (mep_mv is None) == (response is None):
-            raise InvalidValueError("tell needs either mep_mv or response", got=(mep_mv, response))
+            raise InvalidValueError("tell needs either mep_mv or response, and not both", got=(mep_mv, response))
         if not (response is None or isinstance(response, bool | np.bool_)):
             raise InvalidValueError("response must be True or False", got=response)
         mep_mv = None if mep_mv is None else amplitude("mep_mv", mep_mv)

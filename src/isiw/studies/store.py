@@ -125,7 +125,7 @@ class Store:
         raise StudyError("the study has no such unit", got=key, remedy="The rows have their units in the column unit.")
 
     def require_same_code(self) -> None:
-        """Raise where other code would go on than began: its rows do not belong into one table.
+        """Raise where other code would go on than began: its rows do not belong in one table.
 
         Raises:
             StudyError: isiw was changed since, though its version was not.
