@@ -10,6 +10,7 @@ from isiw.interval.record import begin_log, continue_log, read_productions
 from isiw.interval.task import answer, session_blocks
 from isiw.log.production import Block
 from isiw.log.reader import read_session
+from isiw.log.threshold import read_threshold
 from isiw.log.writer import LogWriter
 from isiw.strategy.threshold import IntensityRange
 from log.written import make_header
@@ -95,8 +96,11 @@ def test_a_log_is_never_overwritten_and_the_way_on_is_named(tmp_path: Path) -> N
 
 
 def test_readers_of_sessions_refuse_it_and_say_what_reads_it(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"interval production task(.|\n)*isiw interval .* --show"):
-        read_session(written(tmp_path / "a.mcap", 1))
+    log = written(tmp_path / "a.mcap", 1)
+    with pytest.raises(LogError, match=r"interval production task, not .* window(.|\n)*isiw interval .* --show"):
+        read_session(log)
+    with pytest.raises(LogError, match=r"interval production task, not .* threshold(.|\n)*isiw interval .* --show"):
+        read_threshold(log)
 
 
 @pytest.mark.parametrize(

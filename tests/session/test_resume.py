@@ -343,29 +343,24 @@ def test_the_trial_that_was_excluded_last_is_known_after_an_interruption(interru
     exclude(interrupted, 1, "moved")
     seen: list[int | None] = []
 
-    def undo(update: SessionUpdate) -> None:
-        if update.trial.index == 4:
-            for _ in range(2):
-                seen.append(session.last_excluded)
-                session.include(seen[-1] if seen[-1] is not None else -1)
-            seen.append(session.last_excluded)
+    def undo(_: SessionUpdate) -> None:
+        seen.append(session.last_excluded)
+        if seen[-1] is not None:
+            session.include(seen[-1])
 
-    session = resume(interrupted, ScriptedDevice(), scripted_strategy(10), on_trial=undo)
+    session = resume(interrupted, ScriptedDevice(), scripted_strategy(7), on_trial=undo)
     session.run()
     assert seen == [1, 3, None]
-    with open_session(scripted_strategy(10), own_loop_log(interrupted.parent), resume=True) as recorder:
-        assert recorder.last_excluded == 0
 
 
-def own_loop_log(folder: Path) -> Path:
-    """The log of a loop of one's own, with two trials, both excluded, the first one last."""
-    log = folder / "own.mcap"
+def test_a_loop_of_ones_own_knows_after_an_interruption_which_trial_was_excluded_last(log: Path) -> None:
     with open_session(scripted_strategy(10), log) as recorder:
         for mep_mv in (0.1, 0.2):
             recorder.tell(recorder.ask(), mep_mv)
         recorder.exclude(1)
         recorder.exclude(0)
-    return log
+    with open_session(scripted_strategy(10), log, resume=True) as recorder:
+        assert recorder.last_excluded == 0
 
 
 @pytest.mark.parametrize("trial", [-1, 4, 99])

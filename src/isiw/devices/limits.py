@@ -36,8 +36,8 @@ class Limits:
         max_coil_c: highest temperature of the coil at which to deliver [°C]; the device must report it.
         intensity_pct_mso: the only intensity at which to deliver [% of the maximum stimulator output]; the device must
             report it. Where None, one that is reported when the device is staged may not change any more.
-        max_consecutive_mistrials: after so many trials in a row that are rejected, or show a faulty rig, a
-            session pauses, so that a person can look.
+        max_consecutive_mistrials: after so many trials in a row that are rejected, or show a faulty rig, a session
+            pauses, so that a person can look.
 
     Raises:
         InvalidValueError: values that are not finite or limit nothing, or a number that is not whole.
@@ -78,7 +78,8 @@ class Limits:
             space: the design space.
             min_iti_s: shortest time between two deliveries [s].
             max_pulses: largest number of deliveries in a session.
-            max_consecutive_mistrials: after so many mistrials in a row a session pauses.
+            max_consecutive_mistrials: after so many trials in a row that are rejected, or show a faulty rig, a session
+                pauses.
 
         Raises:
             InvalidValueError: no design space, or values that are not finite or limit nothing.

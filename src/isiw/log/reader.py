@@ -192,34 +192,36 @@ def read_session(path: str | Path) -> SessionRecord:
     return read_salvaged(salvage(path))
 
 
-def read_salvaged(salvaged: Salvage) -> SessionRecord:
-    """The search for a window in what was salvaged from a log.
+def read_salvaged(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionRecord:
+    """The search in what was salvaged from a log.
 
     Args:
         salvaged: what was read.
+        wanted: what the log should be of.
 
     Raises:
-        LogError: the log holds no search for a window, or is from a newer version.
+        LogError: the log is of something else, or from a newer version.
         DamagedLogError: not even the header can be read.
     """
-    record = read_any(salvaged)
-    if (kind := kind_of(record.header)) is not LogKind.SEARCH:
-        raise of_another_kind(record.path, kind, LogKind.SEARCH)
+    record = read_any(salvaged, wanted)
+    if (kind := kind_of(record.header)) is not wanted:
+        raise of_another_kind(record.path, kind, wanted)
     return record
 
 
-def read_any(salvaged: Salvage) -> SessionRecord:
+def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionRecord:
     """What was salvaged from a log, be it of a search for a window or of a motor threshold.
 
     Args:
         salvaged: what was read.
+        wanted: what the log is hoped to be of, for the error.
 
     Raises:
         LogError: the log of an interval production task, or one from a newer version.
         DamagedLogError: not even the header can be read.
     """
     if of_production(salvaged):
-        raise of_another_kind(salvaged.path, LogKind.PRODUCTION, LogKind.SEARCH)
+        raise of_another_kind(salvaged.path, LogKind.PRODUCTION, wanted)
     records = Records.of(salvaged)
     return SessionRecord(
         salvaged.path,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from isiw.log.kinds import LogKind, kind_of, of_another_kind
-from isiw.log.reader import SessionRecord, read_any
+from isiw.log.kinds import LogKind
+from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import PulseOutcome
 
@@ -34,10 +34,7 @@ def read_threshold_salvaged(salvaged: Salvage) -> SessionRecord:
     Raises:
         LogError: the log is of something else.
     """
-    record = read_any(salvaged)
-    if (kind := kind_of(record.header)) is not LogKind.THRESHOLD:
-        raise of_another_kind(record.path, kind, LogKind.THRESHOLD)
-    return record
+    return read_salvaged(salvaged, LogKind.THRESHOLD)
 
 
 def outcomes(record: SessionRecord) -> tuple[PulseOutcome, ...]:
