@@ -20,6 +20,7 @@ from isiw.subjects.cohorts import COHORTS, cohort, person_of
 from isiw.subjects.days import another_day
 from isiw.subjects.labs import LABS, lab
 from isiw.subjects.profiles import OpposedProfile, PeakProfile, TwoPeakProfile
+from isiw.subjects.realities import CHANGED
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
 from isiw.subjects.subject import Drift, SimulatedSubject
 from isiw.types import ArrayLike, FloatArray
@@ -28,13 +29,16 @@ from known import instance, known
 PEOPLE = 400
 KS_LEVEL = 1e-5
 OFF_THE_MAP = ("other-rig", "late", "very-wide", "steep", "flat", "weak", "rmt-off", "hand", "electrical")
-OTHER_LAWS = {"odd", "kim11", "kim11-measured", "another-day", "supra-threshold", *LABS}
+REALITIES = (*CHANGED, "narrow-unstated", "wide-early", "above-threshold", "hand-flat")
+OTHER_LAWS = {"odd", "kim11", "kim11-measured", "another-day", "supra-threshold", *LABS, *REALITIES}
 USUAL_START = [name for name in COHORTS if name not in {"late", "very-wide", "electrical", *OTHER_LAWS}]
 USUAL_DELAY = [name for name in COHORTS if name not in {"other-rig", *OTHER_LAWS}]
 USUAL_WIDTH = [name for name in COHORTS if name not in {"narrow", "wide", "very-wide", "electrical", *OTHER_LAWS}]
 GAIN = [name for name in COHORTS if name not in {"recruitment", "nonresponder", *OTHER_LAWS, *OFF_THE_MAP}]
 SOME_WITHOUT_A_WINDOW = {
     "nonresponder": 0.0,
+    "hand-flat": 0.0,
+    **dict.fromkeys((*CHANGED, "above-threshold"), 0.5),
     **dict.fromkeys(("steep", "weak", "rmt-off", "odd", "another-day", *LABS), 0.9),
 }
 SPACES = [VALVE_SPACE, IMPACT_SPACE]
@@ -73,6 +77,17 @@ GOLDEN = {  # person 3 of seed 7: start, width, hit delay [ms]; baseline, one ME
     "lab-late": (138.189661220, 85.013381303, 177.032057023, 55.153055983, 134.267019245),
     "lab-rig": (-1.656078453, 138.533150191, 45.954129384, 17.539448992, 24.883362277),
     "another-day": (86.347281970, 48.950264038, 184.314189247, 13.879170544, 14.421862001),
+    "step": (81.012881495, 90.560929756, 189.365568514, 22.170657720, 45.164054131),
+    "ramp": (29.857617357, 62.566342772, 185.971627415, 14.919375828, 19.411587999),
+    "retuned": (106.458277098, 88.860301485, 181.353444246, 24.494754465, 58.121870850),
+    "fading": (15.136013650, 60.182860626, 180.402314083, 13.750959843, 22.808404145),
+    "moving": (28.058038202, 85.162561249, 185.570235669, 22.583014655, 41.157359736),
+    "tap-response": (9.006871941, 59.787186602, 188.459837551, 17.672638757, 24.533129379),
+    "coarse": (36.490709217, 76.347793697, 182.223155273, 22.105619155, 35.000000000),
+    "narrow-unstated": (20.616196848, 34.005905577, 176.681130899, 13.584031706, 16.984726636),
+    "wide-early": (5.719166380, 232.895172209, 186.014928978, 15.309943927, 58.461965103),
+    "above-threshold": (78.356068374, 113.496183169, 188.615581818, 78.655825082, 102.568477278),
+    "hand-flat": (97.698950486, 148.604497863, 189.425449654, 12.975470100, 17.062463144),
 }
 
 

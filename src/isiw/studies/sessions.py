@@ -206,7 +206,7 @@ class _Person:
     def __init__(self, session: SimulatedSession, number: int, crowd: Crowd) -> None:
         subject = session.subject()
         self.session, self.number, self.crowd = session, number, crowd
-        self.truth = subject.window(session.space)
+        self.still = subject.window(session.space) if subject.change is None else None
         self.responder = subject.begin(session.seed + session.person)
         self.rows: list[dict[str, Any]] = []
         self.mistrials = self.fallbacks = 0
@@ -214,6 +214,14 @@ class _Person:
         converged = math.nan if session.stopping == "ignored" else 0.0
         self.stop: dict[str, Any] = {"stop_trial": math.nan, "stop_reason": "", "converged": converged}
         self.stop |= {f"stop_{name}": math.nan for name in _OF_THE_STOP}
+
+    @property
+    def truth(self) -> Window | None:
+        """The true window now; in a person who does not change, always the same."""
+        responder = self.responder
+        if responder.subject.change is None:
+            return self.still
+        return responder.subject.window(self.session.space, responder.trials)
 
     @property
     def ended(self) -> bool:

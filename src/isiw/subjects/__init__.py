@@ -1,5 +1,6 @@
 """Simulated people: the cohorts on which strategies are compared, and the truth about each person."""
 
+from isiw.subjects.changes import Change, TapResponse
 from isiw.subjects.cohorts import COHORTS, cohort
 from isiw.subjects.days import another_day
 from isiw.subjects.labs import LABS, Lab, lab
@@ -16,6 +17,7 @@ __all__ = [
     "MEASURED_KIM",
     "THRESHOLD_COHORTS",
     "WIDTHS_KIM_MS",
+    "Change",
     "Drift",
     "EmgFloor",
     "GainResponse",
@@ -33,6 +35,7 @@ __all__ = [
     "SimulatedSubject",
     "StimulatedPerson",
     "StimulatedResponder",
+    "TapResponse",
     "TrialNoise",
     "TwoPeakProfile",
     "another_day",

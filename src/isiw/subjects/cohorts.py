@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Final, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from isiw.subjects.days import another_day
 from isiw.subjects.labs import LABS, lab
 from isiw.subjects.measured import MEASURED_KIM, WIDTHS_KIM_MS
 from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
+from isiw.subjects.realities import CHANGED
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import Drift, SimulatedSubject
 from isiw.subjects.supra import supra_threshold
@@ -68,6 +69,7 @@ class _Law:
 
     start_ms: _Pair = (5, 110)
     width_ms: _Pair = (100, 0.42)
+    width_law: Literal["log-normal", "uniform"] = "log-normal"
     width_limits_ms: _Pair = (40, 230)
     hit_delay_ms: _Pair = (170, 190)
     amplitude_mv: _Pair = (0.16, 0.35)
@@ -77,6 +79,7 @@ class _Law:
     sigma_x_pct_rmt: _Pair = (5, 9)
     intensity_sd_pct_rmt: float = 0.0
     intensities_pct_rmt: tuple[float, ...] = (90.0,)
+    intensity_range_pct_rmt: _Pair | None = None
 
     def response(self, rng: np.random.Generator) -> RecruitmentResponse:
         floor = EmgFloor(_log_normal(rng, 0.010, 0.25), float(rng.uniform(0.12, 0.25)))
@@ -92,13 +95,19 @@ class _Law:
 
     def subject(self, rng: np.random.Generator) -> SimulatedSubject:
         start_ms = float(rng.uniform(*self.start_ms))
-        width_ms = float(np.clip(_log_normal(rng, *self.width_ms), *self.width_limits_ms))
+        if self.width_law == "uniform":
+            width_ms = float(rng.uniform(*self.width_ms))
+        else:
+            width_ms = float(np.clip(_log_normal(rng, *self.width_ms), *self.width_limits_ms))
         response = self.response(rng)
         subject = replace(
             _subject(rng, PeakProfile(start_ms, width_ms), response, self.hit_delay_ms),
             input_correlation=float(rng.uniform(0, 0.2)),
         )
-        intensity = float(rng.choice(self.intensities_pct_rmt)) + self.intensity_sd_pct_rmt * rng.standard_normal()
+        if self.intensity_range_pct_rmt is None:
+            intensity = float(rng.choice(self.intensities_pct_rmt)) + self.intensity_sd_pct_rmt * rng.standard_normal()
+        else:
+            intensity = float(rng.uniform(*self.intensity_range_pct_rmt))
         return replace(subject, response=replace(response, intensity_pct_rmt=intensity))
 
 
@@ -123,6 +132,19 @@ _OFF_THE_MAP: Final[Mapping[str, _Law]] = MappingProxyType(
     }
 )
 """People whom the usual law does not cover."""
+
+_REALITIES: Final[Mapping[str, _Law]] = MappingProxyType(
+    {
+        **dict.fromkeys(CHANGED, _USUAL),
+        "narrow-unstated": _Law(start_ms=(5, 90), width_ms=(15, 40), width_law="uniform"),
+        "wide-early": _Law(start_ms=(-40, 20), width_ms=(200, 320), width_law="uniform"),
+        "above-threshold": _Law(intensity_range_pct_rmt=(100, 110)),
+        "hand-flat": replace(_OFF_THE_MAP["hand"], boost_pct_rmt=(0, 0)),
+    }
+)
+"""People in whose sessions something else moves an MEP, or is not as assumed."""
+
+_ALL_WITH_A_WINDOW: Final = frozenset({"narrow-unstated", "wide-early"})
 
 _NARROW: Final = _Law(start_ms=(5, 50), width_ms=(20, 0.3), width_limits_ms=(10, 40))
 """Windows after an electrical pulse: 15–20 ms wide with TMS below the threshold (dissertation, 3.3.4)."""
@@ -170,6 +192,13 @@ def _nonresponder(rng: np.random.Generator, *, kind: bool) -> SimulatedSubject:
     return replace(subject, input_correlation=float(rng.uniform(0, 0.2)))
 
 
+def _reality(rng: np.random.Generator, name: str, *, window: bool) -> SimulatedSubject:
+    law = _REALITIES[name]
+    has_window = window or name in _ALL_WITH_A_WINDOW
+    subject = (law if has_window else replace(law, boost_pct_rmt=(0, 0))).subject(rng)
+    return CHANGED[name](rng, subject) if name in CHANGED else subject
+
+
 def _kim_subject(index: int) -> SimulatedSubject:
     rng = np.random.default_rng([zlib.crc32(b"kim11"), 4, index])
     profile = PeakProfile(float(rng.uniform(20, 100)), WIDTHS_KIM_MS[index])
@@ -215,7 +244,7 @@ _DRAW: Final[dict[str, Callable[[np.random.Generator], SimulatedSubject]]] = {
     "supra-threshold": supra_threshold,
 }
 
-COHORTS: Final = (*_DRAW, "nonresponder", *_ELEVEN, *LABS, "another-day")
+COHORTS: Final = (*_DRAW, "nonresponder", *_ELEVEN, *LABS, "another-day", *_REALITIES)
 """The names that `cohort` knows."""
 
 
@@ -257,5 +286,7 @@ def person_of(name: str, number: int, seed: int) -> SimulatedSubject:
     rng = np.random.default_rng([zlib.crc32(name.encode()), seed, number])
     if name == "nonresponder":
         return _nonresponder(rng, kind=number % 2 == 0)
+    if name in _REALITIES:
+        return _reality(rng, name, window=number % 2 == 0)
     draw = lab(name, seed).subject if name in LABS else _DRAW[name]
     return draw(rng)

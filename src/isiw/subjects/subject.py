@@ -6,7 +6,7 @@ start-up, serial correlation, plasticity).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, get_args
 
 import numpy as np
@@ -23,6 +23,7 @@ from isiw.checks import (
 )
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.subjects.changes import Change, TapResponse, amplitude_of_both_mv
 from isiw.subjects.plasticity import Plasticity
 from isiw.subjects.profiles import OpposedProfile, Profile
 from isiw.subjects.responses import RecruitmentResponse, ResponseCurve, TrialNoise
@@ -93,10 +94,13 @@ class SimulatedSubject:
         conditioning: what is given to them first, a tap or an electrical pulse.
         plasticity: how the pairs that are delivered change the gain; None where they do not. The true window and
             profile are those before the first pair.
+        change: what else changes during a session; None where nothing does.
+        tap_response: what the tap alone evokes in the muscle; None where it evokes nothing.
+        amplitude_step_mv: step to which amplitudes are rounded [mV]; 0 where they are not.
 
     Raises:
-        InvalidValueError: an invalid number or choice, or a depressed segment, but a response that has no recruitment
-            curve.
+        InvalidValueError: an invalid number or choice, or a depressed segment or another intensity, but a response that
+            has no recruitment curve.
     """
 
     profile: Profile
@@ -112,10 +116,13 @@ class SimulatedSubject:
     stated_hit_delay_ms: tuple[float, float] = (180.0, 6.0)
     conditioning: Conditioning = "tap"
     plasticity: Plasticity | None = None
+    change: Change | None = None
+    tap_response: TapResponse | None = None
+    amplitude_step_mv: float = 0.0
 
     def __post_init__(self) -> None:
         check_numbers(self, "hit_delay_ms")
-        check_numbers(self, "hit_delay_sd_ms", "isi_jitter_ms", least=0)
+        check_numbers(self, "hit_delay_sd_ms", "isi_jitter_ms", "amplitude_step_mv", least=0)
         check_numbers(self, "input_correlation", least=-1, most=1)
         check_probabilities(self, "outlier_probability")
         check_numbers(self, "scale", above=0)
@@ -123,26 +130,37 @@ class SimulatedSubject:
         check_choice(self, "conditioning", get_args(Conditioning))
         stated_ms = mean_and_sd("SimulatedSubject.stated_hit_delay_ms", self.stated_hit_delay_ms)
         object.__setattr__(self, "stated_hit_delay_ms", stated_ms)
-        if isinstance(self.profile, OpposedProfile) and not isinstance(self.response, RecruitmentResponse):
+        retuned = self.change is not None and self.change.intensity_pct_rmt != 0
+        if (retuned or isinstance(self.profile, OpposedProfile)) and not isinstance(self.response, RecruitmentResponse):
             raise InvalidValueError(
-                "only an MEP on a recruitment curve can be depressed",
+                "only an MEP on a recruitment curve can be depressed, or depends on the intensity",
                 got=type(self.response).__name__,
                 expected=RecruitmentResponse.__name__,
-                remedy="Give the person a RecruitmentResponse, or a profile without a depressed segment.",
+                remedy="Give the person a RecruitmentResponse, or neither a depressed segment nor another intensity.",
             )
 
-    def facilitation(self, isi_ms: FloatArray, reference: Reference) -> FloatArray:
+    def facilitation(self, isi_ms: FloatArray, reference: Reference, trial: int = 0) -> FloatArray:
         """Facilitation at ISIs on a reference [ms], at the mean hit delay; negative where depressed, same shape.
 
         Args:
             isi_ms: ISIs [ms], any shape.
             reference: what they count from.
+            trial: after how many trials, in a person who changes.
         """
-        return self.profile(isi_ms if reference == "impact" else isi_ms - self.hit_delay_ms)
+        from_impact_ms = np.asarray(isi_ms if reference == "impact" else isi_ms - self.hit_delay_ms)
+        if self.change is None:
+            return self.profile(from_impact_ms)
+        moved_ms = self.change.share(trial) * self.change.shift_ms
+        return self.change.enhancement(trial) * self.profile(from_impact_ms - moved_ms)
 
-    def expected_mep_mv(self, space: DesignSpace) -> FloatArray:
-        """Expected MEP on the space's grid [mV], drift and start-up off, shape (t,)."""
-        evoked = self.response.expected_evoked_mv(self.facilitation(space.grid_ms, space.reference))
+    def expected_mep_mv(self, space: DesignSpace, trial: int = 0) -> FloatArray:
+        """Expected MEP on the space's grid [mV], shape (t,); drift, start-up and changes of level and intensity off.
+
+        Args:
+            space: the design space.
+            trial: after how many trials, in a person whose window fades or moves.
+        """
+        evoked = self.response.expected_evoked_mv(self.facilitation(space.grid_ms, space.reference, trial))
         return self.scale * (evoked + self.response.floor.mean_mv)
 
     @property
@@ -150,9 +168,15 @@ class SimulatedSubject:
         """Expected MEP without a tap [mV]."""
         return self.scale * float(self.response.expected_evoked_mv(0.0) + self.response.floor.mean_mv)
 
-    def window(self, space: DesignSpace) -> Window | None:
-        """The true window on the space's grid; None where there is none."""
-        return window_from_excess(space.grid_ms, self.expected_mep_mv(space) - self.baseline_mv, self.baseline_mv)
+    def window(self, space: DesignSpace, trial: int = 0) -> Window | None:
+        """The true window on the space's grid; None if there is none.
+
+        Args:
+            space: the design space.
+            trial: after how many trials, in a person whose window fades or moves.
+        """
+        excess_mv = self.expected_mep_mv(space, trial) - self.baseline_mv
+        return window_from_excess(space.grid_ms, excess_mv, self.baseline_mv)
 
     def depressed(self, space: DesignSpace) -> Window | None:
         """The true ISIs that depress the MEP: the window's rule for the deficit; None where there are none."""
@@ -189,13 +213,19 @@ class Responder:
         self._walk = 0.0
         self._dose = 0.0
 
-    def respond(self, isi_ms: float | None, reference: Reference) -> Response:
-        """Answer one pair of stimuli.
+    @property
+    def trials(self) -> int:
+        """How many stimuli were answered."""
+        return self._trials
+
+    def respond(self, isi_ms: float | None, reference: Reference, *, pulse: bool = True) -> Response:
+        """Answer one pair of stimuli, or one of them alone.
 
         Args:
             isi_ms: the commanded ISI on the reference [ms]; None for TMS alone.
             reference: the event that the ISI counts from. From the valve command the hit delay's variation stays
                 unseen; from the impact it moves the realised ISI, which is told.
+            pulse: whether the magnetic pulse is given; without it, the amplitude is of what the MEP window would hold.
 
         Raises:
             InvalidValueError: an ISI that is not finite, or an unknown reference.
@@ -203,17 +233,41 @@ class Responder:
         isi_ms = None if isi_ms is None else number("an ISI [ms]", isi_ms)
         choice("the reference", reference, get_args(Reference))
         noise = self._next_noise()
-        told_ms, facilitation = (None, 0.0) if isi_ms is None else self._stimulate(isi_ms, reference)
+        told_ms, from_impact_ms = (None, None) if isi_ms is None else self._stimulate(isi_ms, reference)
+        facilitation = 0.0
+        if from_impact_ms is not None and pulse:
+            facilitation = float(self.subject.facilitation(np.asarray(from_impact_ms), "impact", self._trials))
         self._dose += max(0.0, facilitation)
         subject, rng = self.subject, self._rng
         floor_mv = subject.response.floor.median_mv * np.exp(subject.response.floor.log_sd * rng.standard_normal())
-        mep_mv = subject.response.sample_evoked_mv(facilitation, noise, rng) + floor_mv
+        evoked_mv = self._response().sample_evoked_mv(facilitation, noise, rng) if pulse else 0.0
+        mep_mv = self._with_tap_mv(evoked_mv, noise, from_impact_ms) + floor_mv
         if rng.random() < subject.outlier_probability:
             mep_mv = rng.uniform(*OUTLIERS_MV)
         unseen_ms = 0.0 if subject.jitter_told or isi_ms is None else subject.isi_jitter_ms
-        return Response(told_ms, float(subject.scale * mep_mv), unseen_ms)
+        return Response(told_ms, self._displayed_mv(subject.scale * mep_mv), unseen_ms)
 
-    def respond_instead(self, isi_ms: float | None, reference: Reference) -> Response:
+    def _response(self) -> ResponseCurve:
+        """The response at the intensity of this trial."""
+        change, response = self.subject.change, self.subject.response
+        if change is None or not isinstance(response, RecruitmentResponse):
+            return response
+        added_pct = change.share(self._trials) * change.intensity_pct_rmt
+        return replace(response, intensity_pct_rmt=response.intensity_pct_rmt + added_pct)
+
+    def _with_tap_mv(self, evoked_mv: float, noise: TrialNoise, from_impact_ms: float | None) -> float:
+        """The amplitude of what the MEP window holds above the floor; a gain acts on the tap's response, too."""
+        tap = self.subject.tap_response
+        if tap is None or from_impact_ms is None:
+            return evoked_mv
+        tap_mv = tap.sample_mv(self._rng) * float(np.exp(noise.log_gain))
+        return amplitude_of_both_mv(evoked_mv, tap, tap_mv, from_impact_ms)
+
+    def _displayed_mv(self, mep_mv: float) -> float:
+        step_mv = self.subject.amplitude_step_mv
+        return float(mep_mv if step_mv == 0 else step_mv * np.round(mep_mv / step_mv))
+
+    def respond_instead(self, isi_ms: float | None, reference: Reference, *, pulse: bool = True) -> Response:
         """Answer one pair of stimuli that is given because another was lost; see `respond`.
 
         Its noise is drawn apart, so that what was lost does not move the noise of all later trials. What it does to the
@@ -222,22 +276,24 @@ class Responder:
         Args:
             isi_ms: the commanded ISI on the reference [ms]; None for TMS alone.
             reference: the event that the ISI counts from.
+            pulse: whether the magnetic pulse is given.
         """
         usual, self._rng = self._rng, np.random.default_rng([self._seed, 1, self._trials])
         try:
-            return self.respond(isi_ms, reference)
+            return self.respond(isi_ms, reference, pulse=pulse)
         finally:
             self._rng = usual
 
     def _stimulate(self, isi_ms: float, reference: Reference) -> tuple[float, float]:
+        """The ISI as told, and the true one from the impact [ms]."""
         subject, rng = self.subject, self._rng
         late_ms = subject.hit_delay_sd_ms * rng.standard_normal()
         realised_ms = isi_ms + subject.isi_jitter_ms * rng.standard_normal()
         told_ms = realised_ms if subject.jitter_told else isi_ms
         from_impact_ms = realised_ms - late_ms
         if reference == "valve":
-            return told_ms, float(subject.profile(from_impact_ms - subject.hit_delay_ms))
-        return told_ms - late_ms, float(subject.profile(from_impact_ms))
+            return told_ms, from_impact_ms - subject.hit_delay_ms
+        return told_ms - late_ms, from_impact_ms
 
     def _next_noise(self) -> TrialNoise:
         subject, rng = self.subject, self._rng
@@ -251,4 +307,6 @@ class Responder:
         if subject.plasticity is not None:
             log_gain += subject.plasticity.log_gain(self._dose)
         self._trials += 1
+        if subject.change is not None:
+            log_gain += subject.change.share(self._trials) * subject.change.log_gain
         return TrialNoise(float(self._input_z), float(log_gain))

@@ -1,0 +1,152 @@
+"""What else moves an MEP than the ISI and chance: changes during a session, the tap's own response, coarse amplitudes.
+
+A coil that is re-seated, a gain, or another intensity changes all evoked amplitudes at once; habituation and plasticity
+change the enhancement; and the tap itself may evoke a response in the muscle that is recorded [Kim2020, 2.2, Fig. 3.7].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from isiw.checks import check_numbers, check_wholes
+from isiw.errors import InvalidValueError
+from isiw.types import FloatArray
+
+__all__ = ["Change", "TapResponse", "amplitude_of_both_mv"]
+
+MEP_WINDOW_MS: Final = (15.0, 35.0)
+"""The MEP window [ms after the magnetic pulse] [Kim2020, 5.2.3]."""
+
+_STEP_MS: Final = 0.5
+_AFTER_PULSE_MS: Final = np.arange(MEP_WINDOW_MS[0], MEP_WINDOW_MS[1] + _STEP_MS / 2, _STEP_MS)
+_MEP_CENTRE_MS, _MEP_LOBE_MS = 25.6, 4.3
+"""Middle of a forearm muscle's MEP, and from there to its peak and its trough [ms] (docs/physiology.md)."""
+
+_OSCILLATION_HZ: Final = 80.0
+"""Frequency of the tap's response: that of surface EMG."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change in the course of a session: none before trial `first`, whole from trial `last` on, linear in between.
+
+    Args:
+        first: number of the first trial that is changed, from 1 on.
+        last: number of the trial from which on the change is complete; `first` is a step.
+        log_gain: change of everything that is evoked, natural log.
+        intensity_pct_rmt: change of the intensity [% RMT]; of a person with a recruitment curve.
+        shift_ms: by how much the window moves [ms].
+        half_life: after so many trials the enhancement is half of what it was, from the first trial on; None where it
+            stays.
+
+    Raises:
+        InvalidValueError: a number that is not finite, trials in the wrong order, or a half-life that is not positive.
+    """
+
+    first: int = 1
+    last: int = 1
+    log_gain: float = 0.0
+    intensity_pct_rmt: float = 0.0
+    shift_ms: float = 0.0
+    half_life: float | None = None
+
+    def __post_init__(self) -> None:
+        check_wholes(self, "first", least=1)
+        check_wholes(self, "last", least=1)
+        check_numbers(self, "log_gain", "intensity_pct_rmt", "shift_ms")
+        check_numbers(self, "half_life", above=0, optional=True)
+        if self.last < self.first:
+            raise InvalidValueError("a change ends before it begins", got=(self.first, self.last))
+
+    def share(self, trial: int) -> float:
+        """How much of the change there is at a trial, in 0–1.
+
+        Args:
+            trial: its number, from 1 on.
+        """
+        return float(np.clip((trial - self.first + 1) / (self.last - self.first + 1), 0.0, 1.0))
+
+    def enhancement(self, trial: int) -> float:
+        """The factor on the enhancement at a trial.
+
+        Args:
+            trial: its number, from 1 on.
+        """
+        return 1.0 if self.half_life is None else float(2.0 ** (-trial / self.half_life))
+
+
+@dataclass(frozen=True)
+class TapResponse:
+    """What the tap alone evokes in the muscle that is recorded: a burst of fixed course and varying size.
+
+    Args:
+        start_ms: when it begins [ms after the hit].
+        duration_ms: how long it lasts [ms].
+        median_mv: median of its peak-to-peak amplitude [mV].
+        log_sd: SD of the amplitude from trial to trial, natural log.
+
+    Raises:
+        InvalidValueError: a duration or an amplitude that is not positive, or a negative SD.
+    """
+
+    start_ms: float
+    duration_ms: float
+    median_mv: float
+    log_sd: float
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "start_ms")
+        check_numbers(self, "duration_ms", "median_mv", above=0)
+        check_numbers(self, "log_sd", least=0)
+
+    def course(self, after_hit_ms: FloatArray) -> FloatArray:
+        """The burst as a share of its peak-to-peak amplitude, which is 1 over its whole length; same shape.
+
+        Args:
+            after_hit_ms: times after the hit [ms].
+        """
+        phase_ms = np.asarray(after_hit_ms, dtype=np.float64) - self.start_ms
+        whole = _burst(np.linspace(0.0, self.duration_ms, 401), self.duration_ms)
+        return _burst(phase_ms, self.duration_ms) / np.ptp(whole)
+
+    def sample_mv(self, rng: np.random.Generator) -> float:
+        """The peak-to-peak amplitude of one trial [mV].
+
+        Args:
+            rng: source of randomness.
+        """
+        return float(self.median_mv * np.exp(self.log_sd * rng.standard_normal()))
+
+
+def amplitude_of_both_mv(evoked_mv: float, tap: TapResponse, tap_mv: float, isi_ms: float) -> float:
+    """Peak-to-peak amplitude of what is in the MEP window: the MEP, and what the tap evoked [mV].
+
+    Args:
+        evoked_mv: the MEP's own amplitude [mV].
+        tap: the course of the tap's response.
+        tap_mv: its amplitude in this trial [mV].
+        isi_ms: from the impact to the pulse [ms].
+    """
+    both = evoked_mv * _MEP + tap_mv * tap.course(isi_ms + _AFTER_PULSE_MS)
+    return float(np.ptp(both))
+
+
+def _burst(phase_ms: FloatArray, duration_ms: float) -> FloatArray:
+    """An oscillation that swells and fades; nothing before its beginning and after its end."""
+    inside = (phase_ms >= 0) & (phase_ms <= duration_ms)
+    envelope = np.sin(np.pi * phase_ms / duration_ms) ** 2
+    wave = np.sin(2e-3 * np.pi * _OSCILLATION_HZ * (phase_ms - duration_ms / 2) + np.pi / 4)
+    return np.where(inside, envelope * wave, 0.0)
+
+
+def _mep_course() -> FloatArray:
+    """An MEP of peak-to-peak amplitude 1 at `_AFTER_PULSE_MS`: two lobes."""
+    share = (_AFTER_PULSE_MS - _MEP_CENTRE_MS) / _MEP_LOBE_MS
+    course = -share * np.exp(0.5 * (1.0 - share**2))
+    return np.asarray(course / np.ptp(course))
+
+
+_MEP: Final = _mep_course()
