@@ -120,7 +120,12 @@ def test_summary_prints_the_table_and_writes_it_with_a_figure(folder: Path) -> N
         ["gaussian", "incremental", 2, 2],
         ["gaussian", "incremental", 4, 2],
     ]
-    assert f"{table['f1'].iloc[0]:.3f}" in result.output
+    compared = pd.read_csv(folder / "differences.csv")
+    assert compared[["strategy", "reference", "people"]].drop_duplicates().to_numpy().tolist() == [
+        ["incremental", "even", 2]
+    ]
+    for shown in (f"{table['f1'].iloc[0]:.2f}", f"{compared['difference'].iloc[0]:+.2f}"):
+        assert shown.replace("0.", ".", 1) in result.output
     for name in ("f1", "frontier", "coverage", "latency"):
         assert "<svg" in (folder / f"summary_{name}.svg").read_text()
 

@@ -65,7 +65,7 @@ def test_an_error_of_the_labs_own_code_is_no_wrong_setting(tmp_path: Path) -> No
     (tmp_path / "broken_rig.py").write_text("def make(port='COM3'):\n    return None + 1\n", encoding="utf-8")
     with pytest.raises(TypeError, match="unsupported operand"):
         device_from_factory("broken_rig:make", {}, tmp_path)
-    with pytest.raises(ConfigError, match=r"do not fit the factory.*'prot'"):
+    with pytest.raises(ConfigError, match=r"do not fit the function.*'prot'"):
         device_from_factory("broken_rig:make", {"prot": "COM4"}, tmp_path)
 
 

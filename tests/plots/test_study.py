@@ -19,8 +19,9 @@ OF_A_BELIEF = {"start_coverage": 0.9, "end_coverage": 0.8, "called_none": 0.0}
 def table(*cohorts: str, strategies: tuple[str, ...] = ("default", "nr"), **values: Any) -> pd.DataFrame:
     rows = [
         {
-            "cohort": cohort, "strategy": strategy, "trial": trial, "people": 4, "f1": 0.5 + trial / 100, "f1_se": 0.1,
-            "delivered": trial + 1.0, "end_delivered": 15.0, "end_f1": 0.65, "ask_ms": 3.0, "tell_ms": 1.0,
+            "cohort": cohort, "strategy": strategy, "trial": trial, "people": 4, "f1": 0.5 + trial / 100,
+            "f1_low": 0.3 + trial / 100, "f1_high": 0.7 + trial / 100, "delivered": trial + 1.0,
+            "end_delivered": 15.0, "end_f1": 0.65, "ask_ms": 3.0, "tell_ms": 1.0,
         } | OF_A_BELIEF | values
         for cohort in cohorts
         for strategy in strategies
@@ -44,15 +45,25 @@ def test_each_cohort_has_a_panel_with_a_curve_and_a_band_a_strategy() -> None:
             assert curve(axes, name) == ([0, 10, 20], [0.5, 0.6, 0.7])
         (band, _) = axes.collections
         heights = np.asarray(band.get_paths()[0].vertices)[:, 1]
-        assert (heights.min(), heights.max()) == pytest.approx((0.5 - 0.196, 0.7 + 0.196))
+        assert (heights.min(), heights.max()) == pytest.approx((0.3, 0.9))
 
 
 def test_a_strategy_has_its_colour_whatever_it_is_compared_with() -> None:
     for strategies in (("default",), ("default", "nr", "gpr", "mine")):
-        axes = study_figure(table("wide", strategies=strategies)).axes[0]
+        axes = study_figure(table("wide", strategies=strategies), "frontier").axes[0]
         colours = {str(line.get_label()): line.get_color() for line in axes.lines}
         assert colours["default"] == STRATEGY_COLOURS["default"]
     assert len({colours[name] for name in strategies}) == 4
+
+
+def test_of_more_than_three_strategies_each_has_a_panel_with_its_band_before_the_means_of_the_others() -> None:
+    figure = study_figure(table("wide", "narrow", strategies=("default", "nr", "gpr", "mine")))
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    names = [f"{cohort}: {name}" for cohort in ("wide", "narrow") for name in ("default", "gpr", "mine", "nr")]
+    assert [axes.get_title(loc="left") for axes in shown] == names
+    for axes in shown:
+        assert len(axes.collections) == 1
+        assert sum(line.get_label() == "the other strategies" for line in axes.lines) == 3
 
 
 def test_a_method_without_a_belief_is_not_drawn_before_it_has_reported_a_window() -> None:

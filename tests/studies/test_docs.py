@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from isiw.studies import conduct
 from isiw.studies.plan import study_from
 
 TEXT = (Path(__file__).parents[2] / "docs" / "studies.md").read_text(encoding="utf-8")
@@ -19,7 +20,7 @@ def blocks(language: str) -> list[str]:
 
 
 def test_the_study_is_valid() -> None:
-    (block,) = blocks("toml")
+    block, _ = blocks("toml")
     study = study_from(tomllib.loads(block), "docs")
     assert len(study.units()) == 3 * 2 * 100
     assert study.units()[1].key == "nr.recruitment.00000"
@@ -35,16 +36,24 @@ def test_the_example_in_python_runs(
     assert len(list((tmp_path / "small.study" / "parts").iterdir())) == 8
 
 
+def test_the_module_of_ones_own_takes_part_as_the_study_names_it(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(blocks("python")[1], encoding="utf-8")
+    values = tomllib.loads(blocks("toml")[1]) | {"people": 1, "trials": 2}
+    values["strategies"] = values["strategies"][1:]
+    rows = conduct(study_from(values, "docs", tmp_path), tmp_path / "own.study").rows()
+    assert set(rows["strategy"]) == {"upper_end"}
+
+
 def test_a_strategy_of_ones_own_meets_the_people_of_a_study(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {"__name__": "docs"}
-    exec(compile(blocks("python")[1], "studies.md", "exec"), names)  # noqa: S102 - the point of the test
+    exec(compile(blocks("python")[2], "studies.md", "exec"), names)  # noqa: S102 - the point of the test
     assert set(names["rows"]["strategy"]) == {"straddle"}
     assert "10" in capsys.readouterr().out
 
 
 def test_people_of_ones_own_meet_named_strategies(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {"__name__": "docs"}
-    exec(compile(blocks("python")[2], "studies.md", "exec"), names)  # noqa: S102 - as above
+    exec(compile(blocks("python")[3], "studies.md", "exec"), names)  # noqa: S102 - as above
     assert len(names["rows"]) == 2 * 2 * 2
     assert set(names["rows"]["cohort"]) == {"mine"}
     assert "random" in capsys.readouterr().out

@@ -13,13 +13,14 @@ from isiw.errors import InvalidValueError, StrategyError, StudyError
 from isiw.metrics import f1
 from isiw.signals.judgement import wrong_isi
 from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.strategy import Strategy
 from isiw.studies import SimulatedSession, paired_sessions, play, run_study, simulate
 from isiw.studies.batch import simulate_batch
 from isiw.subjects import SimulatedSubject, cohort
 from isiw.subjects.subject import Responder, Response
 from isiw.types import Reference
-from isiw.window import Window
-from known import known
+from isiw.window import Window, WindowEstimate
+from known import instance, known
 
 TIMES = ["ask_ms", "tell_ms"]
 SMALL = (("particles", 100),)
@@ -59,7 +60,7 @@ def test_each_mark_is_a_row_and_the_perfect_player_scores_one() -> None:
 def test_a_mark_of_zero_is_what_is_believed_before_any_trial() -> None:
     session = replace(small(), marks=(0, 4))
     rows = simulate(session)
-    before = session.player().estimate()
+    before = instance(WindowEstimate, session.player().estimate())
     assert rows["trial"].tolist() == [0, 4]
     assert rows["delivered"].tolist() == [0, 4]
     assert rows["probability"][0] == before.probability
@@ -233,14 +234,14 @@ def test_where_trials_are_lost_a_study_asks_what_a_session_asks(monkeypatch: pyt
     session = Late("even", "gaussian", 2, 5, 40, (40,), IMPACT_SPACE, settings, stopping="ends")
     delivered, usual = list[tuple[float, Response]](), Responder.respond
 
-    def respond(responder: Responder, isi_ms: float | None, reference: Reference) -> Response:
-        response = usual(responder, isi_ms, reference)
+    def respond(responder: Responder, isi_ms: float | None, reference: Reference, *, pulse: bool = True) -> Response:
+        response = usual(responder, isi_ms, reference, pulse=pulse)
         delivered.append((known(isi_ms), response))
         return response
 
     monkeypatch.setattr(Responder, "respond", respond)
     simulate(session)
-    strategy, lost = session.player(), 0
+    strategy, lost = instance(Strategy, session.player()), 0
     for isi_ms, response in delivered[:12]:
         assert strategy.ask() == isi_ms
         if wrong_isi(known(response.isi_ms), isi_ms, session.space) is None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from isiw.studies import summarise
+from isiw.errors import InvalidValueError
+from isiw.studies import differences, means_table, summarise
 
 
 def rows(strategy: str, cohort: str, f1s: Sequence[float], **columns: object) -> pd.DataFrame:
@@ -64,3 +66,82 @@ def test_who_failed_is_counted_and_a_strategy_that_failed_for_all_is_not_left_ou
 
 def test_a_study_of_which_nothing_is_finished_has_an_empty_table() -> None:
     assert len(summarise(NOBODY, NOBODY)) == 0
+
+
+def several(people: int, **shifts: float) -> pd.DataFrame:
+    """Strategies on the same people: F1 of the first, and what each other one adds to it, with some noise."""
+    rng = np.random.default_rng(3)
+    usual = rng.uniform(0.3, 0.7, people)
+    parts = [
+        rows_of(strategy, usual + shift + (0.02 * rng.standard_normal(people) if shift else 0.0))
+        for strategy, shift in ({"default": 0.0} | shifts).items()
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def rows_of(strategy: str, f1s: np.ndarray) -> pd.DataFrame:
+    known = {"start_covered": 1.0, "end_covered": 1.0, "reported_window": True, "delivered": 10, "ask_ms": 1.0}
+    stop = {"stop_trial": math.nan, "stop_f1": math.nan, "converged": math.nan, "tell_ms": 1.0}
+    who = {"strategy": strategy, "cohort": "wide", "trial": 10, "person": range(len(f1s)), "f1": f1s}
+    return pd.DataFrame(who | known | stop)
+
+
+def test_rows_alone_can_be_summarised() -> None:
+    assert list(summarise(several(4))["failed"]) == [0]
+
+
+def test_the_band_of_three_people_is_wide_and_stays_within_0_and_1() -> None:
+    (row,) = summarise(rows("nr", "wide", [0.9, 0.6, 0.0])).to_dict("records")
+    assert (row["f1_low"], row["f1_high"]) == (0.0, 1.0)  # 0.5 ± 4.30 standard errors
+    (one,) = summarise(rows("nr", "wide", [0.9])).to_dict("records")
+    assert math.isnan(one["f1_low"])
+
+
+def test_differences_are_paired_by_person() -> None:
+    (row,) = differences(several(40, better=0.1)).to_dict("records")
+    assert (row["strategy"], row["reference"], row["people"]) == ("better", "default", 40)
+    assert row["difference"] == pytest.approx(0.1, abs=0.01)
+    assert 0.08 < row["low"] < row["difference"] < row["high"] < 0.12
+    assert row["se"] < 0.2 * summarise(several(40, better=0.1))["f1_se"].min()  # what no pairing would give
+
+
+def test_people_without_rows_of_both_do_not_count() -> None:
+    whole = several(10, better=0.1)
+    lost = whole[(whole["strategy"] == "default") | (whole["person"] < 6)]
+    assert list(differences(lost)["people"]) == [6]
+
+
+def test_more_comparisons_have_wider_intervals() -> None:
+    one, *_ = differences(several(40, better=0.1)).to_dict("records")
+    (same,) = differences(several(40, better=0.1, x=0.2, y=0.3, z=0.4)).query("strategy == 'better'").to_dict("records")
+    assert same["difference"] == one["difference"]
+    assert same["high"] - same["low"] > 1.2 * (one["high"] - one["low"])
+
+
+def test_intervals_hold_for_the_share_of_studies_that_they_say() -> None:
+    rng, held = np.random.default_rng(5), 0
+    for _ in range(60):
+        base = rng.uniform(0.2, 0.8, 30)
+        other = base + 0.05 + 0.1 * rng.standard_normal(30)
+        (row,) = differences(pd.concat([rows_of("default", base), rows_of("b", other)])).to_dict("records")
+        held += row["low"] <= 0.05 <= row["high"]
+    assert held >= 52  # of 60 at 95 %; fewer come by chance in 1 of 500 runs
+
+
+def test_a_comparison_needs_two_strategies_and_a_reference_among_them() -> None:
+    with pytest.raises(InvalidValueError, match="two strategies"):
+        differences(several(4))
+    with pytest.raises(InvalidValueError, match="default"):
+        differences(several(4, better=0.1), "defualt")
+
+
+def test_the_printed_table_fits_100_columns_and_names_people_and_reference() -> None:
+    marks = [
+        several(30, **{f"a-strategy-{k}": k / 50 for k in range(1, 6)}).assign(trial=mark) for mark in range(5, 65, 5)
+    ]
+    every = pd.concat(marks)
+    text = means_table(summarise(every), differences(every))
+    assert max(map(len, text.splitlines())) <= 100
+    assert "30 people" in text
+    assert "minus default" in text
+    assert text.splitlines()[1].split()[-1] == "60"  # the last mark is kept

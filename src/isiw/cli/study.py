@@ -64,10 +64,13 @@ def replay(
     folder: Folder,
     key: Annotated[str, typer.Argument(help="A unit's key, or the number of a row of the table.", **NO_DEFAULT)],
     person: Annotated[int | None, typer.Option(help="Of a batch, compare this person only.", **NO_DEFAULT)] = None,
+    study: Annotated[
+        Path | None, typer.Option(help="The study (TOML) that names code of your own, if it has any.", **NO_DEFAULT)
+    ] = None,
 ) -> None:
     """Run one session of a study again, alone, and say whether the result is the same."""
     with errors_reported():
-        store = isiw.studies.open_store(folder)
+        store = isiw.studies.open_store(folder) if study is None else _store(study, folder)
         if key.isdigit():
             key, person = isiw.studies.unit_of_row(store, int(key))
         result = isiw.studies.replay(store, key, person)
@@ -79,18 +82,28 @@ def replay(
 
 
 @app.command()
-def summary(folder: Folder) -> None:
-    """Print the table of a study, and write it and its pictures into the folder."""
+def summary(
+    folder: Folder,
+    reference: Annotated[
+        str | None,
+        typer.Option(help="The strategy that others are compared with; by default the default.", **NO_DEFAULT),
+    ] = None,
+) -> None:
+    """Print the mean F1 and the paired differences of a study, and write its tables and pictures into the folder."""
     with errors_reported():
         store = isiw.studies.open_store(folder)
         if not len(rows := store.rows()):
             _say_what_is_there(store)
             raise typer.Exit(1)
-        table = isiw.studies.summarise(rows, store.errors())
-        show(table.to_string(index=False, float_format=lambda value: f"{value:.3f}"))
+        table, compared = isiw.studies.summarise(rows, store.errors()), None
         table.to_csv(folder / "summary.csv", index=False)
+        if rows["strategy"].nunique() > 1 or reference is not None:
+            compared = isiw.studies.differences(rows, reference)
+            compared.to_csv(folder / "differences.csv", index=False)
+        show(isiw.studies.means_table(table, compared))
         _say_what_is_there(store)
-        show(f"table:   {folder / 'summary.csv'}")
+        for name in ("summary", *(["differences"] if compared is not None else [])):
+            show(f"table:   {folder / f'{name}.csv'}")
         for name in isiw.plots.STUDY_PICTURES:
             target = folder / f"summary_{name}.svg"
             show(f"picture: {isiw.plots.save_study_plot(table, target, picture=name, overwrite=True)}")

@@ -5,18 +5,15 @@ A log never names it: what is imported is what the person at the keyboard has co
 
 from __future__ import annotations
 
-import importlib
-import inspect
-import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from isiw.devices.protocol import Device
-from isiw.errors import ConfigError, did_you_mean
+from isiw.errors import ConfigError
 from isiw.log.outputs import made_folder
+from isiw.text.named_code import named_code, require_fitting
 
 __all__ = ["TEMPLATE_FILES", "device_from_factory", "write_rig_template"]
 
@@ -35,19 +32,8 @@ def device_from_factory(factory: str, settings: Mapping[str, Any], folder: Path 
     Raises:
         ConfigError: it cannot be imported, does not take the settings, or makes no device.
     """
-    module_name, _, name = factory.partition(":")
-    with _importable(folder):
-        try:
-            make = getattr(importlib.import_module(module_name), name)
-        except (ImportError, AttributeError) as error:
-            where = f"The module is looked for in {folder or 'the installed packages'} first."
-            raise ConfigError(
-                f"device.factory cannot be imported: {error}",
-                got=factory,
-                expected="module:function, such as mylab.rig:make",
-                remedy=f"{_meant(module_name, name, folder)} {where}".lstrip(),
-            ) from error
-    _require_fitting(make, settings)
+    make = named_code(factory, folder, "device.factory")
+    require_fitting(make, settings, "device.settings")
     device = make(**settings)
     if not isinstance(device, Device):
         raise ConfigError(
@@ -57,46 +43,6 @@ def device_from_factory(factory: str, settings: Mapping[str, Any], folder: Path 
             remedy="See isiw.Device.",
         )
     return device
-
-
-def _meant(module_name: str, name: str, folder: Path | None) -> str:
-    """The function, or the module beside the configuration, that was probably meant, as a question."""
-    module = sys.modules.get(module_name)
-    if module is not None:
-        return did_you_mean(name, vars(module))
-    return did_you_mean(module_name, () if folder is None else (file.stem for file in folder.glob("*.py")))
-
-
-def _require_fitting(make: Callable[..., object], settings: Mapping[str, Any]) -> None:
-    parameters = inspect.signature(make).parameters
-    try:
-        inspect.signature(make).bind(**settings)
-    except TypeError as error:
-        meant = next(filter(None, (did_you_mean(key, parameters) for key in settings if key not in parameters)), "")
-        takes = f"It takes {', '.join(parameters) or 'no settings'}."
-        raise ConfigError(
-            f"device.settings do not fit the factory: {error}",
-            got=dict(settings),
-            remedy=f"{meant} {takes}".lstrip(),
-        ) from error
-
-
-@contextmanager
-def _importable(folder: Path | None) -> Iterator[None]:
-    """Within, modules of a folder can be imported before any others of their name; later, after them.
-
-    Drivers are often imported late, and a lab's file may have the name of a module that isiw imports late.
-    """
-    if folder is None:
-        yield
-        return
-    sys.path.insert(0, str(folder))
-    try:
-        yield
-    finally:
-        sys.path.remove(str(folder))
-        if str(folder) not in sys.path:
-            sys.path.append(str(folder))
 
 
 def write_rig_template(folder: str | Path) -> tuple[Path, ...]:

@@ -22,7 +22,8 @@ StudyPicture: TypeAlias = Literal["f1", "frontier", "coverage", "latency"]
 
 _MARKERS = "osD^vPX"
 _COLUMNS = 4
-_SE_OF_BAND = 1.96
+_MOST_IN_A_PANEL = 3
+"""More strategies than these have panels of their own, or their bands hide each other."""
 _DASHED = (0, (4, 2))
 
 
@@ -45,7 +46,7 @@ def save_study_plot(
 
 
 def study_figure(table: pd.DataFrame, picture: StudyPicture = "f1") -> Figure:
-    """A study as a figure, a panel a cohort.
+    """A study as a figure, a panel a cohort; of F1 with many strategies a panel for each of them.
 
     Args:
         table: as `isiw.studies.summarise` returns it.
@@ -56,18 +57,24 @@ def study_figure(table: pd.DataFrame, picture: StudyPicture = "f1") -> Figure:
     """
     draw_panel = STUDY_PICTURES[choice("the picture of a study", picture, STUDY_PICTURES)]
     played = table[table["people"] > 0]
-    cohorts, colours = list(played["cohort"].unique()), strategy_colours(sorted(played["strategy"].unique()))
-    columns = min(_COLUMNS, max(1, len(cohorts)))
-    lines = max(1, -(-len(cohorts) // columns))
+    colours = strategy_colours(sorted(played["strategy"].unique()))
+    apart = picture == "f1" and len(colours) > _MOST_IN_A_PANEL
+    wanted = [(cohort, name) for cohort in played["cohort"].unique() for name in (colours if apart else [None])]
+    columns = min(_COLUMNS, max(1, len(colours) if apart else len(wanted)))
+    lines = max(1, -(-len(wanted) // columns))
     figure = Figure(figsize=(0.8 + 3.2 * columns, 1.2 + 2.7 * lines), layout="constrained")
     panels = list(figure.subplots(lines, columns, squeeze=False, sharey=True).flat)
-    for axes, cohort in zip(panels, cohorts, strict=False):
+    for axes, (cohort, name) in zip(panels, wanted, strict=False):
         tidied(axes)
         of_cohort = played[played["cohort"] == cohort].sort_values("trial")
-        draw_panel(axes, {name: of_cohort[of_cohort["strategy"] == name] for name in colours}, colours)
-        axes.set_title(cohort, fontsize=10, loc="left", color=INK)
+        curves = {each: of_cohort[of_cohort["strategy"] == each] for each in colours}
+        if name is None:
+            draw_panel(axes, curves, colours)
+        else:
+            _draw_f1_of(axes, curves, name, colours[name])
+        axes.set_title(cohort if name is None else f"{cohort}: {name}", fontsize=10, loc="left", color=INK)
         axes.set_xlim(left=0)
-    for axes in panels[len(cohorts) :]:
+    for axes in panels[len(wanted) :]:
         axes.set_visible(False)
     explain(figure, ncols=2 * columns)
     return figure
@@ -81,6 +88,20 @@ def _draw_f1(axes: Axes, curves: _Curves, colours: _Colours) -> None:
     markers = itertools.cycle(_MARKERS)
     for name, curve in curves.items():
         draw_curve(axes, curve, name, colours[name], next(markers))
+    _name_f1_axes(axes)
+
+
+def _draw_f1_of(axes: Axes, curves: _Curves, name: str, colour: str) -> None:
+    """One strategy with its band, before the means of the others."""
+    for other, curve in curves.items():
+        if other != name:
+            shown = _from_first_estimate(curve)
+            axes.plot(shown["trial"], shown["f1"], color=FAINT, lw=0.8, label="the other strategies")
+    draw_curve(axes, curves[name], name, colour)
+    _name_f1_axes(axes)
+
+
+def _name_f1_axes(axes: Axes) -> None:
     axes.set_ylim(0, 1)
     axes.set_xlabel("trials", fontsize=9)
     axes.set_ylabel("mean F1, 95 % band", fontsize=9)
@@ -93,15 +114,14 @@ def draw_curve(axes: Axes, curve: pd.DataFrame, name: str, colour: str, marker: 
 
     Args:
         axes: where to.
-        curve: the rows of one strategy and cohort, trials ascending: trial, f1, f1_se, and where known called_none and
-            start_coverage.
+        curve: the rows of one strategy and cohort, trials ascending: trial, f1, f1_low, f1_high, and if known
+            called_none and start_coverage.
         name: for the legend.
         colour: of the strategy.
         marker: of the marked trials.
     """
     curve = _from_first_estimate(curve)
-    reach = _SE_OF_BAND * curve["f1_se"].fillna(0.0)
-    axes.fill_between(curve["trial"], curve["f1"] - reach, curve["f1"] + reach, color=colour, alpha=0.15, lw=0)
+    axes.fill_between(curve["trial"], curve["f1_low"], curve["f1_high"], color=colour, alpha=0.15, lw=0)
     axes.plot(curve["trial"], curve["f1"], color=colour, marker=marker, ms=4, lw=1.5, label=name)
     for at_start in curve.loc[curve["trial"] == 0, "f1"]:
         axes.axhline(at_start, color=colour, lw=0.8, ls=":")

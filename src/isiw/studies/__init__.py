@@ -10,7 +10,7 @@ from isiw.studies.players import Player
 from isiw.studies.running import Replay, conduct, paired_sessions, replay, run_study, unit_of_row
 from isiw.studies.sessions import SimulatedSession, play, simulate
 from isiw.studies.store import Store, begin_store, open_store
-from isiw.studies.summary import summarise
+from isiw.studies.summary import differences, means_table, summarise
 
 __all__ = [
     "DaskCluster",
@@ -25,7 +25,9 @@ __all__ = [
     "Unit",
     "begin_store",
     "conduct",
+    "differences",
     "load_study",
+    "means_table",
     "open_store",
     "paired_sessions",
     "play",

@@ -19,6 +19,8 @@ from isiw.models.protocol import Observation, Posterior, ReportsTrouble, Respons
 from isiw.strategy.choosing import Choice, instead_of_lost
 from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision
+from isiw.strategy.strategy import Strategy
+from isiw.studies.players import Player
 from isiw.studies.sessions import SimulatedSession, examine
 from isiw.studies.threads import one_torch_thread
 from isiw.subjects.subject import Response
@@ -47,7 +49,7 @@ class _Batch:
                 "the people of a batch have strategies with different settings",
                 remedy="Run them in batches of their own.",
             )
-        players = [session.player() for session in sessions]
+        players = [_strategy(session.player()) for session in sessions]
         first = players[0]
         acquisition, model = _together([player.acquisition for player in players]), _on_device(first.model, device)
         method = Method(first.space, model, acquisition, first.stopping, first.initial_ms, first.cost)
@@ -85,6 +87,17 @@ class _Batch:
         posterior = self.course.posterior
         failed = isinstance(posterior, ReportsTrouble) and posterior.trouble is not None
         return None if failed and self.course.people > 1 else failed
+
+
+def _strategy(player: Player) -> Strategy:
+    if not isinstance(player, Strategy):
+        raise StudyError(
+            "only a model with an acquisition function examines people side by side",
+            got=type(player).__name__,
+            expected="an isiw.Strategy",
+            remedy='Use engine = "single".',
+        )
+    return player
 
 
 @dataclass(frozen=True)

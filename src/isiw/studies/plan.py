@@ -29,6 +29,7 @@ from isiw.errors import ConfigError, InvalidValueError
 from isiw.strategy.catalogue import settings_for
 from isiw.strategy.settings.common import settings_values
 from isiw.studies.batch import simulate_batch
+from isiw.studies.own import OWN, OwnCode
 from isiw.studies.sessions import OWN_STRATEGY, SimulatedSession, Stopping, require_cohorts, simulate
 from isiw.text.toml_files import checked, read_toml
 
@@ -63,24 +64,50 @@ class StudyStrategy:
     """A strategy that is compared with others.
 
     Args:
-        name: a named strategy.
-        settings: its settings that differ from what the name means.
-        label: what it is called in the table; by default its name.
+        name: a named strategy, or one of your own as `module:function`.
+        settings: its settings that differ from what the name means; of one of your own, arguments of the function.
+        label: what it is called in the table; by default its name, or that of the function.
+        code: the checksum of your own code; it is worked out where it is not given.
+        folder: where your own module is looked for first.
 
     Raises:
         StrategyError: an unknown name or setting.
+        ConfigError: your own function cannot be imported.
         InvalidValueError: an invalid setting, or None for one, or a label that cannot be part of a file's name.
     """
 
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     label: str = ""
+    code: str = ""
+    folder: Path | None = field(default=None, compare=False)
+
+    @property
+    def own(self) -> OwnCode | None:
+        """The code of one's own that makes it; None for a named strategy."""
+        if not self.code:
+            return None
+        return OwnCode(self.name if ":" in self.name else "", self.folder, self.code)
 
     def __post_init__(self) -> None:
+        if isinstance(self.name, str) and ":" in self.name:
+            object.__setattr__(self, "code", OwnCode.named(self.name, self.folder).checksum)
+            object.__setattr__(self, "label", self.label or self.name.partition(":")[2])
+        elif self.name != OWN:
+            object.__setattr__(self, "code", "")
         if not isinstance(self.settings, Mapping):
             raise InvalidValueError(
                 "settings are a mapping of names to values", got=self.settings, expected="such as {'particles': 500}"
             )
+        if not self.code:
+            self._check_settings()
+        object.__setattr__(self, "label", self.label or self.name)
+        if not re.fullmatch(r"[\w.+-]+", text("label", self.label)):
+            raise InvalidValueError(
+                "a label is part of a file's name", got=self.label, expected="letters, digits, and any of _ . + -"
+            )
+
+    def _check_settings(self) -> None:
         chosen = settings_values(settings_for(self.name, **self.settings))
         if unset := [key for key in self.settings if key not in chosen]:  # what a rig states could take its place
             raise InvalidValueError(
@@ -90,11 +117,6 @@ class StudyStrategy:
             )
         kept = {key: chosen[key] for key in self.settings}
         object.__setattr__(self, "settings", kept)
-        object.__setattr__(self, "label", self.label or self.name)
-        if not re.fullmatch(r"[\w.+-]+", text("label", self.label)):
-            raise InvalidValueError(
-                "a label is part of a file's name", got=self.label, expected="letters, digits, and any of _ . + -"
-            )
 
 
 @dataclass(frozen=True)
@@ -115,9 +137,10 @@ class Unit:
 
 
 def run_unit(unit: Unit) -> pd.DataFrame:
-    """The rows of a unit; columns as in `isiw.studies.sessions.examine`, and its key as `unit`."""
+    """The rows of a unit; columns as in `isiw.studies.sessions.examine`, and its key and one's own code's checksum."""
     rows = simulate_batch(unit.sessions, unit.device) if unit.engine == "batched" else simulate(*unit.sessions)
-    return rows.assign(unit=unit.key)
+    own = unit.sessions[0].own
+    return rows.assign(unit=unit.key, code="" if own is None else own.checksum)
 
 
 @dataclass(frozen=True)
@@ -222,6 +245,7 @@ class Study:
             label=strategy.label,
             stopping=self.stopping,
             amplitude=self.amplitude,
+            own=strategy.own,
         )
         return session if self.hit_delay == "unstated" else session.as_the_rig_states()
 
@@ -246,9 +270,8 @@ def load_study(path: str | Path) -> Study:
         ConfigError: it cannot be read, or has an unknown key or a bad value; the message names file, key and value.
     """
     values = read_toml(path)
-    for of_the_folder in ("checksum", "versions"):
-        values.pop(of_the_folder, None)
-    return study_from(values, str(path))
+    began = [values.pop(of_the_folder, None) for of_the_folder in ("checksum", "versions")]
+    return study_from(values, str(path), None if any(began) else Path(path).resolve().parent)
 
 
 def _several(values: Any) -> tuple[Any, ...]:
@@ -270,19 +293,20 @@ def _named(strategy: Any) -> StudyStrategy:
     )
 
 
-def study_from(values: Mapping[str, Any], source: str) -> Study:
+def study_from(values: Mapping[str, Any], source: str, folder: Path | None = None) -> Study:
     """A study from TOML values, in which a strategy may be its name alone, and a space `"valve"` or `"impact"`.
 
     Args:
         values: the values.
         source: where they are from, for the message.
+        folder: where modules of the operator's own are; None for the folder of a study, which may name none.
 
     Raises:
         ConfigError: an unknown key or a bad value.
     """
     plain = dict(values)
     if isinstance(plain.get("strategies"), list):
-        plain["strategies"] = [_strategy_values(strategy) for strategy in plain["strategies"]]
+        plain["strategies"] = [_strategy_values(strategy, source, folder) for strategy in plain["strategies"]]
     if isinstance(plain.get("space"), str):
         if plain["space"] not in _SPACES:
             names = ", ".join(f'"{name}"' for name in _SPACES)
@@ -292,10 +316,26 @@ def study_from(values: Mapping[str, Any], source: str) -> Study:
     return checked(Study, plain, source)
 
 
-def _strategy_values(strategy: Any) -> Any:
-    return {"name": strategy} if isinstance(strategy, str) else strategy
+def _strategy_values(strategy: Any, source: str, folder: Path | None) -> Any:
+    values = {"name": strategy} if isinstance(strategy, str) else strategy
+    if not isinstance(values, Mapping) or ":" not in str(values.get("name", "")):
+        return values
+    if folder is None:
+        raise ConfigError(
+            f"{source}: the folder of a study names no code",
+            got=values["name"],
+            remedy="Run the STUDY.toml of your own that names it.",
+        )
+    return {**values, "folder": folder}
 
 
 def study_values(study: Study) -> dict[str, Any]:
-    """A study as TOML values; `study_from` makes the same study of them."""
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(study).items()}
+    """A study as TOML values, for its folder: code of one's own by its checksum alone."""
+    values = {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(study).items()}
+    values["strategies"] = [_kept(strategy) for strategy in values["strategies"]]
+    return values
+
+
+def _kept(strategy: Mapping[str, Any]) -> dict[str, Any]:
+    named = {key: strategy[key] for key in ("name", "settings", "label")}
+    return {**named, "name": OWN, "code": strategy["code"]} if strategy["code"] else named

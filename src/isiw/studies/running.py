@@ -46,6 +46,7 @@ def conduct(
     """
     if executor is not None and not callable(getattr(executor, "results", None)):
         raise InvalidValueError("no executor", got=executor, expected="Processes(workers), or a DaskCluster")
+    _require_code(study)
     store, run = begin_store(study, folder), partial(_run_with, code_checksum())
     with store.locked():
         if left := store.left(retry=retry):
@@ -56,6 +57,15 @@ def conduct(
                 store.keep(unit, result)
                 on_done(unit, result)
     return store
+
+
+def _require_code(study: Study) -> None:
+    """Raise if a strategy is code of one's own that the study does not name, as that of a folder."""
+    if unnamed := [each.label for each in study.strategies if each.own is not None and not each.own.reference]:
+        raise StudyError(
+            f"{', '.join(unnamed)}: code of your own, which the folder of a study does not name",
+            remedy="Run the STUDY.toml that names it, with --out and this folder.",
+        )
 
 
 def _run_with(code: str, unit: Unit) -> pd.DataFrame:

@@ -21,7 +21,7 @@ from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choosing import Choice
 from isiw.strategy.stopping import stimuli_left
-from isiw.strategy.strategy import Strategy
+from isiw.studies.own import OwnCode
 from isiw.studies.players import Crowd, Player, Reported, alone
 from isiw.studies.threads import one_torch_thread
 from isiw.subjects.cohorts import COHORTS, person_of
@@ -87,6 +87,7 @@ class SimulatedSession:
         stopping: whether the strategy's stopping rule is `"ignored"`, or it is `"noted"` when it fires, or `"ends"` the
             session.
         amplitude: factor on all of the person's amplitudes, as of another rig or muscle.
+        own: code of one's own that makes the strategy; None for a named one.
 
     Raises:
         InvalidValueError: no trial, an invalid person, seed or amplitude, no mark or one beyond the trials, or an
@@ -104,6 +105,7 @@ class SimulatedSession:
     label: str = ""
     stopping: Stopping = "ignored"
     amplitude: float = 1.0
+    own: OwnCode | None = None
 
     def __post_init__(self) -> None:
         check_wholes(self, "trials", least=1)
@@ -137,12 +139,17 @@ class SimulatedSession:
         subject = self.subject()
         delay_ms = subject.stated_hit_delay_ms if self.space.reference == "valve" else None
         stimulus = None if subject.conditioning == "tap" else subject.conditioning
+        if self.own is not None:  # which is told what its settings say
+            return self
         known = known_settings(self.strategy, {"hit_delay_ms": delay_ms, "conditioning": stimulus})
         return replace(self, settings=tuple((known | dict(self.settings)).items()))
 
-    def player(self) -> Strategy:
+    def player(self) -> Player:
         """The strategy before its first trial."""
-        return make_strategy(self.strategy, self.space, self.seed + self.person, **dict(self.settings))
+        seed, settings = self.seed + self.person, dict(self.settings)
+        if self.own is not None:
+            return self.own.player(self.space, seed, settings)
+        return make_strategy(self.strategy, self.space, seed, **settings)
 
 
 def simulate(session: SimulatedSession) -> pd.DataFrame:

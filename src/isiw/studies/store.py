@@ -214,6 +214,12 @@ def _state(values: Mapping[str, Any]) -> str:
 
 def _same(store: Store, kept: Store) -> Store:
     before, now = study_values(kept.study), study_values(store.study)
+    if before != now and {**before, "strategies": _uncoded(before)} == {**now, "strategies": _uncoded(now)}:
+        raise StudyError(
+            f"your own code was changed since {store.folder} was begun",
+            expected="the code that made the rows that are there",
+            remedy="Go back to that code, or begin in another folder.",
+        )
     differing = [f"{name} was {before[name]!r}, now {now[name]!r}" for name in now if before[name] != now[name]]
     if differing:
         going_on = command("study", "run", store.folder)
@@ -222,6 +228,11 @@ def _same(store: Store, kept: Store) -> Store:
             remedy=f"Choose another folder, or go on with the study that is there: {going_on}",
         )
     return store
+
+
+def _uncoded(values: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The strategies of a study, without the checksums of one's own code."""
+    return [{key: value for key, value in strategy.items() if key != "code"} for strategy in values["strategies"]]
 
 
 def _versions() -> dict[str, str]:

@@ -1,31 +1,50 @@
-"""What a study comes to: one row a strategy, cohort and mark."""
+"""What a study comes to: means over people by strategy, cohort and mark, and paired differences between strategies."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
 import pandas as pd
+from scipy import stats
 
-__all__ = ["summarise"]
+from isiw.errors import InvalidValueError, did_you_mean
+from isiw.types import FloatArray
 
-_GROUP = ["cohort", "strategy", "trial"]
+__all__ = ["differences", "means_table", "summarise"]
+
+_GROUP: Final = ["cohort", "strategy", "trial"]
+
+LEVEL: Final = 0.95
+"""Confidence level of all intervals."""
+
+RESAMPLES: Final = 4999
+"""Bootstrap samples of an interval; enough for the tail of ten comparisons at once."""
+
+COLUMNS: Final = 100
+"""Width of a printed table."""
 
 
-def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
+def summarise(rows: pd.DataFrame, errors: pd.DataFrame | None = None) -> pd.DataFrame:
     """Means over people.
 
     Args:
         rows: the rows of a study.
-        errors: the people whose units failed, as `Store.errors` gives them.
+        errors: the people whose units failed, as `Store.errors` gives them; None if nobody failed.
 
     Returns:
-        Sorted by cohort, strategy and trial: people; mean F1 and its standard error; shares of the people with
-        a window whose start and end lie in the 90 % intervals; share to whom no window is reported, as where a
-        method has no answer yet; mean of the pairs delivered; mean of the pairs after which the stopping rule
-        fired and of the F1 then, over those for whom it did; the same over all, where those for whom it has not
-        count as they stand at this mark (`end_delivered`, `end_f1`; NaN where the rule is ignored); share for
-        whom it did so before the budget was used up; people without rows because they failed; median time of an
-        ask and a tell [ms]. A strategy that failed for everybody has one row, at trial 0.
+        Sorted by cohort, strategy and trial: people; mean F1, its standard error, and its 95 % interval by Student's t,
+        cut off at 0 and 1 and NaN for a single person; shares of the people with a window whose start and end lie in
+        the 90 % intervals; share to whom no window is reported, as where a method has no answer yet; mean of the pairs
+        delivered; mean of the pairs after which the stopping rule fired and of the F1 then, over those for whom it did;
+        the same over all, where those for whom it has not count as they stand at this mark (`end_delivered`, `end_f1`;
+        NaN where the rule is ignored); share for whom it did so before the budget was used up; people without rows
+        because they failed; median time of an ask and a tell [ms]. A strategy that failed for everybody has one row,
+        at trial 0.
     """
-    failed = errors.groupby(_GROUP[:2]).size() if len(errors) else pd.Series(dtype="int64")
+    failed = pd.Series(dtype="int64") if errors is None or not len(errors) else errors.groupby(_GROUP[:2]).size()
     table = _means(rows) if len(rows) else pd.DataFrame(columns=[*_GROUP, "people"])
     present = set(zip(table["cohort"], table["strategy"], strict=True))
     missing = [{"cohort": c, "strategy": s, "trial": 0, "people": 0} for c, s in failed.index if (c, s) not in present]
@@ -42,11 +61,15 @@ def _means(rows: pd.DataFrame) -> pd.DataFrame:
         "end_f1": rows["stop_f1"].mask(going_on & ~ignored, rows["f1"]),
     }
     groups = rows.assign(**at_end, called_none=~rows["reported_window"].astype(bool)).groupby(_GROUP)
+    people, f1, se = groups.size(), groups["f1"].mean(), groups["f1"].sem()
+    reach = se * stats.t.ppf(0.5 + LEVEL / 2, people - 1)
     return pd.DataFrame(
         {
-            "people": groups.size(),
-            "f1": groups["f1"].mean(),
-            "f1_se": groups["f1"].sem(),
+            "people": people,
+            "f1": f1,
+            "f1_se": se,
+            "f1_low": (f1 - reach).clip(lower=0.0),
+            "f1_high": (f1 + reach).clip(upper=1.0),
             "start_coverage": groups["start_covered"].mean(),
             "end_coverage": groups["end_covered"].mean(),
             "called_none": groups["called_none"].mean(),
@@ -60,3 +83,118 @@ def _means(rows: pd.DataFrame) -> pd.DataFrame:
             "tell_ms": groups["tell_ms"].median(),
         }
     ).reset_index()
+
+
+def differences(rows: pd.DataFrame, reference: str | None = None) -> pd.DataFrame:
+    """Paired differences of F1 between strategies on the same people.
+
+    Args:
+        rows: the rows of a study.
+        reference: the strategy that the others are compared with; by default "default", or else the first label.
+
+    Returns:
+        Sorted by cohort, strategy and trial: people (who have rows of both), mean difference of F1 (the strategy minus
+        the reference), its standard error, and its interval by a bootstrap over people. The intervals of a cohort and
+        mark hold together with 95 % probability: each has a level of 1 − .05 / (number of strategies − 1)
+        (Bonferroni). With fewer than two people there is no interval (NaN).
+
+    Raises:
+        InvalidValueError: an unknown reference, or fewer than two strategies.
+    """
+    labels = sorted(rows["strategy"].unique()) if len(rows) else []
+    if len(labels) < 2:
+        raise InvalidValueError("a comparison needs two strategies", got=", ".join(labels) or "none")
+    reference = reference or ("default" if "default" in labels else labels[0])
+    if reference not in labels:
+        raise InvalidValueError(
+            "no such strategy in the study",
+            got=reference,
+            expected=", ".join(labels),
+            remedy=did_you_mean(reference, labels) or None,
+        )
+    f1 = rows.pivot_table(index=["cohort", "trial", "person"], columns="strategy", values="f1")
+    others = [label for label in labels if label != reference]
+    compared = [
+        {"cohort": cohort, "strategy": label, "trial": trial, "reference": reference}
+        | _difference((people[label] - people[reference]).dropna().to_numpy(), len(others))
+        for (cohort, trial), people in f1.groupby(level=["cohort", "trial"])
+        for label in others
+    ]
+    table = pd.DataFrame(compared)
+    return table[table["people"] > 0].sort_values(_GROUP, ignore_index=True)
+
+
+def _difference(paired: FloatArray, comparisons: int) -> dict[str, float]:
+    """Mean, standard error and interval of the differences of some people."""
+    people = len(paired)
+    mean = float(paired.mean()) if people else math.nan
+    found = {"people": people, "difference": mean, "se": math.nan, "low": math.nan, "high": math.nan}
+    if people < 2:
+        return found
+    low, high = (mean, mean) if np.ptp(paired) == 0 else _bootstrapped(paired, 1.0 - (1.0 - LEVEL) / comparisons)
+    return found | {"se": float(stats.sem(paired)), "low": low, "high": high}
+
+
+def _bootstrapped(paired: FloatArray, level: float) -> tuple[float, float]:
+    """The interval of a mean: bias-corrected and accelerated, or by percentiles if very few people leave that open."""
+    for method in ("BCa", "percentile"):
+        rng = np.random.default_rng(0)
+        drawn = stats.bootstrap(
+            (paired,), np.mean, confidence_level=level, n_resamples=RESAMPLES, batch=500, method=method, rng=rng
+        )
+        low, high = map(float, drawn.confidence_interval)
+        if math.isfinite(low) and math.isfinite(high):
+            break
+    return low, high
+
+
+def means_table(summary: pd.DataFrame, compared: pd.DataFrame | None = None) -> str:
+    """A study as text of at most 100 columns: a block a cohort, a line a strategy, a column a mark.
+
+    Args:
+        summary: as `summarise` returns it.
+        compared: as `differences` returns it, printed below each cohort; None if there is nothing to compare.
+    """
+    lines = list[str]()
+    for cohort, means in summary[summary["people"] > 0].groupby("cohort"):
+        people = sorted(means["people"].unique())
+        lines.append(f"{cohort}: mean F1, ± half of its 95 % interval; {_counted(people)}")
+        lines += _block(means, "f1", "f1_low", "f1_high", "0.2f")
+        of_cohort = None if compared is None else compared[compared["cohort"] == cohort]
+        if of_cohort is not None and len(of_cohort):
+            reference = of_cohort["reference"].iloc[0]
+            lines.append(f"minus {reference}, the same people; intervals that hold together with 95 % probability")
+            lines += _block(of_cohort, "difference", "low", "high", "+0.2f")
+        lines.append("")
+    return "\n".join(lines).rstrip()
+
+
+def _counted(people: Sequence[int]) -> str:
+    return f"{people[0]} people" if people[0] == people[-1] else f"{people[0]}–{people[-1]} people"
+
+
+def _block(table: pd.DataFrame, mean: str, low: str, high: str, form: str) -> Iterator[str]:
+    """A heading and a line a strategy; of too many marks some are left out, evenly, and the last is kept."""
+    width = max(8, int(table["strategy"].str.len().max()))
+    cell = 16 if form.startswith("+") else 8
+    marks = sorted(table["trial"].unique())
+    most = max(1, (COLUMNS - width - 2) // (cell + 2))
+    kept = [marks[i] for i in sorted({round(each) for each in np.linspace(0, len(marks) - 1, most)})][-most:]
+    yield "  ".join(["trials".ljust(width), *(f"{mark:>{cell}}" for mark in kept)])
+    for strategy, of_strategy in table.groupby("strategy"):
+        at = of_strategy.set_index("trial")
+        cells = (_cell(at.loc[mark], mean, low, high, form) if mark in at.index else "–" for mark in kept)
+        yield "  ".join([str(strategy).ljust(width), *(f"{each:>{cell}}" for each in cells)])
+
+
+def _cell(row: pd.Series, mean: str, low: str, high: str, form: str) -> str:
+    value = _without_zero(f"{row[mean]:{form}}")
+    if math.isnan(row[low]):
+        return value
+    if form.startswith("+"):
+        return f"{value} [{_without_zero(f'{row[low]:{form}}')} {_without_zero(f'{row[high]:{form}}')}]"
+    return f"{value} ±{_without_zero(f'{max(row[high] - row[mean], row[mean] - row[low]):.2f}')}"
+
+
+def _without_zero(figure: str) -> str:
+    return figure.replace("0.", ".", 1) if figure.lstrip("+-").startswith("0.") else figure

@@ -335,5 +335,5 @@ def test_a_misspelt_setting_is_told(tmp_path: Path) -> None:
     config.write_text(
         f'[device]\nfactory = "isiw:FolderDevice"\n[device.settings]\nfolder = "{tmp_path}"\ninf = {{}}\n'
     )
-    with pytest.raises(ConfigError, match=r"do not fit the factory.*inf"):
+    with pytest.raises(ConfigError, match=r"do not fit the function.*inf"):
         session_for(load_config(config))

@@ -1,0 +1,89 @@
+"""Code that an operator's own configuration names as `module:function`; what is read from a log never gets here."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from isiw.errors import ConfigError, did_you_mean
+
+__all__ = ["named_code", "require_fitting"]
+
+
+def named_code(reference: str, folder: Path | None, key: str) -> Any:
+    """What a configuration names, imported.
+
+    Args:
+        reference: where it is, as `module:function`.
+        folder: where the module is looked for before anything else; None for the installed packages alone.
+        key: of the configuration, for the message.
+
+    Raises:
+        ConfigError: it cannot be imported.
+    """
+    module_name, _, name = reference.partition(":")
+    with _importable(folder):
+        try:
+            return getattr(importlib.import_module(module_name), name)
+        except (ImportError, AttributeError) as error:
+            where = f"The module is looked for in {folder or 'the installed packages'} first."
+            raise ConfigError(
+                f"{key} cannot be imported: {error}",
+                got=reference,
+                expected="module:function, such as mylab.rig:make",
+                remedy=f"{_meant(module_name, name, folder)} {where}".lstrip(),
+            ) from error
+
+
+def _meant(module_name: str, name: str, folder: Path | None) -> str:
+    """The function, or the module beside the configuration, that was probably meant, as a question."""
+    module = sys.modules.get(module_name)
+    if module is not None:
+        return did_you_mean(name, vars(module))
+    return did_you_mean(module_name, () if folder is None else (file.stem for file in folder.glob("*.py")))
+
+
+def require_fitting(make: Callable[..., object], settings: Mapping[str, Any], key: str) -> None:
+    """Check that a function takes some settings.
+
+    Args:
+        make: the function.
+        settings: its keyword arguments.
+        key: of the configuration, for the message.
+
+    Raises:
+        ConfigError: it does not.
+    """
+    signature = inspect.signature(make)
+    try:
+        signature.bind(**settings)
+    except TypeError as error:
+        parameters = signature.parameters
+        meant = next(filter(None, (did_you_mean(name, parameters) for name in settings if name not in parameters)), "")
+        takes = f"It takes {', '.join(parameters) or 'no settings'}."
+        raise ConfigError(
+            f"{key} do not fit the function: {error}", got=dict(settings), remedy=f"{meant} {takes}".lstrip()
+        ) from error
+
+
+@contextmanager
+def _importable(folder: Path | None) -> Iterator[None]:
+    """Within, modules of a folder can be imported before any others of their name; later, after them.
+
+    Drivers are often imported late, and a lab's file may have the name of a module that isiw imports late.
+    """
+    if folder is None:
+        yield
+        return
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        if str(folder) not in sys.path:
+            sys.path.append(str(folder))
