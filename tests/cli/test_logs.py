@@ -11,7 +11,7 @@ import pytest
 from cli.conftest import COMMAND, Command
 from export.recorded import note, sweep, write_sweeps
 from isiw import __version__
-from isiw.config import true_window
+from isiw.config import Truth, truth_of
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
@@ -96,7 +96,7 @@ def test_a_session_of_lab_software_with_its_own_configuration_is_drawn_without_a
     Session(ScriptedDevice(), scripted_strategy(2), log=tmp_path / "lab.mcap", config={"rig": "A", "seed": 3}).run()
     result = isiw("plot", "lab.mcap", "-o", "picture.png")
     assert result.exit_code == 0, result.output
-    assert true_window(read_session("lab.mcap")) is None
+    assert truth_of(read_session("lab.mcap")) == Truth()
     assert isiw("show", "lab.mcap").exit_code == 0
 
 

@@ -39,3 +39,9 @@ def test_a_session_whose_last_decision_is_not_on_disk_is_to_be_resumed(
     with pytest.raises(LogError) as failed:
         session.run()
     assert "isiw resume" in after_error(session, None, failed.value, delivered=True)[-1]
+
+
+def test_a_session_in_recorded_emg_goes_on_with_its_folder_named_again(tmp_path: Path) -> None:
+    config = {"isiw_run": {"subject": {"kind": "recorded", "data": "elsewhere"}}}
+    session = Session(ScriptedDevice(), scripted_strategy(2), log=tmp_path / "s.mcap", config=config)
+    assert after_error(session, None, None, delivered=True)[-1].endswith("s.mcap --data DIR")

@@ -9,13 +9,14 @@ import tomli_w
 
 from isiw.config import (
     RunConfig,
-    config_of_log,
+    Truth,
     device_for,
     fresh_log_path,
     load_config,
+    run_of_log,
     session_for,
     subject_for,
-    true_window,
+    truth_of,
 )
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, StrategyError
@@ -237,7 +238,7 @@ def test_a_fresh_log_path_is_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_recorded_emg_needs_its_folder() -> None:
-    with pytest.raises(ConfigError, match=r"subject.data.*--data"):
+    with pytest.raises(ConfigError, match=r"recorded EMG.*--data"):
         device_for(RunConfig().with_overrides(subject="recorded"))
 
 
@@ -257,8 +258,8 @@ def test_a_log_holds_the_configuration_it_was_run_with(tmp_path: Path, config_fi
     config = config.with_overrides(log=tmp_path / "s.mcap")
     session_for(config).run()
     record = read_session(tmp_path / "s.mcap")
-    assert config_of_log(record) == config.model_copy(update={"log": None})
-    assert true_window(record) == subject_for(config).window(record.header.space)
+    assert run_of_log(record).model_dump() == {"seed": 5, "subject": config.subject.model_dump(exclude={"data"})}
+    assert truth_of(record) == Truth(known=True, window=subject_for(config).window(record.header.space))
     assert len(record.table) == 2
 
 
@@ -266,7 +267,7 @@ def test_a_log_holds_the_configuration_it_was_run_with(tmp_path: Path, config_fi
 def test_a_log_of_other_software_has_no_configuration(tmp_path: Path, config: dict[str, Any]) -> None:
     Session(ScriptedDevice(), scripted_strategy(1), log=tmp_path / "s.mcap", config=config).run()
     with pytest.raises(ConfigError, match=r"device is not known here.*isiw.resume"):
-        config_of_log(read_session(tmp_path / "s.mcap"))
+        run_of_log(read_session(tmp_path / "s.mcap"))
 
 
 @pytest.mark.parametrize(

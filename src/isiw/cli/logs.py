@@ -71,9 +71,11 @@ def _save(
 ) -> None:
     """Save what is made of a log, beside it where nobody gave a place, and say where it is."""
     record = isiw.read_session(log)
-    truth = isiw.config.true_window(record)
+    truth = isiw.config.truth_of(record)
     target = output or free_beside(record.path, suffix)
-    show(f"{what}: {save(record, target, truth=truth, overwrite=overwrite)}")
+    show(f"{what}: {save(record, target, truth=truth.window, overwrite=overwrite)}")
+    if truth.lacking:
+        show(f"Drawn without it: {truth.lacking}", style="yellow")
     exit_if_damaged(record.losses)
 
 

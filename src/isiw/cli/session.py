@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,6 +15,7 @@ from isiw.cli.files import free_beside, is_log
 from isiw.text.commands import command
 
 if TYPE_CHECKING:
+    from isiw.devices.protocol import Device
     from isiw.session.loop import Session
 
 __all__ = ["app"]
@@ -94,12 +95,18 @@ def resume(
     """Continue an interrupted session, with its own ISI range and strategy, within the limits in CONFIG."""
     with errors_reported():
         record = isiw.config.read_to_resume(log, config)
-        settings = isiw.config.load_config(config) if config else isiw.config.config_of_log(record)
-        isiw.config.require_same_person(settings, [record])
-        changes = isiw.config.changes_on_resume(settings, record) if config else {}
-        device = isiw.config.device_for(settings.with_overrides(data=data))
+        changes: dict[str, Any] = {}
+        differences: tuple[str, ...] = ()
+        if config is None:  # then only what the log says of a simulated person, which names nothing to import or open
+            device: Device = isiw.config.device_of_log(record, data)
+        else:
+            settings = isiw.config.load_config(config)
+            isiw.config.require_same_person(settings, [record])
+            changes = isiw.config.changes_on_resume(settings, record)
+            differences = isiw.config.differences_on_resume(settings, record)
+            device = isiw.config.device_for(settings.with_overrides(data=data))
         session = isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify, **changes)
-        for difference in isiw.config.differences_on_resume(settings, record) if config else ():
+        for difference in differences:
             show(difference, style="yellow", stderr=True)
         _run_to_the_end(session, config, live=live, resumed=True)
 
@@ -125,13 +132,13 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
                 show(line)
         raise
     record = isiw.read_session(result.log)
-    truth = isiw.config.true_window(record)
+    truth = isiw.config.truth_of(record)
     show(f"\n{isiw.report.final_statement(record, config)}", style="bold")
-    if isiw.config.has_truth(record):
-        show(isiw.report.truth_sentence(record, truth))
+    if truth.known:
+        show(isiw.report.truth_sentence(record, truth.window))
     show(f"log:     {result.log}")
     try:
-        picture = isiw.plots.save_session_plot(record, free_beside(result.log, ".png"), truth=truth)
+        picture = isiw.plots.save_session_plot(record, free_beside(result.log, ".png"), truth=truth.window)
         show(f"picture: {picture}")
     except OSError as error:
         later = command("plot", result.log)

@@ -1,37 +1,37 @@
 """Configuration files, and the sessions that they describe."""
 
 from isiw.config.going_on import changes_on_resume, differences_on_resume, read_to_resume
+from isiw.config.logged import Truth, device_of_log, run_of_log, truth_of
 from isiw.config.next_steps import after_end, after_error
 from isiw.config.rig import write_rig_template
-from isiw.config.run import RunConfig, config_of_log, limits_for, load_config
+from isiw.config.run import RunConfig, limits_for, load_config
 from isiw.config.session import (
     device_for,
     fresh_log_path,
-    has_truth,
     require_device,
     session_for,
     subject_for,
-    true_window,
 )
 from isiw.config.taught import require_same_person
 
 __all__ = [
     "RunConfig",
+    "Truth",
     "after_end",
     "after_error",
     "changes_on_resume",
-    "config_of_log",
     "device_for",
+    "device_of_log",
     "differences_on_resume",
     "fresh_log_path",
-    "has_truth",
     "limits_for",
     "load_config",
     "read_to_resume",
     "require_device",
     "require_same_person",
+    "run_of_log",
     "session_for",
     "subject_for",
-    "true_window",
+    "truth_of",
     "write_rig_template",
 ]

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from isiw.config.run import RunConfig, config_of_log
-from isiw.config.session import has_truth
+from isiw.config.logged import run_of_log
+from isiw.config.run import RunConfig
+from isiw.config.sections import SimulatedConfig
 from isiw.devices.limits import Limits
 from isiw.errors import ConfigError, LogError
 from isiw.log.reader import SessionRecord, read_session
@@ -123,10 +124,13 @@ def _require_space(config: RunConfig, header: Header) -> None:
 
 
 def _require_same_simulated(config: RunConfig, record: SessionRecord) -> None:
-    if not has_truth(record):
+    """Raise where another person is simulated; whom the log does not make out, nobody can compare."""
+    try:
+        was = run_of_log(record)
+    except ConfigError:
         return
-    was = config_of_log(record)
-    if (was.seed, was.subject) != (config.seed, config.subject):
+    now = SimulatedConfig(**config.subject.model_dump(exclude={"data"}))
+    if (was.seed, was.subject) != (config.seed, now):
         raise ConfigError(
             "the configuration simulates another person",
             got=f"seed {config.seed}, {config.subject}",

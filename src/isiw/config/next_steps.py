@@ -67,9 +67,14 @@ def after_end(session: Session, config: Path | None, *, delivered: bool) -> str 
 
 
 def _resume(session: Session, config: Path | None, *, named: bool) -> str:
-    """The command that goes on; a simulated person is known from the log, so that the file need not be named."""
-    files = [session.log_path, config] if named or RUN_KEY not in session.header.config else [session.log_path]
-    return command("resume", *filter(None, files))
+    """The command that goes on; a simulated person is known from the log, but not where recorded EMG is."""
+    run = session.header.config.get(RUN_KEY)
+    if config is not None and (named or run is None):
+        return command("resume", session.log_path, config)
+    recorded = (
+        isinstance(run, dict) and isinstance(run.get("subject"), dict) and run["subject"].get("kind") == "recorded"
+    )
+    return command("resume", session.log_path, *(["--data", "DIR"] if recorded else []))
 
 
 def _anew(session: Session, config: Path | None) -> str:

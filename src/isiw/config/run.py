@@ -33,14 +33,11 @@ from isiw.config.sections import (
 from isiw.config.slips import require_units
 from isiw.devices.limits import Limits
 from isiw.errors import ConfigError, did_you_mean
-from isiw.log.reader import SessionRecord
-from isiw.log.schema import RUN_KEY
 from isiw.signals.limits import SignalLimits
-from isiw.text.commands import command
 from isiw.text.toml_files import checked, read_toml
 from isiw.visit import VisitProtocol
 
-__all__ = ["RunConfig", "config_of_log", "limits_for", "load_config"]
+__all__ = ["RunConfig", "limits_for", "load_config"]
 
 
 class RunConfig(Section):
@@ -170,23 +167,6 @@ def _read_from(folder: Path, config: RunConfig) -> RunConfig:
 
 def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
     return checked(RunConfig, values, source)
-
-
-def config_of_log(record: SessionRecord) -> RunConfig:
-    """The configuration that a logged session was run with.
-
-    Raises:
-        ConfigError: it was run by other software than `isiw run`.
-    """
-    if RUN_KEY not in record.header.config:
-        raise ConfigError(
-            "the session's device is not known here",
-            got=record.header.device.name,
-            remedy="Go on where it was run: with the configuration that has your device, CONFIG, "
-            f"{command('resume', record.path, 'CONFIG')}; in your own software by isiw.resume(path, device).run(), or "
-            "for a loop of your own by isiw.open_session(strategy, path, resume=True).",
-        )
-    return _validated(record.header.config[RUN_KEY], str(record.path))
 
 
 def limits_for(config: RunConfig) -> Limits:

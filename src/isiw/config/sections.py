@@ -22,6 +22,7 @@ __all__ = [
     "DeviceConfig",
     "LimitsConfig",
     "Section",
+    "SimulatedConfig",
     "SpaceConfig",
     "StrategyConfig",
     "SubjectConfig",
@@ -47,18 +48,27 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class SubjectConfig(Section):
-    """Who is stimulated: a simulated person, whose MEPs may be put into recorded EMG."""
+class SimulatedConfig(BaseModel):
+    """Who is simulated, in names and numbers; other keys are ignored, as a log of another version may have them."""
+
+    model_config = ConfigDict(frozen=True)
 
     kind: Literal["simulated", "recorded"] = "simulated"
     cohort: str = "recruitment"
     number: int = Field(default=0, ge=0, lt=10_000)
-    data: Path | None = None
 
     @field_validator("cohort")
     @classmethod
     def _known(cls, name: str) -> str:
         return str(choice("the cohort", name, COHORTS))
+
+
+class SubjectConfig(SimulatedConfig):
+    """Who is stimulated: a simulated person, whose MEPs may be put into recorded EMG."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    data: Path | None = None
 
 
 class SpaceConfig(Section):

@@ -9,23 +9,22 @@ from pathlib import Path
 from typing import Any, Final
 
 from isiw.config.rig import device_from_factory
-from isiw.config.run import RunConfig, config_of_log, limits_for
-from isiw.config.sections import SubjectConfig
+from isiw.config.run import RunConfig, limits_for
+from isiw.config.sections import SimulatedConfig, SubjectConfig
 from isiw.config.taught import settings_with_taught
 from isiw.devices.protocol import Device
 from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import ConfigError
 from isiw.log.durable import log_exists
-from isiw.log.reader import SessionRecord
 from isiw.log.schema import RUN_KEY
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import SimulatedSubject
-from isiw.window import Window
+from isiw.types import Reference
 
-__all__ = ["device_for", "fresh_log_path", "has_truth", "require_device", "session_for", "subject_for", "true_window"]
+__all__ = ["device_for", "fresh_log_path", "require_device", "session_for", "simulated_device", "subject_for"]
 
 SESSIONS: Final = Path("isiw-sessions")
 """The folder for logs of sessions without a path."""
@@ -44,16 +43,6 @@ def subject_for(config: RunConfig) -> SimulatedSubject:
     return person_of(config.subject.cohort, config.subject.number, config.seed)
 
 
-def true_window(record: SessionRecord) -> Window | None:
-    """The true window of the person whom `isiw run` simulated; None where it, or such a person, does not exist."""
-    return subject_for(config_of_log(record)).window(record.header.space) if has_truth(record) else None
-
-
-def has_truth(record: SessionRecord) -> bool:
-    """Whether the session is of a person whom `isiw run` simulated."""
-    return RUN_KEY in record.header.config
-
-
 def device_for(config: RunConfig) -> Device:
     """The device: the user's own, or a simulated person, in recorded EMG where asked for.
 
@@ -63,22 +52,38 @@ def device_for(config: RunConfig) -> Device:
     """
     if config.device is not None:
         return device_from_factory(config.device.factory, config.device.settings, config.device.folder)
-    reference = config.space.reference
-    subject = subject_for(config)
-    respond = partial(subject.begin(config.seed).respond, reference=reference)
+    return simulated_device(config.seed, config.subject, config.space.reference, config.subject.data)
+
+
+def simulated_device(seed: int, person: SimulatedConfig, reference: Reference, data: Path | None) -> SimulatedDevice:
+    """The device of a simulated person.
+
+    Args:
+        seed: of the person and the trials.
+        person: who is simulated, and whether in recorded EMG.
+        reference: the event that ISIs count from.
+        data: the folder with the recordings.
+
+    Raises:
+        ConfigError: recorded EMG without its folder.
+        DeviceError: no recordings in the folder.
+    """
+    subject = person_of(person.cohort, person.number, seed)
+    respond = partial(subject.begin(seed).respond, reference=reference)
     hit_delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
-    if config.subject.kind == "simulated":
-        person = SimulatedPerson(respond, reference, hit_delay_ms=hit_delay_ms, conditioning=subject.conditioning)
-        return SimulatedDevice(person)
-    if config.subject.data is None:
-        raise ConfigError(
-            "subject.data is missing: recorded EMG is not part of the package",
-            expected="the folder with the recordings",
-            remedy="Give it with --data DIR.",
+    if person.kind == "simulated":
+        return SimulatedDevice(
+            SimulatedPerson(respond, reference, hit_delay_ms=hit_delay_ms, conditioning=subject.conditioning)
         )
-    recordings = load_recordings(config.subject.data)
-    recorded = RecordedPerson(respond, reference, recordings, config.seed, hit_delay_ms, subject.conditioning)
-    return SimulatedDevice(recorded)
+    if data is None:
+        raise ConfigError(
+            "the folder of the recorded EMG is missing: it is not part of the package, and no folder is taken from a log",
+            expected="the folder with the recordings",
+            remedy="Give it with --data DIR, or as subject.data in a configuration.",
+        )
+    return SimulatedDevice(
+        RecordedPerson(respond, reference, load_recordings(data), seed, hit_delay_ms, subject.conditioning)
+    )
 
 
 def require_device(config: RunConfig, path: Path) -> None:
@@ -147,7 +152,7 @@ def _code(config: RunConfig) -> str:
 
 
 def _kept(config: RunConfig) -> dict[str, Any]:
-    """What a log keeps to simulate the same person again; never what names code to import.
+    """What a log keeps of how its person was simulated; never what names code to import.
 
     What a prior came to is in the strategy's recipe; where it came from is kept for whoever reads the log.
     """

@@ -1,0 +1,91 @@
+"""Whom a logged session simulated: names and numbers. Nothing that a log names is imported or opened."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from isiw.config.sections import SimulatedConfig
+from isiw.config.session import simulated_device
+from isiw.devices.simulated import SimulatedDevice
+from isiw.errors import ConfigError
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import RUN_KEY
+from isiw.subjects.cohorts import person_of
+from isiw.text.commands import command
+from isiw.text.toml_files import checked
+from isiw.window import Window
+
+__all__ = ["Truth", "device_of_log", "run_of_log", "truth_of"]
+
+
+class _LoggedRun(BaseModel):
+    """What is read of a log's run section; everything else in it is for people."""
+
+    model_config = ConfigDict(frozen=True)
+
+    seed: int = Field(default=0, ge=0)
+    subject: SimulatedConfig = SimulatedConfig()
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The true window of the person whom `isiw run` simulated.
+
+    Args:
+        known: whether somebody was simulated whose window is known.
+        window: the window; None where there is none.
+        lacking: why it is not known, though the log says that somebody was simulated; else empty.
+    """
+
+    known: bool = False
+    window: Window | None = None
+    lacking: str = ""
+
+
+def run_of_log(record: SessionRecord) -> _LoggedRun:
+    """Seed and simulated person of a session of `isiw run`.
+
+    Raises:
+        ConfigError: it was run with a device of the lab's own or by other software, or the person is not known here.
+    """
+    run = record.header.config.get(RUN_KEY)
+    if run is None or (isinstance(run, Mapping) and "device" in run):
+        raise ConfigError(
+            "the session's device is not known here",
+            got=record.header.device.name,
+            remedy="Go on where it was run: with the configuration that has your device, CONFIG, "
+            f"{command('resume', record.path, 'CONFIG')}; in your own software by isiw.resume(path, device).run(), or "
+            "for a loop of your own by isiw.open_session(strategy, path, resume=True).",
+        )
+    return checked(_LoggedRun, run, f"the run section of {record.path}")
+
+
+def truth_of(record: SessionRecord) -> Truth:
+    """What a log says of the true window of a simulated person."""
+    if RUN_KEY not in record.header.config:
+        return Truth()
+    try:
+        run = run_of_log(record)
+    except ConfigError as error:
+        return Truth(lacking=f"The true window of the simulated person is not known: {error}")
+    person = person_of(run.subject.cohort, run.subject.number, run.seed)
+    return Truth(known=True, window=person.window(record.header.space))
+
+
+def device_of_log(record: SessionRecord, data: Path | None = None) -> SimulatedDevice:
+    """The simulated person of a log, as a device.
+
+    Args:
+        record: the session.
+        data: the folder with the recorded EMG, where MEPs were put into one.
+
+    Raises:
+        ConfigError: as for `run_of_log`, or recorded EMG without its folder.
+        DeviceError: no recordings in the folder.
+    """
+    run = run_of_log(record)
+    return simulated_device(run.seed, run.subject, record.header.space.reference, data)
