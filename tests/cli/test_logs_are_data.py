@@ -68,6 +68,6 @@ def test_recordings_are_opened_only_where_the_operator_names_them(
     assert isiw("run", short, *arguments).exit_code == 0
     refused = isiw("resume", "r.mcap")
     assert refused.exit_code == 1
-    assert "no folder is taken from a log" in refused.output
+    assert "nor taken from a log" in refused.output
     assert "--data DIR" in refused.output
     assert isiw("resume", "r.mcap", "--data", recordings_folder).exit_code == 0

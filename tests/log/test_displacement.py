@@ -68,7 +68,8 @@ def log(path: Path, header: Header) -> LogWriter:
 
 def kept(error: LogError) -> Path:
     """The copy that an error's message names."""
-    return Path(known(error.remedy).removeprefix("What the session still held of it is in ").removesuffix("."))
+    place, _, _ = known(error.remedy).partition(". ")
+    return Path(place.removeprefix("What the session still held of it is in ").removesuffix("."))
 
 
 def test_a_log_in_its_place_is_accepted(log: LogWriter) -> None:
@@ -105,6 +106,23 @@ def test_a_log_that_was_shortened_before_more_was_written_is_an_error(log: LogWr
         log.require_in_place()
     with pytest.raises(LogError, match="bytes instead of"):
         log.close()
+
+
+@pytest.mark.parametrize("left", [0, 100, 3000])
+def test_of_a_log_that_was_shortened_header_trials_and_events_are_saved_from_memory(
+    log: LogWriter, path: Path, header: Header, left: int
+) -> None:
+    os.truncate(path.with_name("s.mcap.part"), left)
+    write_trials(log, [5])
+    with pytest.raises(LogError, match="Header, trials and events are written from memory") as caught:
+        log.close()
+    saved = read_session(kept(caught.value))
+    assert saved.header == header
+    assert [trial.index for trial in saved.table] == list(range(6))
+    assert [intent.trial for intent in saved.intents] == list(range(6))
+    assert saved.losses
+    assert not saved.end_lost
+    assert "from memory" in saved.events[-1].text
 
 
 def test_a_copy_replaces_no_other_copy(log: LogWriter, path: Path) -> None:

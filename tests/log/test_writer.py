@@ -118,7 +118,7 @@ def test_a_log_that_cannot_go_on_stays_as_it_was(
     with monkeypatch.context() as patched:
         patched.setattr(os, "fsync", full_disk if trouble == "disk" else os.fsync)
         with pytest.raises(LogError):
-            LogWriter.continuing(finished_log, found, unwritable if trouble == "header" else header)
+            LogWriter.continuing(finished_log, found, header, unwritable if trouble == "header" else header)
     assert list(finished_log.parent.iterdir()) == [finished_log]
     assert finished_log.read_bytes() == before
     LogWriter.continuing(finished_log, found, header).close()

@@ -71,6 +71,18 @@ def test_what_the_session_held_of_its_log_is_saved_and_can_be_resumed(log: Path,
     assert len(resume(saved, ScriptedDevice(), scripted_strategy(9)).run().trials) == 9
 
 
+def test_a_session_whose_log_was_shortened_is_resumed_from_what_was_written_from_memory(log: Path) -> None:
+    def on_trial(update: SessionUpdate) -> None:
+        if update.trial.index == 2:
+            os.truncate(log.with_name("s.mcap.part"), 100)
+
+    with pytest.raises(LogError, match="from memory"):
+        Session(ScriptedDevice(), scripted_strategy(9), log=log, on_trial=on_trial).run()
+    saved = log.with_name("s.rescued.mcap")
+    assert len(read_session(saved).table) == 3
+    assert len(resume(saved, ScriptedDevice(), scripted_strategy(9)).run().trials) == 9
+
+
 def test_a_log_that_is_gone_after_the_last_stimulus_is_no_success(log: Path) -> None:
     def on_trial(update: SessionUpdate) -> None:
         if update.decision.stop:

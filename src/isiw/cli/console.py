@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -15,6 +15,9 @@ from rich.text import Text
 
 import isiw
 from isiw.text import plain
+
+if TYPE_CHECKING:
+    from isiw.log.reader import SessionRecord
 
 __all__ = [
     "DAMAGED",
@@ -28,6 +31,7 @@ __all__ = [
     "errors_reported",
     "exit_if_damaged",
     "refuse_ignored",
+    "say_unread",
     "show",
     "show_entry",
 ]
@@ -78,6 +82,16 @@ def exit_if_damaged(losses: Sequence[str]) -> None:
         show(loss, style="red")
     if losses:
         raise typer.Exit(DAMAGED)
+
+
+def say_unread(record: SessionRecord) -> None:
+    """Print which parts of a log's header this version cannot read.
+
+    Args:
+        record: the session.
+    """
+    for sentence in record.told_unread:
+        show(sentence, style="yellow", stderr=True)
 
 
 @contextmanager

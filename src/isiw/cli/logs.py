@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 import isiw
-from isiw.cli.console import LOGS, NO_DEFAULT, Overwrite, errors_reported, exit_if_damaged, show
+from isiw.cli.console import LOGS, NO_DEFAULT, Overwrite, errors_reported, exit_if_damaged, say_unread, show
 from isiw.cli.files import free_beside
 from isiw.text.numbers import counted
 
@@ -25,6 +25,7 @@ def show_log(log: Log) -> None:
     """Say who, when and with what, list the trials, and say what was found; works on a damaged log, too."""
     with errors_reported():
         record = isiw.read_session(log)
+        say_unread(record)
         for fact in isiw.report.first_facts(record):
             show(f"{fact.name + ':':10}{fact.value}")
         show("")
@@ -71,6 +72,7 @@ def _save(
 ) -> None:
     """Save what is made of a log, beside it where nobody gave a place, and say where it is."""
     record = isiw.read_session(log)
+    say_unread(record)
     truth = isiw.config.truth_of(record)
     target = output or free_beside(record.path, suffix)
     show(f"{what}: {save(record, target, truth=truth.window, overwrite=overwrite)}")
@@ -139,6 +141,8 @@ def compare(
     """Compare the windows of sessions: of one person on several days, or of several people."""
     with errors_reported():
         records = [isiw.read_session(log) for log in logs]
+        for record in records:
+            say_unread(record)
         differences = isiw.priors.differences(records)
         show(isiw.report.comparison_table(records))
         for difference in differences:

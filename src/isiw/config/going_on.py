@@ -66,6 +66,7 @@ def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any
     Raises:
         ConfigError: the file has another design space, or simulates another person, than the session.
     """
+    record.require_read()
     header, given = record.header, config.model_fields_set
     _require_space(config, header)
     _require_same_simulated(config, record)

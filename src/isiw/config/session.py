@@ -77,7 +77,7 @@ def simulated_device(seed: int, person: SimulatedConfig, reference: Reference, d
         )
     if data is None:
         raise ConfigError(
-            "the folder of the recorded EMG is missing: it is not part of the package, and no folder is taken from a log",
+            "the folder of the recorded EMG is missing: recordings are not part of the package, nor taken from a log",
             expected="the folder with the recordings",
             remedy="Give it with --data DIR, or as subject.data in a configuration.",
         )

@@ -140,4 +140,5 @@ def log_losses(record: SessionRecord) -> list[str]:
         (timeless, f"The onset is not known of trials {', '.join(timeless)}."),
         (not record.finished and not record.losses, "The session had not closed its log."),
     )
-    return [*record.losses, *(sentence for lacks, sentence in said if lacks)]
+    unread = (f"The log's {part} cannot be read by this version of isiw." for part in record.unread)
+    return [*record.losses, *unread, *(sentence for lacks, sentence in said if lacks)]

@@ -51,6 +51,8 @@ def _judge(path: str | Path, verdict: Callable[[TrialTable], Event]) -> None:
     record = read_salvaged(salvaged)
     event = verdict(record.table)
     record.require_end()
+    if record.losses:  # then the header may be written again
+        record.require_read()
     with LogWriter.continuing(path, salvaged, record.header) as log:
         log.append(event)
         if record.losses:

@@ -30,6 +30,7 @@ __all__ = [
     "begun",
     "damaged_of",
     "disk_errors",
+    "keep_damaged",
     "kept_for",
     "log_exists",
     "log_of",
@@ -333,3 +334,21 @@ def begun(path: Path) -> Iterator[DurableFile]:
         file.abandon()
         path.unlink(missing_ok=True)
         raise
+
+
+def keep_damaged(damaged: Path, target: Path) -> None:
+    """Keep a damaged file's bytes under a name of their own.
+
+    Args:
+        damaged: the file.
+        target: the log that it is of.
+    """
+    names = (damaged_of(target, number) for number in itertools.count())
+    kept = next(name for name in names if not name.exists())
+    try:
+        kept.hardlink_to(damaged)
+    except OSError:  # a disk without hard links
+        with begun(kept) as copy, damaged.open("rb") as source:
+            shutil.copyfileobj(source, copy)
+            copy.close()
+    sync_folder(kept.parent)

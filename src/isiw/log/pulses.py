@@ -136,7 +136,9 @@ def _of_subject(log: Path, subject: str) -> list[tuple[int, int]]:
     salvaged = salvage(log)
     if of_production(salvaged) and not _given(salvaged):  # nobody is stimulated in such a task
         return []
-    header = read_any(salvaged).header
+    record = read_any(salvaged)
+    record.require_read("subject", "device")
+    header = record.header
     if header.subject != subject or header.device.simulated:
         return []
     if salvaged.end_lost and not _went_on(salvaged):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from isiw.errors import DamagedLogError, InvalidValueError
+from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.log.frames import trial_frame
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.onsets import Onset
@@ -49,6 +49,7 @@ class SessionRecord:
         end_lost: whether its end is missing, so that nobody knows how many stimuli it told of.
         delivered: how many stimuli were given by its index, or may have been; 0 where it has none.
         onsets: when each stimulus was about to be delivered, by its trial's number.
+        unread: parts of the header that this version cannot read, and why; something neutral stands in for each.
     """
 
     path: Path
@@ -60,6 +61,7 @@ class SessionRecord:
     end_lost: bool = False
     delivered: int = 0
     onsets: Mapping[int, Onset] = field(default_factory=dict, repr=False)
+    unread: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
         header, last = self.header, self.estimates[-1] if self.estimates else None
@@ -77,7 +79,30 @@ class SessionRecord:
             ]
             if self.is_judged_since:
                 lines.append("Trials were judged anew after this estimate.")
-        return "\n".join([*lines, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
+        return "\n".join([*lines, *self.told_unread, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
+
+    @property
+    def told_unread(self) -> tuple[str, ...]:
+        """A sentence for each part of the header that this version cannot read."""
+        said = "The log's {} cannot be read by this version of isiw: {}"
+        return tuple(said.format(part, why) for part, why in self.unread.items())
+
+    def require_read(self, *parts: str) -> None:
+        """Raise where a part of the header is needed that this version cannot read.
+
+        Args:
+            *parts: their names, as in `Header`; by default all.
+
+        Raises:
+            LogError: one of them cannot be read.
+        """
+        needed = {part: why for part, why in self.unread.items() if part in parts or not parts}
+        if needed:
+            raise LogError(
+                f"what is needed of the log's header cannot be read: {', '.join(needed)}",
+                got=f"{self.path}: {'; '.join(needed.values())}",
+                remedy="Use the version of isiw that wrote it; isiw show, plot, report and export show the rest.",
+            )
 
     @cached_property
     def table(self) -> TrialTable:
@@ -223,9 +248,10 @@ def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionReco
     if of_production(salvaged):
         raise of_another_kind(salvaged.path, LogKind.PRODUCTION, wanted)
     records = Records.of(salvaged)
+    header = records.header_of(Header, SCHEMA_VERSION)
     return SessionRecord(
         salvaged.path,
-        records.header_of(Header, SCHEMA_VERSION),
+        header,
         tuple(records.history),
         records.waveforms,
         records.told_losses,
@@ -233,6 +259,7 @@ def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionReco
         salvaged.end_lost,
         _delivered(salvaged, records.history),
         records.onsets.by_trial,
+        records.unread,
     )
 
 

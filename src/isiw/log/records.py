@@ -9,12 +9,14 @@ from typing import Final, TypeVar
 from pydantic import ValidationError
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.log.headers import first_fault, header_in_parts
 from isiw.log.onsets import Onsets
 from isiw.log.production import Production, ProductionHeader
 from isiw.log.salvage import Message, Salvage
 from isiw.log.schema import AnyHeader, Event, Header, Intent, PulseOutcome, Record, Waveform
 from isiw.log.topics import decode
 from isiw.log.writer import CONFIGURATION
+from isiw.text.json_texts import read_json
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial
 
@@ -40,6 +42,7 @@ class Records:
         waveforms: the recorded channels, by trial and name.
         losses: what was left out, a sentence each.
         onsets: when each stimulus was about to be delivered.
+        unread: parts of the header that cannot be read, and why.
     """
 
     salvaged: Salvage
@@ -48,6 +51,7 @@ class Records:
     waveforms: dict[tuple[int, str], Channel] = field(default_factory=dict)
     losses: list[str] = field(default_factory=list)
     onsets: Onsets = field(default_factory=Onsets)
+    unread: dict[str, str] = field(default_factory=dict)
     _trials: set[int] = field(default_factory=set)
 
     @classmethod
@@ -82,20 +86,21 @@ class Records:
         """
         header = self.header if isinstance(self.header, kind) else None
         if header is None or (self.losses and CONFIGURATION in self.salvaged.attachments):
-            header = _header_from_attachment(self.salvaged, kind)  # what is lost may have been the last header
+            # what is lost may have been the last header
+            header, self.unread = _header_from_attachment(self.salvaged, kind)
         return _checked_version(header, newest, self.salvaged.path)
 
     def take(self, message: Message) -> None:
         """Take one more record."""
         try:
-            record = decode(message.topic, message.data)
+            record, unread = _decoded(message)
             if isinstance(record, Waveform):
                 self.waveforms[record.trial, message.topic.removeprefix("/")] = record.channel()
         except ValueError as error:
-            self.losses.append(f"A record on {message.topic} makes no sense and is left out: {_first_line(error)}")
+            self.losses.append(f"A record on {message.topic} makes no sense and is left out: {first_fault(error)}")
             return
         if isinstance(record, Header | ProductionHeader):
-            self.header = record
+            self.header, self.unread = record, unread
         elif (trial := _concluded(record)) is not None and trial in self._trials:
             self.losses.append(f"A second record of trial {trial} is left out.")
         elif not isinstance(record, Waveform):
@@ -113,6 +118,16 @@ class Records:
             self.onsets.refused()
 
 
+def _decoded(message: Message) -> tuple[Record, dict[str, str]]:
+    """A record, and of a header the parts that cannot be read."""
+    try:
+        return decode(message.topic, message.data), {}
+    except ValidationError:
+        if message.topic != "/header":
+            raise
+        return header_in_parts(read_json(message.data))
+
+
 def _concluded(record: Record) -> int | None:
     """The number of the trial whose outcome a record is; None for any other record."""
     if isinstance(record, Trial):
@@ -120,18 +135,11 @@ def _concluded(record: Record) -> int | None:
     return record.trial if isinstance(record, PulseOutcome | Production) else None
 
 
-def _first_line(error: ValueError) -> str:
-    """What is wrong with a record, without what pydantic says of where to read more."""
-    if isinstance(error, ValidationError):
-        first = error.errors(include_url=False, include_input=False)[0]
-        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-    return str(error)
-
-
-def _header_from_attachment(salvaged: Salvage, kind: type[HeaderKind]) -> HeaderKind:
+def _header_from_attachment(salvaged: Salvage, kind: type[HeaderKind]) -> tuple[HeaderKind, dict[str, str]]:
     text = salvaged.attachments.get(CONFIGURATION, b"")[:MOST_CONFIGURATION]
     try:
-        return kind.model_validate(parsed(text.decode()))
+        values = parsed(text.decode())
+        return header_in_parts(values) if kind is Header else (kind.model_validate(values), {})
     except (ValueError, RecursionError) as error:
         raise DamagedLogError(
             "the log's header is lost",

@@ -22,11 +22,13 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, field_validator
 
+from isiw.checks import mean_and_sd, number
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
+from isiw.errors import InvalidValueError
 from isiw.log.production import Production, ProductionHeader
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.stopping import StopDecision
@@ -88,6 +90,18 @@ class StrategyRecipe(_Record):
     name: str
     seed: int
     settings: dict[str, Any] = Field(default_factory=dict)
+
+    @field_validator("settings")
+    @classmethod
+    def _readable(cls, settings: dict[str, Any]) -> dict[str, Any]:
+        """What a header is read by, whatever the strategy."""
+        if settings.get("conditioning", "tap") not in STIMULI:
+            raise InvalidValueError("the conditioning stimulus is unknown", got=settings["conditioning"])
+        if (limit_mv := settings.get("detection_limit_mv")) is not None:
+            number("detection_limit_mv", limit_mv, above=0)
+        if (delay_ms := settings.get("hit_delay_ms")) is not None:
+            mean_and_sd("hit_delay_ms", delay_ms)
+        return settings
 
 
 RUN_KEY: Final = "isiw_run"

@@ -24,6 +24,7 @@ from isiw.log.schema import (
     ThresholdBelief,
     Waveform,
 )
+from isiw.text.json_texts import refuse_doubled
 from isiw.trials import Trial
 
 __all__ = [
@@ -155,9 +156,10 @@ def decode(topic: str, data: bytes) -> Record:
         data: JSON.
 
     Raises:
-        ValueError: not such a record.
+        ValueError: not such a record, or a key that is there twice.
     """
     record: Record = adapter(topic).validate_json(data)
+    refuse_doubled(data)
     if isinstance(record, Trial) and record.index >= MOST_TRIALS:
         raise InvalidValueError("no session has so many trials", got=record.index, expected=f"below {MOST_TRIALS}")
     return record

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
-import shutil
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self, cast
 
-import tomli_w
 from mcap.writer import Writer
 
 from isiw.errors import LogError
@@ -20,15 +17,17 @@ from isiw.log.durable import (
     DurableFile,
     Fingerprint,
     begun,
-    damaged_of,
     disk_errors,
+    keep_damaged,
     log_of,
     part_of,
     sync_folder,
 )
+from isiw.log.headers import as_toml
 from isiw.log.locks import claimed, refuse_if_locked
+from isiw.log.memory import Memory, found_in
 from isiw.log.salvage import Message, Salvage, holds, salvage_file
-from isiw.log.schema import RUN_KEY, AnyHeader, Header, Record
+from isiw.log.schema import RUN_KEY, AnyHeader, Event, Header, Record
 from isiw.log.topics import CHANNEL_IDS, announcement, decode, encode, is_of_isiw, json_schema, topic_of
 from isiw.text.commands import command
 
@@ -36,6 +35,8 @@ __all__ = ["CONFIGURATION", "LogWriter"]
 
 CONFIGURATION = "configuration.toml"
 """The attachment that holds the header once more, as TOML."""
+
+_FROM_MEMORY = "Header, trials and events are written from memory; waveforms and estimates may be lost."
 
 _COPYING = ".resuming"
 """What a log's copy is called until it takes the log's place."""
@@ -60,6 +61,7 @@ class LogWriter:
         self._writer = Writer(cast("IO[bytes]", file), enable_data_crcs=True)
         self._channels: dict[str, int] = {}
         self._records = 0
+        self._memory = Memory()
         self._log_time_ns = 0
         self._replaces: Fingerprint | None = None
         self.on_append: Callable[[Record, str | None], None] | None = None
@@ -121,12 +123,12 @@ class LogWriter:
                 log._replaces = replaces
                 log._copy_all(salvage, header, as_resumed)
                 if salvage.losses:
-                    _keep(salvage.path, target)
+                    keep_damaged(salvage.path, target)
                 file.move_to(part_of(target), replacing=True, source=source)
         return log
 
     def _copy_all(self, salvage: Salvage, header: AnyHeader, as_resumed: AnyHeader | None) -> None:
-        self.begin(as_resumed or header)
+        self.begin(as_resumed or header, None if as_resumed else salvage.attachments.get(CONFIGURATION))
         if not any(message.topic == topic_of(header) for message in salvage.messages):
             self.append(header)
         for message in salvage.messages:
@@ -137,12 +139,17 @@ class LogWriter:
             self.append(as_resumed)
         self.sync()
 
-    def begin(self, header: AnyHeader) -> None:
+    def begin(self, header: AnyHeader, configuration: bytes | None = None) -> None:
         """Write what is not a message: metadata for tools that list files, and the header as TOML.
+
+        Args:
+            header: what the session is.
+            configuration: the header as TOML, where there is one already.
 
         Raises:
             LogError: something in the header is not a TOML value.
         """
+        self._header = header
         facts = {
             "isiw_version": header.isiw_version,
             "schema_version": str(header.schema_version),
@@ -150,7 +157,7 @@ class LogWriter:
             "seed": str(header.seed),
             "created": header.created,
         }
-        configuration = _as_toml(header)
+        configuration = configuration or as_toml(header)
         now_ns = time.time_ns()
         self._writer.add_metadata("session", facts)
         self._writer.add_attachment(now_ns, now_ns, CONFIGURATION, "application/toml", configuration)
@@ -249,12 +256,27 @@ class LogWriter:
 
     def _save_if_displaced(self) -> None:
         displacement = self._file.displacement()
-        if displacement is not None:
-            raise LogError(
-                f"the log is no longer as it was written: {displacement}",
-                got=str(self._file.path),
-                remedy=f"What the session still held of it is in {self._file.rescued(self.path)}.",
-            )
+        if displacement is None:
+            return
+        copy = self._file.rescued(self.path)
+        held = f"What the session still held of it is in {copy}."
+        if (records := self._memory.completing(found_in(copy))) is not None:
+            self._write_from_memory(copy, records, displacement)
+            held = f"{held} {_FROM_MEMORY}"
+        raise LogError(f"the log is no longer as it was written: {displacement}", got=str(self._file.path), remedy=held)
+
+    def _write_from_memory(self, copy: Path, records: Sequence[Message], displacement: str) -> None:
+        """Put a log of what is known in the place of a copy that lacks some of it; gaps in its numbers are losses."""
+        with begun(copy.with_name(f"{copy.name}{_COPYING}")) as file:
+            log = LogWriter(copy, file)
+            log.begin(self._header)
+            for record in records:
+                log._records = record.sequence
+                log._copy(record)
+            log.append(Event(kind="fault", text=f"While the log was written {displacement}. {_FROM_MEMORY}"))
+            log._writer.finish()
+            file.move_to(copy, replacing=True)
+            file.close()
 
     def __enter__(self) -> Self:
         return self
@@ -268,6 +290,7 @@ class LogWriter:
         self._log_time_ns = max(self._log_time_ns, message.log_time_ns)
         channel = self._register(message.topic)
         self._writer.add_message(channel, self._log_time_ns, message.data, self._log_time_ns, self._records)
+        self._memory.keep(Message(message.topic, message.data, self._log_time_ns, self._records))
         self._records += 1
 
     def _register(self, topic: str) -> int:
@@ -363,26 +386,3 @@ def _foreign(path: Path, salvage: Salvage) -> LogError:
         got=str(path),
         remedy=f"Give {salvage.path.name} or {path.name} another name or folder, and go on from there.",
     )
-
-
-def _as_toml(header: AnyHeader) -> bytes:
-    try:
-        return tomli_w.dumps(header.model_dump(mode="json", exclude_none=True)).encode()
-    except (TypeError, ValueError) as error:
-        raise LogError(
-            f"the header cannot be written: {error}",
-            remedy="Give subject, config and the strategy's settings as TOML values, and leave out what is None.",
-        ) from error
-
-
-def _keep(damaged: Path, target: Path) -> None:
-    """Keep a damaged file's bytes under a name of their own."""
-    names = (damaged_of(target, number) for number in itertools.count())
-    kept = next(name for name in names if not name.exists())
-    try:
-        kept.hardlink_to(damaged)
-    except OSError:  # a disk without hard links
-        with begun(kept) as copy, damaged.open("rb") as source:
-            shutil.copyfileobj(source, copy)
-            copy.close()
-    sync_folder(kept.parent)

@@ -58,8 +58,9 @@ def require_meps(record: SessionRecord) -> None:
         record: the session.
 
     Raises:
-        LogError: it has no accepted trial, or none with an MEP.
+        LogError: it has no accepted trial, or none with an MEP, or what is known of rig and person cannot be read.
     """
+    record.require_read("seed", "strategy", "device", "visit", "subject")
     if not record.table.told:
         raise LogError(
             "the session has no accepted trial to learn from", got=str(record.path), remedy="Leave this log out."

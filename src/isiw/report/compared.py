@@ -60,7 +60,7 @@ def comparison_page(records: Sequence[SessionRecord], differences: Sequence[Diff
         headings=HEADINGS,
         rows=comparison_rows(records),
         sessions=[_session(record) for record in records],
-        losses=[f"{record.path.name}: {loss}" for record in records for loss in record.losses],
+        losses=[f"{record.path.name}: {loss}" for record in records for loss in (*record.told_unread, *record.losses)],
     )
 
 

@@ -36,7 +36,8 @@ def first_facts(record: SessionRecord) -> list[Fact]:
         "strategy": f"{header.strategy.name or 'of own objects'}, seed {header.strategy.seed}",
         "version": f"isiw {header.isiw_version}" + (f" ({versions})" if versions else ""),
     }
-    return [Fact(name, " ".join(value.split())) for name, value in told.items()]
+    parts = {"date": "created", "version": "isiw_version"}
+    return [Fact(name, " ".join(_read(record, parts.get(name, name), value).split())) for name, value in told.items()]
 
 
 def further_facts(record: SessionRecord) -> list[Fact]:
@@ -57,7 +58,12 @@ def further_facts(record: SessionRecord) -> list[Fact]:
         "log": f"{record.path.name}, schema {header.schema_version}",
     }
     told = {name: value if isinstance(value, str) else _fields(value) for name, value in groups.items()}
-    return [Fact(name, value) for name, value in told.items() if value]
+    parts = {
+        "judgement of a sweep": "signals",
+        "deadline of a delivery": "timeout_s",
+        "deadline of a choice": "ask_deadline_s",
+    }
+    return [Fact(name, _read(record, parts.get(name, name), value)) for name, value in told.items() if value]
 
 
 def settings_facts(record: SessionRecord) -> list[Fact]:
@@ -70,6 +76,11 @@ def settings_facts(record: SessionRecord) -> list[Fact]:
         Fact(key, json.dumps(value, ensure_ascii=False))
         for key, value in _flat(record.header.strategy.settings).items()
     ]
+
+
+def _read(record: SessionRecord, part: str, value: str) -> str:
+    """What is said of a part of the header, unless it cannot be read: then what it is by default says nothing."""
+    return "cannot be read by this version of isiw" if part in record.unread else value
 
 
 def _subject(record: SessionRecord) -> str:

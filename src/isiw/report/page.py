@@ -67,7 +67,7 @@ def _contents(record: SessionRecord) -> dict[str, Any]:
     return {
         "subject": record.header.subject or "an unnamed subject",
         "states": _states(record),
-        "losses": record.losses,
+        "losses": (*record.told_unread, *record.losses),
         "findings": finding_sentences(record),
         "fit": fit_sentence(record),
         "answers": answers(record),

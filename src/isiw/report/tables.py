@@ -93,16 +93,17 @@ def counted_rows(record: SessionRecord) -> list[Counted]:
     wanted_ms = [trial.commanded_isi_ms for trial in record.table] + [intent.isi_ms for intent in record.unknown]
     isis_ms = [isi_ms for isi_ms in wanted_ms if isi_ms is not None]
     asked_ms = f"{min(isis_ms):g}–{max(isis_ms):g} ms" if isis_ms else "–"
+    kept = "limits" not in record.unread
     unknown = sum(trial.reason is MistrialReason.OUTCOME_UNKNOWN for trial in record.table) + len(record.unknown)
     shortest_s = _shortest_s(record)
     return [
-        Counted("stimuli delivered", f"{record.given}", f"at most {limits.max_pulses}"),
+        Counted("stimuli delivered", f"{record.given}", f"at most {limits.max_pulses}" if kept else ""),
         Counted("of them with an unknown outcome", f"{unknown}", ""),
         Counted("shortest time between two stimuli", "not known" if shortest_s is None else f"{shortest_s:.2f} s",
-                f"at least {limits.min_iti_s:g} s"),
-        Counted("ISIs asked", asked_ms, f"{limits.low_ms:g}–{limits.high_ms:g} ms"),
+                f"at least {limits.min_iti_s:g} s" if kept else ""),
+        Counted("ISIs asked", asked_ms, f"{limits.low_ms:g}–{limits.high_ms:g} ms" if kept else ""),
         Counted("most mistrials in a row", f"{_mistrials_in_a_row(record)}",
-                f"a pause after {limits.max_consecutive_mistrials}"),
+                f"a pause after {limits.max_consecutive_mistrials}" if kept else ""),
         Counted("refused before delivery", f"{kinds['refused']}", ""),
         Counted("limits reached", f"{kinds['limit']}", ""),
         Counted("faults", f"{kinds['fault']}", ""),

@@ -129,6 +129,7 @@ def _resumed(
     """The session of a log, from where it ends; what nobody said anew is as it was logged."""
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
+    record.require_read()
     require_same_person(header, record.header)
     record = with_lost_pulses(record, lost_pulses)
     replayed = replay(record, strategy)

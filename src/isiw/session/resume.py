@@ -84,6 +84,7 @@ def resume(  # noqa: PLR0913 - all but three are keyword-only
     """
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
+    record.require_read()
     header = record.header
     if limits is not None:
         limits.require_effect()

@@ -105,6 +105,7 @@ def resume_threshold(
     """
     salvaged = salvage(log)
     record = read_threshold_salvaged(salvaged)
+    record.require_read()
     clock = _clock_for(record.header.device, clock)
     if record.end_lost:
         raise DamagedLogError(

@@ -1,0 +1,48 @@
+"""JSON from elsewhere: a key that is there twice is refused, since readers differ in which of the two counts."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any, Final
+
+__all__ = ["read_json", "refuse_doubled"]
+
+_NUMBERS: Final = re.compile(rb":\s*\[[^\[\]{}\"]*\]")
+"""Lists of numbers: they make up most of a waveform, and have no keys."""
+
+
+def read_json(text: str | bytes) -> Any:
+    """The values of a JSON text.
+
+    Raises:
+        ValueError: it is not JSON, has a key twice, or is nested without end.
+    """
+    try:
+        return json.loads(text, object_pairs_hook=_once_each)
+    except RecursionError as error:
+        raise ValueError("it is nested without end") from error
+
+
+def refuse_doubled(text: bytes) -> None:
+    """Raise where a JSON text has a key twice; quick where it is long because of lists of numbers.
+
+    Args:
+        text: JSON.
+
+    Raises:
+        ValueError: it has a key twice, or is not JSON.
+    """
+    try:
+        read_json(_NUMBERS.sub(b":0", text))
+    except ValueError:  # a text may look like such a list
+        read_json(text)
+
+
+def _once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    values = dict(pairs)
+    if len(values) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {twice[:80]!r} is there twice")
+    return values
