@@ -116,7 +116,7 @@ def write_messages(path: Path, messages: list[Message], *, doubled: str | None =
 
 
 def mutated(messages: list[Message], rng: np.random.Generator) -> tuple[list[Message], str | None, tuple[str, ...]]:
-    """Records of which one to three are changed, a key of the header that is to be there twice, and what was changed."""
+    """Records with one to three changes, a key of the header that is to be there twice, and what was changed."""
     changed, doubled, said = copy.deepcopy(messages), None, []
     for _ in range(int(rng.integers(1, 4))):
         kind = rng.choice(["value", "value", "value", "run", "key", "extra", "topic", "drop", "twice", "order"])

@@ -26,6 +26,23 @@ def test_the_parts_of_a_message_can_be_read_one_by_one() -> None:
     assert (error.what, error.got, error.expected, error.remedy) == ("a", 1, "b", "c")
 
 
+class Unprintable:
+    def __repr__(self) -> str:
+        raise RuntimeError
+
+
+@pytest.mark.parametrize("got", ["x" * 10**6, list(range(10**5)), 16**5000, Unprintable()], ids=type)
+def test_a_value_that_is_long_or_cannot_be_printed_is_shortened(got: object) -> None:
+    error = IsiwError("what", got=got, remedy="Do this.")
+    assert len(str(error)) < 230
+    assert str(error).endswith("Do this.")
+    assert error.got is got
+
+
+def test_of_a_long_path_the_files_name_is_still_told() -> None:
+    assert "P07.mcap" in str(IsiwError("no log", got="/far" * 100 + "/P07.mcap"))
+
+
 @pytest.mark.parametrize(
     ("child", "parent"),
     [

@@ -197,7 +197,7 @@ def text(what: str, value: object) -> str:
         InvalidValueError: anything else.
     """
     if not isinstance(value, str):
-        remedy = f'Write it in quotes: "{value}".' if isinstance(value, int | float) else None
+        remedy = f'Write it in quotes: "{value}".' if isinstance(value, int | float) and abs(value) < 1e15 else None
         raise InvalidValueError(f"{what} must be a text", got=value, remedy=remedy)
     return str(value)
 

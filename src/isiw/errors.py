@@ -67,11 +67,12 @@ class IsiwError(Exception):
         self, what: str, *, got: object = None, expected: str | None = None, remedy: str | None = None
     ) -> None:
         self.what, self.got, self.expected, self.remedy = what, got, expected, remedy
-        parts = [what]
+        parts = [_cut(what, _LONGEST_TEXT // 10)]
         if got is not None:
-            parts.append(f"got {got!r}")
+            parts.append(f"got {_shortened(got)}")
         if expected is not None:
-            parts.append(f"expected {expected}")
+            parts.append(f"expected {_cut(expected, _LONGEST_TEXT // 10)}")
+        remedy = remedy and _cut(remedy, _LONGEST_TEXT // 5)
         message = "; ".join(parts)
         super().__init__(f"{message}. {remedy}" if remedy else message)
 
@@ -137,6 +138,21 @@ class DamagedLogError(LogError):
 
 
 _LONGEST_TEXT = 10_000
+_LONGEST_GOT = 200
+
+
+def _shortened(value: object) -> str:
+    """What a value prints as, of a long one its beginning and its end."""
+    try:
+        return _cut(repr(value), _LONGEST_GOT)
+    except Exception:  # noqa: BLE001 - a whole number of thousands of digits, or an object that fails in any way
+        return f"a value of the type {type(value).__name__} that cannot be printed"
+
+
+def _cut(text: str, most: int) -> str:
+    """A text without its middle, where it is longer than it may be; a path keeps its name at the end."""
+    half = (most - 3) // 2
+    return text if len(text) <= most else f"{text[:half]} … {text[-half:]}"
 
 
 def told(error: BaseException) -> str:
@@ -170,5 +186,9 @@ def did_you_mean(given: object, known: Iterable[object]) -> str:
         known: the words that there are.
     """
     words = {word.casefold(): word for word in map(str, known)}
-    near = difflib.get_close_matches(given.casefold(), words, n=1) if isinstance(given, str) else []
+    near = (
+        difflib.get_close_matches(given.casefold(), words, n=1)
+        if isinstance(given, str) and len(given) <= _LONGEST_GOT
+        else []
+    )
     return f"Did you mean {words[near[0]]}?" if near else ""

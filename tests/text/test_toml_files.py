@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -58,3 +59,34 @@ def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path: Path) -> None:
         read_toml(tmp_path / "broken.toml")
     with pytest.raises(ConfigError, match="cannot be read"):
         read_toml(tmp_path / "nowhere.toml")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x = 0x" + "f" * 5000,
+        "x = " + "9" * 5000,
+        "[a]\ny = [1, 0b1" + "0" * 300 + "]",
+        "".join(f"[a{n}.{'.'.join(f'k{part}' for part in range(97))}]\n" for n in range(20_000)),
+        ".".join(f'"k {part}"' for part in range(20_000)) + " = 1",
+        ".".join("k" * 50 for _ in range(200)) + " = 1",
+        "x = " + "[" * 5000,
+    ],
+)
+def test_what_is_too_large_to_read_is_refused_in_words_at_once(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "large.toml"
+    file.write_text(text, encoding="utf-8")
+    begin_s = time.process_time()
+    with pytest.raises(ConfigError, match="is not valid TOML") as refused:
+        read_toml(file)
+    assert time.process_time() - begin_s < 2
+    assert len(str(refused.value)) < 1000
+
+
+def test_a_value_of_a_megabyte_is_not_repeated_whole(tmp_path: Path) -> None:
+    file = tmp_path / "large.toml"
+    for text in (f'people = "{"x" * 900_000}"', f"{'x' * 900_000} = 1"):
+        file.write_text(text, encoding="utf-8")
+        with pytest.raises(ConfigError) as refused:
+            checked(Whole, read_toml(file), str(file))
+        assert len(str(refused.value)) < 4000

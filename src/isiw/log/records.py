@@ -24,9 +24,6 @@ __all__ = ["Records"]
 
 HeaderKind = TypeVar("HeaderKind", Header, ProductionHeader)
 
-MOST_CONFIGURATION: Final = 2**20
-"""Of a configuration as TOML [bytes]; the default's is 2 kB."""
-
 MOST_LOSSES: Final = 50
 """Losses that are listed one by one."""
 
@@ -136,7 +133,7 @@ def _concluded(record: Record) -> int | None:
 
 
 def _header_from_attachment(salvaged: Salvage, kind: type[HeaderKind]) -> tuple[HeaderKind, dict[str, str]]:
-    text = salvaged.attachments.get(CONFIGURATION, b"")[:MOST_CONFIGURATION]
+    text = salvaged.attachments.get(CONFIGURATION, b"")
     try:
         values = parsed(text.decode())
         return header_in_parts(values) if kind is Header else (kind.model_validate(values), {})

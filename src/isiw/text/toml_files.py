@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
@@ -18,19 +18,43 @@ __all__ = ["checked", "parsed", "read_toml"]
 
 _T = TypeVar("_T")
 
-_TOO_MANY_PARTS: Final = re.compile(r"(?:\.\s*[\w\"'-]{1,40}\s*){100}")
+_LARGEST: Final = 2**20
+"""Of a text [characters]; what isiw itself writes has some ten thousand."""
+
+_TOO_MANY_PARTS: Final = re.compile(r"""(?:\.[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+){100}""")
+
+_MOST_BITS: Final = 256
+"""Of a whole number; TOML asks for 64, and some seeds have 128."""
 
 
 def parsed(text: str) -> dict[str, Any]:
     """The values of a TOML text.
 
     Raises:
-        ValueError: it is not TOML, or has a key of more than a hundred parts, which would take gigabytes to read.
+        ValueError: it is not TOML, or is more than could be read in a moment: a megabyte, a key of more than a hundred
+            parts, or a whole number of hundreds of bits.
         RecursionError: it is nested without end.
     """
+    if len(text) > _LARGEST:
+        raise ValueError(f"it is longer than {_LARGEST} characters")
     if _TOO_MANY_PARTS.search(text):
         raise ValueError("a key has more than a hundred parts")
-    return tomllib.loads(text)
+    values = tomllib.loads(text)
+    _require_moderate(values)
+    return values
+
+
+def _require_moderate(value: object, key: str = "") -> None:
+    """Raise where a whole number is too large even to be printed."""
+    if isinstance(value, int) and value.bit_length() > _MOST_BITS:
+        raise ValueError(f"{key} is a whole number of {value.bit_length()} bits, at most {_MOST_BITS} can be read")
+    items: Iterable[tuple[object, object]] = ()
+    if isinstance(value, dict):
+        items = value.items()
+    elif isinstance(value, list):
+        items = enumerate(value)
+    for name, inner in items:
+        _require_moderate(inner, f"{key}.{name}".lstrip("."))
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
@@ -40,7 +64,8 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         ConfigError: it cannot be read, or is not TOML.
     """
     try:
-        return parsed(Path(path).read_text(encoding="utf-8-sig"))  # with the mark that Windows puts first
+        with Path(path).open(encoding="utf-8-sig") as file:  # with the mark that Windows puts first
+            return parsed(file.read(_LARGEST + 1))
     except OSError as error:
         raise ConfigError(
             f"the TOML file cannot be read: {error.strerror}", got=str(path), remedy="Check the path."

@@ -42,7 +42,7 @@ class Reply:
             expected: what would have been accepted.
             remedy: the way out.
         """
-        shown = plain(got)[:_LONGEST_SHOWN] if isinstance(got, str) else got
+        shown = plain(got) if isinstance(got, str) else got
         return DeviceError(f"{self.source}: {what}", got=shown, expected=expected, remedy=remedy or None)
 
     def require_known(self, keys: Iterable[str]) -> None:
