@@ -15,6 +15,7 @@ import collections
 import copy
 import io
 import json
+import math
 import os
 import tempfile
 import time
@@ -169,7 +170,7 @@ def _change_run(header: Any, rng: np.random.Generator) -> str:
     sections: list[Any] = [
         *ABSURD,
         {"device": {"factory": "subprocess:getoutput", "settings": {"cmd": "false"}}},
-        {"device": {"factory": "antigravity:fly", "folder": "/"}},
+        {"device": {"factory": "planted_rig:make", "folder": "/"}},
         {"prior": "/etc/passwd", "after": ["/etc/passwd"], "log": "/etc/passwd"},
         {"subject": {"kind": "recorded", "data": "/etc"}},
         {"subject": {"cohort": "of-another-version"}},
@@ -198,19 +199,27 @@ def outcome_of(*arguments: str) -> str:
     return "" if code in {0, None, 1, 3, 5} else f"exit code {code}"
 
 
-def faults(folder: Path, cases: int, seed: int = 0, others: tuple[tuple[str, ...], ...] = OTHERS) -> Iterator[Fault]:
+def write_base(folder: Path) -> None:
+    """Write the log that the others are made of, and a configuration."""
+    write_log(folder / "whole.mcap")
+    (folder / "config.toml").write_text(CONFIG, encoding="utf-8")
+
+
+def faults(
+    folder: Path, cases: int, seed: int = 0, first: int = 0, others: tuple[tuple[str, ...], ...] = OTHERS
+) -> Iterator[Fault]:
     """What went wrong with which command.
 
     Args:
-        folder: an empty folder, which is the working one as well.
+        folder: with what `write_base` writes; the working one as well.
         cases: how many logs.
         seed: of the mutations.
+        first: the number of the first of them.
         others: of which commands one is drawn for each log.
     """
-    whole = write_log(folder / "whole.mcap")
+    whole = folder / "whole.mcap"
     messages = messages_of(whole)
-    (folder / "config.toml").write_text(CONFIG, encoding="utf-8")
-    for case in range(cases):
+    for case in range(first, first + cases):
         rng = np.random.default_rng([seed, case])
         changed, doubled, said = mutated(messages, rng)
         other = others[int(rng.integers(len(others)))]
@@ -232,17 +241,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=2000, help="how many logs (default: 2000)")
     parser.add_argument("--seed", type=int, default=10_000, help="of the mutations (default: 10000)")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="end after so long, with what was done")
     chosen = parser.parse_args()
-    begin_s = time.monotonic()
+    begin_s, done, found, before = time.monotonic(), 0, list[Fault](), Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
-        before = Path.cwd()
         os.chdir(folder)
-        found = list(faults(Path(folder), chosen.cases, chosen.seed))
+        write_base(Path(folder))
+        while done < chosen.cases and time.monotonic() - begin_s < 60 * chosen.minutes:
+            found += faults(Path(folder), 1, chosen.seed, done)
+            done += 1
         os.chdir(before)
     ended = collections.Counter(fault.command.split()[0] for fault in found)
     print(f"- command: `{command_of('log_mutations')}`")
     print(f"- {made_with('mcap', 'pydantic')}, seed {chosen.seed}; {time.monotonic() - begin_s:.0f} s\n")
-    print(f"{chosen.cases:,} logs, each through `isiw show`, `isiw resume` and one of {len(OTHERS)} other commands.\n")
+    print(f"{done:,} logs, each through `isiw show`, `isiw resume` and one of {len(OTHERS)} other commands.\n")
     print(f"Commands that ended in anything but an answer or a message: {len(found):,}.")
     for command, count in ended.most_common():
         print(f"- `isiw {command}`: {count:,}")

@@ -45,6 +45,9 @@ _T = TypeVar("_T")
 LEAST_DELAY_MS = 1.0
 """No hammer hits so soon after its command, nor does a shock travel so fast: such a delay is in seconds."""
 
+MOST_DELAY_MS = 10_000.0
+"""Longer than any stimulus takes [ms]."""
+
 MOST_MEP_MV = 1000.0
 """More than any amplifier of EMG gives [mV]: their inputs take some hundred millivolts to either side at most."""
 
@@ -161,7 +164,7 @@ def mean_and_sd(what: str, value: object) -> tuple[float, float]:
         raise InvalidValueError(
             f"{what} must be a mean and an SD [ms]", got=value, remedy="Give both, such as (183.1, 6.0)."
         )
-    mean, sd = (number(what, each, above=0) for each in pair)
+    mean, sd = (number(what, each, above=0, most=MOST_DELAY_MS) for each in pair)
     if mean < LEAST_DELAY_MS:
         raise InvalidValueError(
             f"{what} is shorter than any rig's",

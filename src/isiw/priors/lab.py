@@ -11,8 +11,8 @@ from typing import Final, TypeVar
 import numpy as np
 
 import isiw
-from isiw.checks import check_probabilities, whole
-from isiw.errors import LogError
+from isiw.checks import MOST_OF_A_KIND, check_probabilities, check_wholes, whole
+from isiw.errors import InvalidValueError, LogError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
 from isiw.models.particles.places import MOST_APART_MS, Place
@@ -44,6 +44,8 @@ PEOPLE_FOR_HALF: Final = 2
 """From how many people on a lab's own law has half of the probability."""
 
 
+_MOST_OF_OWN: Final = 1.0 - LEAST_USUAL + 1e-9  # rounded in a file
+
 _EACH_KIND: Final = "Learn a prior from each kind of session."
 
 
@@ -57,6 +59,9 @@ class LearntSession:
         trials: how many accepted trials it has.
         simulated: whether its device was a simulated one.
         muscle: whose EMG was recorded, as the session notes it.
+
+    Raises:
+        InvalidValueError: no number of trials.
     """
 
     sha256: str
@@ -64,6 +69,9 @@ class LearntSession:
     trials: int
     simulated: bool = False
     muscle: str = ""
+
+    def __post_init__(self) -> None:
+        check_wholes(self, "trials", least=1, most=MOST_OF_A_KIND)
 
 
 @dataclass(frozen=True)
@@ -83,7 +91,7 @@ class LabPrior:
         isiw_version: the version that learnt it.
 
     Raises:
-        InvalidValueError: an invalid probability.
+        InvalidValueError: no session, an invalid probability, or one that leaves nothing to people in general.
     """
 
     sessions: tuple[LearntSession, ...]
@@ -98,7 +106,11 @@ class LabPrior:
     isiw_version: str = isiw.__version__
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "p_window")
+        if not self.sessions:
+            raise InvalidValueError("a lab's prior is learnt from at least one session", got=self.sessions)
+        check_probabilities(self, "p_window", above=0.0, below=1.0)
+        for component in filter(None, (self.place, self.floor, self.gain, self.muscle)):
+            check_probabilities(component, "share", above=0.0, most=_MOST_OF_OWN)
 
     @property
     def simulated(self) -> bool:

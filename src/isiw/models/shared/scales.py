@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import torch
 
@@ -11,6 +11,12 @@ from isiw.errors import InvalidValueError
 from isiw.models.protocol import Tensor
 
 __all__ = ["Scale", "check_scales"]
+
+_MOST_MEDIAN: Final = 1e5
+"""In any unit that is used [ms, mV, % RMT, ratios]; nothing that is believed of a person is as large."""
+
+_MOST_LOG_SD: Final = 5.0
+"""Of a logarithm: one person in three would have more than 150 times the median, or less than a 150th."""
 
 
 class Scale(NamedTuple):
@@ -67,7 +73,7 @@ def check_scales(owner: object, *names: str, positive: bool = True, tailed: bool
             raise InvalidValueError(
                 f"{type(owner).__name__}.{name} must be a scale",
                 got=value,
-                expected="a median, an SD, and a cubic tail" if tailed else "a median and an SD",
+                expected=f"a median, an SD{', and a cubic tail' if tailed else ''}, of sizes that a person can have",
             )
         object.__setattr__(owner, name, Scale(*map(float, value)))
 
@@ -76,4 +82,6 @@ def _is_scale(value: tuple[object, ...], *, positive: bool) -> bool:
     if not 2 <= len(value) <= 3 or not all(isinstance(x, int | float) and math.isfinite(x) for x in value):
         return False
     median, sd, tail = Scale(*value)  # type: ignore[arg-type] # they are numbers
-    return sd > 0 and tail >= 0 and (median > 0 or not positive)
+    if positive:
+        return 1 / _MOST_MEDIAN <= median <= _MOST_MEDIAN and 0 < sd <= _MOST_LOG_SD and 0 <= tail <= _MOST_LOG_SD
+    return abs(median) <= _MOST_MEDIAN and 0 < sd <= _MOST_MEDIAN and 0 <= tail <= _MOST_MEDIAN
