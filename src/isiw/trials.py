@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-from isiw.checks import check_amplitude, check_numbers, check_texts, check_wholes
+from isiw.checks import check_amplitude, check_numbers, check_texts, check_wholes, text
 from isiw.errors import InvalidValueError
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.types import FloatArray
@@ -164,6 +164,7 @@ class Sweep:
                 expected='such as {"emg": Channel(...)}',
             )
         for name, channel in self.channels.items():
+            text("the name of a sweep's channel", name)
             if not isinstance(channel, Channel):
                 raise InvalidValueError(
                     f"the sweep's channel {name} says neither its rate nor its unit",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -13,15 +13,23 @@ from isiw.cli.console import LOGS, NO_DEFAULT, Overwrite, errors_reported, exit_
 from isiw.cli.files import free_beside
 from isiw.text.numbers import counted
 
+if TYPE_CHECKING:
+    from isiw.log.schema import Event
+
 __all__ = ["app"]
 
 app = typer.Typer()
+
+_MOST_LISTED = 400
 
 Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
 
 
 @app.command("show", rich_help_panel=LOGS)
-def show_log(log: Log) -> None:
+def show_log(
+    log: Log,
+    whole: Annotated[bool, typer.Option("--all", help="List all trials and events of a long log.")] = False,  # noqa: FBT002 - a flag
+) -> None:
     """Say who, when and with what, list the trials, and say what was found; works on a damaged log, too."""
     with errors_reported():
         record = isiw.read_session(log)
@@ -29,13 +37,27 @@ def show_log(log: Log) -> None:
         for fact in isiw.report.first_facts(record):
             show(f"{fact.name + ':':10}{fact.value}")
         show("")
-        for row in (isiw.report.TRIAL_HEADINGS, *isiw.report.trial_rows(record)):
-            show(isiw.session.aligned(row))
-        for event in record.events:
-            when = "no trial" if event.trial is None else f"trial {event.trial}"
-            show(f"{event.kind} ({when}): {event.text}")
+        show(isiw.session.aligned(isiw.report.TRIAL_HEADINGS))
+        _list("trials", [isiw.session.aligned(row) for row in isiw.report.trial_rows(record)], whole=whole)
+        _list("events", [_event(event) for event in record.events], whole=whole)
         show(isiw.report.final_statement(record), style="bold")
         exit_if_damaged(record.losses)
+
+
+def _event(event: Event) -> str:
+    when = "no trial" if event.trial is None else f"trial {event.trial}"
+    return f"{event.kind} ({when}): {event.text}"
+
+
+def _list(what: str, lines: list[str], *, whole: bool) -> None:
+    """Print lines; of very many the first and the last, unless all are wanted."""
+    left = 0 if whole or len(lines) <= _MOST_LISTED else len(lines) - _MOST_LISTED
+    head = _MOST_LISTED // 2 if left else len(lines)
+    if lines:
+        show("\n".join(lines[:head]))
+    if left:
+        show(f"… {left} {what} in between are not listed; --all lists them …", style="yellow")
+        show("\n".join(lines[head + left :]))
 
 
 @app.command(rich_help_panel=LOGS)

@@ -16,6 +16,7 @@ import isiw
 from isiw.cli.console import NO_DEFAULT, errors_reported, show
 from isiw.text import plain
 from isiw.text.commands import command
+from isiw.text.numbers import read_whole
 
 if TYPE_CHECKING:
     from isiw.studies import Store, Unit
@@ -71,8 +72,8 @@ def replay(
     """Run one session of a study again, alone, and say whether the result is the same."""
     with errors_reported():
         store = isiw.studies.open_store(folder) if study is None else _store(study, folder)
-        if key.isdigit():
-            key, person = isiw.studies.unit_of_row(store, int(key))
+        if (row := read_whole(key)) is not None:
+            key, person = isiw.studies.unit_of_row(store, row)
         result = isiw.studies.replay(store, key, person)
         show(result.again.T.to_string(header=False))
         if result.differing:

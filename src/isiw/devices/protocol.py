@@ -67,6 +67,7 @@ class DeviceInfo:
                 "DeviceInfo.channels must be a table of units", got=self.channels, expected='such as {"emg": "mV"}'
             )
         for channel, unit in self.channels.items():
+            text("the name of a channel in DeviceInfo.channels", channel)
             text(f"the unit of {channel!r} in DeviceInfo.channels", unit)
         check_choice(self, "reference", get_args(Reference))
         check_choice(self, "conditioning", get_args(Conditioning))

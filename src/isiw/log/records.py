@@ -13,10 +13,11 @@ from isiw.log.headers import first_fault, header_in_parts
 from isiw.log.onsets import Onsets
 from isiw.log.production import Production, ProductionHeader
 from isiw.log.salvage import Message, Salvage
-from isiw.log.schema import AnyHeader, Event, Header, Intent, PulseOutcome, Record, Waveform
+from isiw.log.schema import MOST_TRIALS, AnyHeader, Event, Header, Intent, PulseOutcome, Record, Waveform
 from isiw.log.topics import decode
 from isiw.log.writer import CONFIGURATION
 from isiw.text.json_texts import read_json
+from isiw.text.numbers import counted
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial
 
@@ -49,6 +50,7 @@ class Records:
     losses: list[str] = field(default_factory=list)
     onsets: Onsets = field(default_factory=Onsets)
     unread: dict[str, str] = field(default_factory=dict)
+    _beyond: int = 0
     _trials: set[int] = field(default_factory=set)
 
     @classmethod
@@ -68,6 +70,9 @@ class Records:
         """The losses, as many as somebody will read."""
         left = len(self.losses) - MOST_LOSSES
         listed = tuple(self.losses[:MOST_LOSSES])
+        if self._beyond:
+            records = counted(self._beyond, "record is", "records are")
+            listed = (f"Only trials up to {MOST_TRIALS - 1} are read: {records} of later ones.", *listed)
         return listed if left <= 0 else (*listed, f"{left} more losses are not listed.")
 
     def header_of(self, kind: type[HeaderKind], newest: int) -> HeaderKind:
@@ -94,6 +99,9 @@ class Records:
             if isinstance(record, Waveform):
                 self.waveforms[record.trial, message.topic.removeprefix("/")] = record.channel()
         except ValueError as error:
+            if _is_beyond(message):
+                self._beyond += 1
+                return
             self.losses.append(f"A record on {message.topic} makes no sense and is left out: {first_fault(error)}")
             return
         if isinstance(record, Header | ProductionHeader):
@@ -123,6 +131,16 @@ def _decoded(message: Message) -> tuple[Record, dict[str, str]]:
         if message.topic != "/header":
             raise
         return header_in_parts(read_json(message.data))
+
+
+def _is_beyond(message: Message) -> bool:
+    """Whether a record is of a later trial than is read."""
+    try:
+        values = read_json(message.data)
+    except ValueError:
+        return False
+    number = values.get("index" if message.topic == "/trial" else "trial") if isinstance(values, dict) else None
+    return isinstance(number, int) and number >= MOST_TRIALS
 
 
 def _concluded(record: Record) -> int | None:

@@ -33,8 +33,8 @@ _LAST_WORD: Final = "Enter ends, u takes the last answer back: "
 SURELY_MV: Final = 2.0
 """More than this [mV] needs its unit: it is more likely an amplitude in µV."""
 
-_AMPLITUDE: Final = re.compile(r"(\d+(?:[.,]\d*)?|[.,]\d+)\s*(mv|uv|µv|μv)?", re.IGNORECASE)
-_THOUSANDS: Final = re.compile(r"[.,]\d{3}$")
+_AMPLITUDE: Final = re.compile(r"(\d+(?:[.,]\d*)?|[.,]\d+)\s*(mv|uv|µv|μv)?", re.IGNORECASE | re.ASCII)
+_THOUSANDS: Final = re.compile(r"[.,][0-9]{3}$")
 
 
 def open_simulated(

@@ -1,8 +1,33 @@
-"""Numbers of things, in words."""
+"""Numbers as other software and instruments write them, and numbers of things in words."""
 
 from __future__ import annotations
 
-__all__ = ["counted"]
+import re
+from typing import Final
+
+__all__ = ["counted", "read_number", "read_whole"]
+
+_NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_WHOLE: Final = re.compile(r"[0-9]{1,18}")
+
+
+def read_number(text: str) -> float:
+    """The number that a text is, in ASCII digits with a decimal point; Python itself would take 1_0_0 and ١٢, too.
+
+    Args:
+        text: the text.
+
+    Raises:
+        ValueError: anything else, also what is not finite.
+    """
+    if not _NUMBER.fullmatch(text):
+        raise ValueError("no number with a decimal point")
+    return float(text)
+
+
+def read_whole(text: str) -> int | None:
+    """The whole number that a text is, in ASCII digits without a sign; None where it is none."""
+    return int(text) if _WHOLE.fullmatch(text) else None
 
 
 def counted(count: int, one: str, several: str | None = None) -> str:

@@ -16,6 +16,7 @@ from isiw.checks import check_choice, check_numbers, check_texts, check_wholes
 from isiw.devices.transports.line_connection import Connection
 from isiw.devices.transports.line_table import Exchange, command_values
 from isiw.errors import DeviceError, DeviceTimeoutError
+from isiw.text.numbers import read_whole
 
 __all__ = ["Line", "LineSettings"]
 
@@ -187,7 +188,7 @@ class Line:
 
 def _is(number: int, stated: str | None) -> bool:
     """Whether an answer states the number of its command."""
-    return stated is not None and stated.isdecimal() and int(stated) == number
+    return stated is not None and read_whole(stated) == number
 
 
 class _Others:

@@ -16,6 +16,7 @@ from typing import Any, Final
 
 from isiw.checks import check_numbers, check_texts, from_table, number
 from isiw.errors import InvalidValueError
+from isiw.text.numbers import read_number
 
 __all__ = ["Exchange", "LineCommands", "command_values", "isi_ms_of", "mep_mv_of", "number_of"]
 
@@ -276,6 +277,6 @@ def number_of(said: Mapping[str, str], name: str) -> float | None:
     if name not in said:
         return None
     try:
-        return number(f"the instrument's {name}", float(said[name]))
+        return number(f"the instrument's {name}", read_number(said[name]))
     except ValueError as error:
         raise InvalidValueError(f"the instrument's {name} is no finite number", got=said[name]) from error

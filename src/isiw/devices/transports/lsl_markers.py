@@ -10,6 +10,7 @@ from typing import Any, Final
 from isiw.devices.transports.exchange import Request, Verb
 from isiw.devices.transports.reply import LONGEST_REPLY, Reply
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered
+from isiw.text.json_texts import read_json
 
 __all__ = ["Markers"]
 
@@ -131,8 +132,8 @@ def _parsed(content: str, source: str) -> Reply:
     if len(content) > LONGEST_REPLY:
         raise broken("too long", got=len(content), expected=f"at most {LONGEST_REPLY} characters")
     try:
-        values = json.loads(content)
-    except (ValueError, RecursionError) as error:
+        values = read_json(content)
+    except ValueError as error:
         raise broken("not JSON", got=content, remedy="Send an object such as those in docs/lab/lsl.md.") from error
     if not isinstance(values, dict):
         raise broken("not a JSON object", got=content)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final, Unpack
@@ -10,6 +9,7 @@ from typing import Final, Unpack
 from isiw.checks import Bounds, number
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.text import plain
+from isiw.text.numbers import read_number
 
 __all__ = ["LONGEST_REPLY", "Reply"]
 
@@ -17,7 +17,6 @@ LONGEST_REPLY: Final = 65_536
 """The longest answer that is read [bytes]; waveforms are not part of it."""
 
 _LONGEST_SHOWN: Final = 200
-_NUMBER: Final = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _POINT: Final = "Write numbers with a decimal point, as in 0.25, and without a unit."
 
 
@@ -78,9 +77,10 @@ class Reply:
         if value is None:
             raise self.broken(f"{key} is missing", remedy="Every answer of this kind must have it.")
         if isinstance(value, str):
-            if not _NUMBER.fullmatch(value):
-                raise self.broken(f"{key} is not a number", got=value, remedy=_POINT)
-            value = float(value)
+            try:
+                value = read_number(value)
+            except ValueError as error:
+                raise self.broken(f"{key} is not a number", got=value, remedy=_POINT) from error
         try:
             return number(key, value, **bounds)
         except InvalidValueError as error:
