@@ -75,13 +75,13 @@ class Fault(NamedTuple):
     detail: str
 
 
-def write_log(path: Path) -> Path:
+def write_log(path: Path, trials: int = 5) -> Path:
     """The log of a short session with a simulated person and waveforms of two channels."""
     space = isiw.DesignSpace(0, 100, 5, reference="valve")
     run = {"seed": 7, "subject": {"kind": "simulated", "cohort": "recruitment", "number": 0}}
     person = isiw.subjects.cohort("recruitment", 1, 7)[0].begin(7)
     device = isiw.SimulatedDevice(isiw.SimulatedPerson(lambda isi_ms: person.respond(isi_ms, "valve"), "valve"))
-    strategy = isiw.make_strategy("random", space, particles=50, max_trials=5)
+    strategy = isiw.make_strategy("random", space, particles=50, max_trials=trials)
     isiw.Session(device, strategy, log=path, subject="P07", config={"isiw_run": run}).run()
     return path
 
@@ -199,9 +199,9 @@ def outcome_of(*arguments: str) -> str:
     return "" if code in {0, None, 1, 3, 5} else f"exit code {code}"
 
 
-def write_base(folder: Path) -> None:
+def write_base(folder: Path, trials: int = 5) -> None:
     """Write the log that the others are made of, and a configuration."""
-    write_log(folder / "whole.mcap")
+    write_log(folder / "whole.mcap", trials)
     (folder / "config.toml").write_text(CONFIG, encoding="utf-8")
 
 

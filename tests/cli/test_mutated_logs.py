@@ -25,7 +25,7 @@ def test_a_hundred_mutated_logs_are_shown_and_resumed_or_refused_in_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    write_base(tmp_path)
+    write_base(tmp_path, trials=2)
     assert list(faults(tmp_path, 100, seed=1, others=CHEAP)) == []
 
 
