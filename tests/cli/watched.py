@@ -70,6 +70,7 @@ def other_files(folder: Path, trap: Path) -> list[tuple[str, ...]]:
         ("run", str(folder / "config.toml"), "--prior", str(prior), "--log", str(folder / "p.mcap")),
         ("study", "run", str(study), "--workers", "1"),
         ("study", "run", str(folder / "begun.study"), "--workers", "1"),
+        ("study", "run", str(folder / "begun.study"), "--out", str(folder / "elsewhere.study"), "--workers", "1"),
         ("study", "summary", str(folder / "begun.study")),
     ]
 

@@ -116,7 +116,7 @@ def _store(source: Path, out: Path | None) -> Store:
         source = source.parent
     if source.is_dir() and out in {None, source}:
         return isiw.studies.open_store(source)
-    plan = isiw.studies.load_study(source / "study.toml" if source.is_dir() else source)
+    plan = isiw.studies.load_study(source)
     return isiw.studies.begin_store(plan, out or source.with_name(f"{source.stem}.study"))
 
 

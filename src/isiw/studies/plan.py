@@ -264,14 +264,19 @@ def _require_torch_device(device: str) -> None:
 
 
 def load_study(path: str | Path) -> Study:
-    """Read a study from a TOML file; that of a folder of results will do, too.
+    """Read a study from a TOML file; that of a folder of results will do, too, but names no code.
+
+    Args:
+        path: the file, or such a folder.
 
     Raises:
         ConfigError: it cannot be read, or has an unknown key or a bad value; the message names file, key and value.
     """
+    whole = Path(path).is_dir()
+    path = Path(path) / "study.toml" if whole else path
     values = read_toml(path)
     began = [values.pop(of_the_folder, None) for of_the_folder in ("checksum", "versions")]
-    return study_from(values, str(path), None if any(began) else Path(path).resolve().parent)
+    return study_from(values, str(path), None if whole or any(began) else Path(path).resolve().parent)
 
 
 def _several(values: Any) -> tuple[Any, ...]:
