@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final, TypeVar, cast
 
 from pydantic import ValidationError
 
@@ -154,7 +154,9 @@ def _header_from_attachment(salvaged: Salvage, kind: type[HeaderKind]) -> tuple[
     text = salvaged.attachments.get(CONFIGURATION, b"")
     try:
         values = parsed(text.decode())
-        return header_in_parts(values) if kind is Header else (kind.model_validate(values), {})
+        if kind is Header:
+            return cast("tuple[HeaderKind, dict[str, str]]", header_in_parts(values))
+        return kind.model_validate(values), {}
     except (ValueError, RecursionError) as error:
         raise DamagedLogError(
             "the log's header is lost",
