@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, TypeVar, cast
+from typing import Final, TypeVar
 
 from pydantic import ValidationError
 
@@ -155,7 +155,7 @@ def _header_from_attachment(salvaged: Salvage, kind: type[HeaderKind]) -> tuple[
     try:
         values = parsed(text.decode())
         if kind is Header:
-            return cast("tuple[HeaderKind, dict[str, str]]", header_in_parts(values))
+            return header_in_parts(values)  # type: ignore[return-value] # which is this kind
         return kind.model_validate(values), {}
     except (ValueError, RecursionError) as error:
         raise DamagedLogError(
