@@ -184,6 +184,7 @@ def test_the_reason_of_a_pause_is_said_also_where_no_mep_was_seen(tmp_path: Path
     record = isiw.read_session(tmp_path / "zeros.mcap")
     for reason, is_said in (
         ("The session is paused: the window of the booth is open.", True),
+        ("The session was ended before its time: the window of the booth is open.", True),
         ("The limit of 4 pulses is reached.", True),
         ("There is no window, with probability 0.95.", False),
     ):

@@ -61,6 +61,7 @@ class Journal:
         self.begin_after(trials or TrialTable(), events)
         self.unconcluded: Trial | None = None
         self.overruled = False
+        self._refusal: Exception | None = None
         self._log: LogWriter | None = None
         self._lock = threading.RLock()
 
@@ -155,8 +156,21 @@ class Journal:
         while faults:
             self.event("fault", faults.popleft())
 
+    def refusal(self, kind: EventKind, error: Exception, trial: int | None = None) -> None:
+        """Write that a stimulus was refused; where that ends the session, it is not written again.
+
+        Args:
+            kind: of event.
+            error: why it was refused.
+            trial: which one; None for the last one.
+        """
+        self.event(kind, told(error), trial)
+        self._refusal = error
+
     def failure(self, error: BaseException) -> None:
         """Write what ends a session before its time."""
+        if error is self._refusal:
+            return
         kind: EventKind = "limit" if isinstance(error, LimitExceededError) else "fault"
         self.event(kind, "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else told(error))
 
