@@ -18,6 +18,7 @@ JSON knows no infinity: where a number is not finite it is one of the strings "I
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
@@ -69,6 +70,10 @@ Number: TypeAlias = Annotated[float, WithJsonSchema({"type": ["number", "string"
 Numbers: TypeAlias = Annotated[
     tuple[float, ...], WithJsonSchema({"type": "array", "items": {"type": ["number", "string"]}})
 ]
+
+
+_KEY_IN_TEXT: Final = re.compile(r" \(key ([A-Za-z0-9_-]{1,64})\)$")
+"""How the text of a note ended before there was a field for its key."""
 
 
 class _Record(BaseModel):
@@ -364,12 +369,22 @@ class Event(_Record):
     """Something that happened to a session.
 
     `trial` is the one that was judged by an operator, refused or answered late, and otherwise the last one before the
-    event. What is "refused" was not delivered, whatever the intent before it says.
+    event. What is "refused" was not delivered, whatever the intent before it says. A note with the `key` of an earlier
+    one is not logged; before there was this field, a note's text ended with it.
     """
 
     kind: EventKind
     trial: TrialNumber | None = None
     text: str = ""
+    key: str | None = None
+
+    @property
+    def idempotency_key(self) -> str | None:
+        """The key of a note, in logs old and new."""
+        if self.kind != "note" or "key" in self.model_fields_set:
+            return self.key
+        found = _KEY_IN_TEXT.search(self.text)
+        return found and found[1]
 
 
 AnyHeader: TypeAlias = Header | ProductionHeader

@@ -183,5 +183,5 @@ def include(session: Running, body: Annotated[IncludeRequest, Depends(body_of(In
 @router.post("/note")
 def note(session: Running, body: Annotated[NoteRequest, Depends(body_of(NoteRequest))]) -> OkAnswer:
     """Log a remark."""
-    session.note(body.text)
+    session.note(body.text, key=body.key)
     return OkAnswer()
