@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-import uvicorn
 
 from isiw.server import Rules, make_app
+from isiw.server.serving import Server, settings_of
 from known import known
 
 TOKEN = "a token for the tests"  # noqa: S105 - of the tests
@@ -36,8 +36,8 @@ PLAN: dict[str, Any] = {
 @contextmanager
 def client_of(folder: Path, **rules: Any) -> Iterator[httpx.Client]:
     """A client of a server in this process, over a socket."""
-    config = uvicorn.Config(make_app(folder, Rules(TOKEN, **rules)), http="h11", ws="none", log_level="critical")
-    server = uvicorn.Server(config)
+    allowed = Rules(TOKEN, **rules)
+    server = Server(settings_of(make_app(folder, allowed), allowed, log_level="critical"))
     with socket.create_server(("127.0.0.1", 0)) as listener:
         listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         thread = threading.Thread(target=server.run, args=([listener],))
