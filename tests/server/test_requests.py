@@ -12,6 +12,8 @@ import pytest
 from isiw.log.reader import read_session
 from server.serving import PLAN, SETTINGS, SPACE, client_of, created, done, refused
 
+ARABIC_12 = "\u0661\u0662"
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -63,6 +65,12 @@ def test_a_whole_session_by_forms_is_that_by_json(client: httpx.Client, folder: 
         (b'{"id": "a", "unknown": 1}', "application/json", 422),
         (b'{"id": "a", "space": {"low_ms": NaN}}', "application/json", 422),
         (b'{"id": "a", "visit": {"subject": "\\ud800"}}', "application/json", 400),
+        (b'{"id": "a", "seed": 1, "seed": 2}', "application/json", 400),
+        (b'{"id": "a", "visit": {"day": 1, "day": 2}}', "application/json", 400),
+        (b'id=a&visit={"day":1,"day":2}', "application/x-www-form-urlencoded", 400),
+        (b'{"id": "a", "strategy": {"settings": {"x": ' + b"9" * 5000 + b"}}}", "application/json", 400),
+        (b"id=a&seed=1_0", "application/x-www-form-urlencoded", 422),
+        (f"id=a&seed={ARABIC_12}".encode(), "application/x-www-form-urlencoded", 422),
     ],
 )
 def test_a_malformed_body_is_refused_in_words_and_begins_nothing(
@@ -121,6 +129,13 @@ def test_a_misspelt_field_is_told_before_the_one_that_is_missing_because_of_it(c
 def test_a_protocol_with_control_trials_is_refused_as_ask_answers_with_an_isi(client: httpx.Client) -> None:
     plan = {**PLAN, "id": "c", "protocol": {"tms_alone": 0.1}}
     assert "control trials" in refused(client.post("/sessions", json=plan), 422, "InvalidValueError")["message"]
+
+
+def test_a_trials_number_in_a_header_is_read_as_in_a_body(client: httpx.Client) -> None:
+    session = created(client, "f")
+    for odd in ("1_0", "+1", "1.0", ARABIC_12, "9" * 5000):
+        response = client.get(f"{session}/progress", headers={"Last-Event-ID": odd.encode()})  # type: ignore[arg-type] # sent as it is
+        refused(response, 422, "InvalidValueError")
 
 
 def test_a_setting_may_be_null(client: httpx.Client) -> None:
