@@ -67,7 +67,12 @@ class Connections:
         self.known.discard(connection)
 
     def lets_in(self, connection: Connection, path: str) -> bool:
-        """Whether there is room for a connection that has shown the token, or its request is urgent."""
+        """Whether there is room for a connection that has shown the token, or its request is urgent.
+
+        Args:
+            connection: the connection.
+            path: of the request.
+        """
         room = len(self.known) < self.rules.most_known
         if room or path in self.rules.urgent_paths:
             self.leave(connection)
