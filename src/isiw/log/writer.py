@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import os
 import shutil
 import threading
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -16,6 +16,8 @@ import tomli_w
 from mcap.writer import Writer
 
 from isiw.errors import LogError
+from isiw.files import in_the_way, is_reserved, sync_folder
+from isiw.log.clock import clock_ns, log_time_ns
 from isiw.log.durable import (
     DurableFile,
     Fingerprint,
@@ -24,7 +26,6 @@ from isiw.log.durable import (
     disk_errors,
     log_of,
     part_of,
-    sync_folder,
 )
 from isiw.log.locks import claimed, refuse_if_locked
 from isiw.log.salvage import Message, Salvage, holds, salvage_file
@@ -76,18 +77,18 @@ class LogWriter:
             header: what the session is.
 
         Raises:
-            LogError: there is one already, finished or not; it is never overwritten. Or it cannot have this name, or
-                the header cannot be written.
+            LogError: there is one already, finished or not; it is never overwritten. Or it cannot have this name, the
+                header cannot be written, or the computer's clock is wrong.
         """
         target = Path(path)
-        with disk_errors(target, "the log cannot be created", "Choose another path."):
+        with disk_errors(target, "the log cannot be created", "Make room, or choose another path."):
             _require_free(target)
-        with begun(part_of(target)) as file:
-            log = cls(target, file)
-            log.begin(header)
-            log.append(header)
-            log.sync()
-            sync_folder(target.parent)
+            with begun(part_of(target)) as file:
+                log = cls(target, file)
+                log.begin(header)
+                log.append(header)
+                log.sync()
+                sync_folder(target.parent)
         return log
 
     @classmethod
@@ -107,7 +108,7 @@ class LogWriter:
 
         Raises:
             LogError: it is still being written, or has changed since it was read, another session's file is at one of
-                its two names, or a header cannot be written.
+                its two names, a header cannot be written, or the computer's clock is wrong.
         """
         target = log_of(Path(path))
         with claimed(salvage.path) as source, disk_errors(target, "the log cannot go on", "It stays as it was."):
@@ -141,7 +142,7 @@ class LogWriter:
         """Write what is not a message: metadata for tools that list files, and the header as TOML.
 
         Raises:
-            LogError: something in the header is not a TOML value.
+            LogError: something in the header is not a TOML value, or the computer's clock is wrong.
         """
         facts = {
             "isiw_version": header.isiw_version,
@@ -151,7 +152,7 @@ class LogWriter:
             "created": header.created,
         }
         configuration = _as_toml(header)
-        now_ns = time.time_ns()
+        now_ns = clock_ns()
         self._writer.add_metadata("session", facts)
         self._writer.add_attachment(now_ns, now_ns, CONFIGURATION, "application/toml", configuration)
 
@@ -170,7 +171,7 @@ class LogWriter:
         topic = topic_of(record, channel_name)
         data = encode(topic, record)
         with self._lock:
-            self._copy(Message(topic, data, time.time_ns()))
+            self._copy(Message(topic, data, log_time_ns()))
         if self.on_append is not None:
             self.on_append(record, channel_name)
 
@@ -283,11 +284,19 @@ class LogWriter:
 
 
 def _require_free(target: Path) -> None:
-    if target != log_of(target) or target.suffix == _COPYING or target.is_dir():
+    if target != log_of(target) or target.suffix == _COPYING:
         raise LogError(
             "a log cannot have this name", got=str(target), remedy="Name a file; .part is added while the session runs."
         )
+    if is_reserved(target.name):
+        raise LogError(
+            "a log cannot have this name, which Windows keeps for itself",
+            got=str(target),
+            remedy="Choose another name, without a full stop or a space at its end.",
+        )
     for existing in (target, part_of(target)):
+        if (other := in_the_way(existing)) is not None:
+            raise LogError(f"no log can be here: there is {other}", got=str(existing), remedy="Choose another path.")
         if existing.exists():
             raise LogError(
                 "there is a log already, and it is never overwritten",
@@ -378,7 +387,7 @@ def _as_toml(header: AnyHeader) -> bytes:
 def _keep(damaged: Path, target: Path) -> None:
     """Keep a damaged file's bytes under a name of their own."""
     names = (damaged_of(target, number) for number in itertools.count())
-    kept = next(name for name in names if not name.exists())
+    kept = next(name for name in names if not os.path.lexists(name))
     try:
         kept.hardlink_to(damaged)
     except OSError:  # a disk without hard links

@@ -6,9 +6,8 @@
 
 Each file is written beside its place, synced, and renamed into it by the process that runs the study, so that a file
 is whole or not there; its name holds the CRC-32 of its bytes, which tells whether it was damaged later. A part holds
-the checksum of its study, so that no other study takes its rows for its own. What is left over of a write that was
-cut off is written over when the unit is run again. One process at a time runs a study: while it does, it has
-`study.toml` locked.
+the checksum of its study, so that no other study takes its rows for its own. One process at a time runs a study: while
+it does, it has `study.toml` locked, and it begins by removing what is left over of writes that were cut off.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ import torch
 
 import isiw
 from isiw.errors import StudyError
-from isiw.log.durable import put
+from isiw.files import TEMPORARY, opened, put
 from isiw.log.locks import claim
 from isiw.studies.code import code_checksum
 from isiw.studies.execution import Failure
@@ -101,6 +100,9 @@ class Store:
                     got=str(self.folder),
                     remedy="Wait for it, or run the study in another folder.",
                 )
+            for unfinished in (f"*/{TEMPORARY}*", "*/*.part"):  # the latter of earlier versions
+                for left_over in self.folder.glob(unfinished):
+                    left_over.unlink()
             yield
 
     def rows(self) -> pd.DataFrame:
@@ -277,7 +279,8 @@ def _table(paths: Iterable[Path], order: Sequence[str], state: str) -> pd.DataFr
 
 def _read(path: Path, state: str) -> pa.Table:
     try:
-        content = path.read_bytes()
+        with opened(path) as file:
+            content = file.read()
         if path.suffixes[-2:-1] != [f".{_checksum(content)}"]:
             raise pa.ArrowInvalid("its checksum fails")
         part = pq.read_table(pa.BufferReader(content))
@@ -302,7 +305,7 @@ def _write(folder: Path, key: str, rows: pd.DataFrame, state: str) -> Path:
     pq.write_table(part.replace_schema_metadata({**(part.schema.metadata or {}), _OF_STUDY: state}), sink)
     content = sink.getvalue().to_pybytes()
     path = folder / f"{key}.{_checksum(content)}.parquet"
-    put(path, content, replacing=True, through=folder / f"{key}.part")
+    put(path, content, replacing=True)
     return path
 
 
