@@ -87,7 +87,8 @@ def test_a_malformed_body_is_refused_in_words_and_begins_nothing(
     [
         ({"strategy": {"name": "defualt"}}, "strategy.name", "default"),
         ({"strategy": {"name": "even", "settings": {"particels": 9}}}, "strategy.settings", "particles"),
-        ({"space": {"low_ms": 100, "high_ms": 50}}, "space", "low_ms < high_ms"),
+        ({"space": {"low_ms": 0, "high_ms": 320}}, "space", "needs its reference, the event that its ISIs count from"),
+        ({"space": {"reference": "valve", "low_ms": 100, "high_ms": 50}}, "space", "low_ms < high_ms"),
         ({"space": {"low": 100}}, "space.low", "is unknown; got 100; expected one of high_ms, low_ms"),
         ({"limits": {"max_pulses": 0}}, "limits.max_pulses", "greater than"),
         ({"protocol": {"iti_s": [9.0, 5.0]}}, "protocol", "ascend"),
@@ -154,3 +155,11 @@ def test_a_path_that_is_none_is_answered_in_words(client: httpx.Client) -> None:
     assert response.headers["Allow"] == "GET"
     refused(client.get("/sessions/e/picture", params={"format": "exe"}), 422, "InvalidValueError")
     refused(client.get("/sessions/e?errors=500"), 422, "InvalidValueError")
+
+
+@pytest.mark.parametrize("name", ["CON", "nul", "aux"])
+def test_an_id_that_windows_keeps_for_itself_is_refused(client: httpx.Client, folder: Path, name: str) -> None:
+    before = list(folder.iterdir())
+    response = client.post("/sessions", json={**PLAN, "id": name})
+    assert response.json()["error"]["message"].startswith("a log cannot have this name, which Windows keeps for itself")
+    assert list(folder.iterdir()) == before

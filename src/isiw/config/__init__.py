@@ -5,6 +5,7 @@ from isiw.config.next_steps import after_end, after_error
 from isiw.config.rig import write_rig_template
 from isiw.config.run import RunConfig, config_of_log, limits_for, load_config
 from isiw.config.session import (
+    assumed_space,
     device_for,
     fresh_log_path,
     has_truth,
@@ -19,6 +20,7 @@ __all__ = [
     "RunConfig",
     "after_end",
     "after_error",
+    "assumed_space",
     "changes_on_resume",
     "config_of_log",
     "device_for",

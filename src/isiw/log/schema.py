@@ -23,7 +23,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
@@ -101,6 +101,11 @@ SERVED_KEY: Final = "isiw_serve"
 own."""
 
 
+def _with_reference(space: object) -> object:
+    """A logged space; where it says no reference, its ISIs count from the impact, which once was the default."""
+    return {"reference": "impact", **space} if isinstance(space, dict) else space
+
+
 class Header(_Record):
     """What a session is, written before anything else, and again before it goes on: the last one holds.
 
@@ -114,7 +119,7 @@ class Header(_Record):
     subject: str = ""
     seed: int
     strategy: StrategyRecipe
-    space: DesignSpace
+    space: Annotated[DesignSpace, BeforeValidator(_with_reference)]
     limits: Limits
     device: DeviceInfo
     signals: SignalLimits

@@ -60,7 +60,10 @@ class CreateRequest(_Request):
     id: str = Field(pattern=NAME, description="Letters, digits, - and _; the log is ID.mcap.")
     seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of the strategy.")
     visit: VisitConfig = VisitConfig()
-    space: SpaceConfig = SpaceConfig()
+    space: SpaceConfig = Field(
+        default=SpaceConfig(reference="valve"),
+        description="Without it, ISIs count from the valve command, from 0 to 500 ms.",
+    )
     strategy: StrategyConfig = StrategyConfig()
     limits: LimitsConfig = LimitsConfig()
     protocol: VisitProtocol = VisitProtocol()

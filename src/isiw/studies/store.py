@@ -34,7 +34,7 @@ from isiw.files import TEMPORARY, opened, put
 from isiw.log.locks import claim
 from isiw.studies.code import code_checksum
 from isiw.studies.execution import Failure
-from isiw.studies.plan import Study, Unit, study_from, study_values
+from isiw.studies.plan import Study, Unit, begun_study, study_values
 from isiw.text.commands import command
 from isiw.text.toml_files import read_toml
 
@@ -191,8 +191,7 @@ def open_store(folder: str | Path) -> Store:
     """
     path = Path(folder) / "study.toml"
     values = read_toml(path)
-    checksum = values.pop("checksum", None)
-    made_with = values.pop("versions", {}).get("isiw")
+    made_with = values.get("versions", {}).get("isiw")
     if made_with != isiw.__version__:
         raise StudyError(
             f"{folder} was made with another version of isiw",
@@ -200,8 +199,8 @@ def open_store(folder: str | Path) -> Store:
             expected=isiw.__version__,
             remedy="Use that version, or begin in another folder.",
         )
-    study = study_from(values, str(path))
-    if checksum not in {None, _state(study_values(study))}:
+    study = begun_study(values, str(path))
+    if values.get("checksum") not in {None, _state(study_values(study))}:
         raise StudyError(
             f"{path} was changed since its sessions were run",
             remedy="Undo the change, or run the changed study in another folder.",
