@@ -23,6 +23,7 @@ import numpy as np
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.server_strangers import operated_meanwhile, served_meanwhile
 from benchmarks.server_tries import Served, fuzzed, killed, tried
 
 SPACE: dict[str, Any] = {"low_ms": 0, "high_ms": 320, "reference": "impact"}
@@ -154,11 +155,37 @@ def description(folder: Path, examples: int) -> None:
     print()
 
 
+def outsiders(folder: Path, tries: int) -> None:
+    """Connections without the token, and how soon whoever has it is answered."""
+    served_s = served_meanwhile(folder, MOST_STRANGERS, tries)
+    operated_s, reason = operated_meanwhile(folder, MOST_STRANGERS, tries // 10)
+    print(
+        f"## {MOST_STRANGERS} connections without the token\n\nA third say nothing, a third never finish their headers,"
+    )
+    print("a third send a byte of them every half second; whoever is hung up on is back after a second. The server may")
+    print(
+        "have 1,024 files open. Each request of the client with the token has a connection of its own. The load average"
+    )
+    print(f"was {os.getloadavg()[1]:.0f}: other programs were busy, too.\n")
+    print("| | tries | answered within 1 s | median [ms] | slowest [ms] |\n|---|---|---|---|---|")
+    for name, spent_s in (
+        ("`isiw serve`, list of sessions", served_s),
+        ("live page, Pause", operated_s[:-1]),
+        ("live page, Stop", operated_s[-1:]),
+    ):
+        in_time, spent_ms = sum(each <= 1.0 for each in spent_s), 1e3 * np.array(spent_s)
+        print(f"| {name} | {len(spent_s)} | {in_time} | {np.median(spent_ms):.0f} | {spent_ms.max():.0f} |")
+    print(f"\nThe session's reason to end: {reason}\n")
+
+
+MOST_STRANGERS = 1000
+
 PARTS: dict[str, tuple[Callable[[Path, int], None], int]] = {
     "latency": (latency, 40),
     "fuzz": (fuzz, 10_000),
     "kills": (kills, 100),
     "description": (description, 100),
+    "outsiders": (outsiders, 200),
 }
 
 

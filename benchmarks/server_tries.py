@@ -36,11 +36,15 @@ PLAN = {"space": {"low_ms": 0, "high_ms": 200, "reference": "impact"}, "limits":
 
 DELIVERY_S = 0.005
 
-SERVING = """
-import os, sys, signal
+FILES = 1024
+"""How many files a process may have open by default, on most systems."""
+
+SERVING = f"""
+import os, resource, sys, signal
 import isiw, torch
 from pathlib import Path
 torch.set_num_threads(1)
+resource.setrlimit(resource.RLIMIT_NOFILE, ({FILES}, {FILES}))
 settings = isiw.server.ServerSettings(Path(sys.argv[1]), port=int(sys.argv[2]), token=sys.argv[3])
 isiw.make_strategy("even", particles=10).estimate()
 while True:

@@ -30,7 +30,7 @@ def imports(rooms: list[str]) -> dict[str, set[str]]:
     """Which rooms each room imports from."""
     graph = grimp.build_graph("isiw", exclude_type_checking_imports=True)
     found: dict[str, set[str]] = {room: set() for room in rooms}
-    for module in graph.modules - {"isiw"}:
+    for module in graph.modules - {"isiw", "isiw.__main__"}:
         room = module.split(".")[1]
         for imported in graph.find_modules_directly_imported_by(module) - {"isiw"}:
             found[room].add(imported.split(".")[1])

@@ -17,7 +17,7 @@ from isiw.errors import InvalidValueError, OutOfSpaceError
 from isiw.strategy.choosing import candidate_isis
 
 spaces = st.builds(
-    lambda low, step, count: DesignSpace(low, low + step * count, step_ms=step),
+    lambda low, step, count: DesignSpace(low, low + step * count, step_ms=step, reference="impact"),
     st.integers(-200, 200),
     st.sampled_from([0.1, 0.25, 0.5, 1.0, 2.5, 5.0]),
     st.integers(1, 400),
@@ -26,7 +26,7 @@ isis = st.floats(-1e4, 1e4)
 
 
 def test_the_grid_holds_both_ends() -> None:
-    assert DesignSpace(10, 20, step_ms=2.5).grid_ms.tolist() == [10.0, 12.5, 15.0, 17.5, 20.0]
+    assert DesignSpace(10, 20, step_ms=2.5, reference="impact").grid_ms.tolist() == [10.0, 12.5, 15.0, 17.5, 20.0]
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_the_grid_holds_both_ends() -> None:
     [(20, 120.3, 0.1), (0, 100.3, 0.1), (0, 4.1, 0.1), (-7.3, 1.1, 0.7), (0, 100, 33.3333333334), (0.1, 1.7, 0.2)],
 )
 def test_rounding_puts_no_isi_beyond_the_bounds(bounds: tuple[float, float, float]) -> None:
-    space = DesignSpace(*bounds)
+    space = DesignSpace(*bounds, reference="impact")
     assert (space.grid_ms[0], space.grid_ms[-1]) == (space.low_ms, space.high_ms)
     assert (np.diff(space.grid_ms) > 0).all()
     assert space.snap(1e4) == space.high_ms
@@ -42,7 +42,7 @@ def test_rounding_puts_no_isi_beyond_the_bounds(bounds: tuple[float, float, floa
 
 
 def test_a_grid_of_whole_milliseconds_is_exact() -> None:
-    assert DesignSpace(-20, 500).grid_ms.tolist() == [float(isi_ms) for isi_ms in range(-20, 501)]
+    assert DesignSpace(-20, 500, reference="impact").grid_ms.tolist() == [float(isi_ms) for isi_ms in range(-20, 501)]
 
 
 @given(spaces)
@@ -107,17 +107,23 @@ def test_a_field_that_is_no_finite_number_is_named(name: str, value: object) -> 
 )
 def test_a_space_that_cannot_be_is_refused(fields: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
-        DesignSpace(**fields)
+        DesignSpace(**{"reference": "impact"} | fields)
+
+
+def test_a_space_without_a_reference_is_refused_with_both_and_what_they_mean() -> None:
+    words = r'reference="impact", the impact of the hammer.*reference="valve", the command that opens the valve'
+    with pytest.raises(InvalidValueError, match=words):
+        DesignSpace(0, 320)
 
 
 def test_a_space_is_printed_with_the_event_that_its_isis_count_from() -> None:
     assert str(DesignSpace(0, 500, reference="valve")) == "0–500 ms after the valve command, every 1 ms"
-    assert str(DesignSpace(10, 50, 2.5)) == "10–50 ms after the impact, every 2.5 ms"
+    assert str(DesignSpace(10, 50, 2.5, reference="impact")) == "10–50 ms after the impact, every 2.5 ms"
 
 
 def test_a_space_in_seconds_is_named() -> None:
-    with pytest.raises(InvalidValueError, match=r"In seconds\? Then DesignSpace\(0, 320\)"):
-        DesignSpace(0, 0.32)
+    with pytest.raises(InvalidValueError, match=r"In seconds\? Then low_ms=0, high_ms=320"):
+        DesignSpace(0, 0.32, reference="impact")
 
 
 def test_the_grid_cannot_be_written_to() -> None:
@@ -133,8 +139,8 @@ def test_the_two_ready_spaces_are_those_of_the_dissertation() -> None:
 @pytest.mark.parametrize("space", [(0, 1e6, 1.0), (0, 500, 1e-3), (0, 1e15, 1e-9), (-1.7e308, 1.7e308, 1.0)])
 def test_a_space_with_more_isis_than_anybody_needs_is_refused(space: tuple[float, float, float]) -> None:
     with pytest.raises(InvalidValueError, match=r"too many ISIs.*larger step_ms"):
-        DesignSpace(*space)
+        DesignSpace(*space, reference="impact")
 
 
 def test_a_second_in_steps_of_a_tenth_of_a_millisecond_is_a_space() -> None:
-    assert len(DesignSpace(0, 1000, 0.1).grid_ms) == 10_001
+    assert len(DesignSpace(0, 1000, 0.1, reference="impact").grid_ms) == 10_001

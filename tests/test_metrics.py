@@ -19,7 +19,7 @@ from isiw.types import ArrayLike
 from isiw.window import Window, WindowEstimate
 from known import known
 
-SPACE = DesignSpace(0, 40, step_ms=1)
+SPACE = DesignSpace(0, 40, step_ms=1, reference="impact")
 
 masks = st.lists(st.booleans(), min_size=12, max_size=12).map(np.array)
 
@@ -74,7 +74,7 @@ def test_a_method_without_an_answer_is_right_about_nobody() -> None:
 
 
 def test_a_window_between_two_isis_of_the_space_is_one_still() -> None:
-    coarse = DesignSpace(0, 100, step_ms=10)
+    coarse = DesignSpace(0, 100, step_ms=10, reference="impact")
     early, late = Window(32, 38), Window(82, 88)
     assert f1(early, early, coarse) == 1
     assert f1(early, late, coarse) == f1(early, None, coarse) == f1(None, late, coarse) == 0
@@ -146,7 +146,7 @@ def test_arguments_in_another_order_are_told_with_the_right_one(
 def test_intervals_of_a_calibrated_posterior_cover_at_their_level() -> None:
     # 2000 draws: four standard errors of a share of 0.9 are 0.027.
     rng = np.random.default_rng(12)
-    fine = DesignSpace(0, 40, step_ms=0.01)
+    fine = DesignSpace(0, 40, step_ms=0.01, reference="impact")
     hits = []
     for _ in range(2000):
         middles = rng.normal((12.0, 28.0), 1.0)
@@ -175,7 +175,7 @@ def test_a_criterion_lasts_from_the_trial_after_the_last_miss(mean_f1: list[floa
 def test_the_ranks_of_edges_drawn_from_the_posterior_itself_are_uniform() -> None:
     # A coarse grid makes ties common. Kolmogorov-Smirnov on 4000 ranks: p < 0.0001 comes once in 10,000 seeds.
     rng = np.random.default_rng(5)
-    space = DesignSpace(0, 100)
+    space = DesignSpace(0, 100, reference="impact")
     ranks = []
     for _ in range(2000):
         edges = rng.integers((10, 50), (20, 60), size=(40, 2)).astype(float)
@@ -186,15 +186,15 @@ def test_the_ranks_of_edges_drawn_from_the_posterior_itself_are_uniform() -> Non
 
 def test_an_edge_before_all_samples_ranks_first() -> None:
     estimate = WindowEstimate(probability=1.0, window=None, edge_samples_ms=np.tile([[50.0, math.inf]], (99, 1)))
-    start, end = edge_ranks(estimate, Window(40, 60), DesignSpace(0, 100), np.random.default_rng(0))
+    start, end = edge_ranks(estimate, Window(40, 60), DesignSpace(0, 100, reference="impact"), np.random.default_rng(0))
     assert start < 0.01
     assert end < 0.01
-    _, end = edge_ranks(estimate, Window(40, 100), DesignSpace(0, 100), np.random.default_rng(0))
+    _, end = edge_ranks(estimate, Window(40, 100), DesignSpace(0, 100, reference="impact"), np.random.default_rng(0))
     assert 0 < end < 1
 
 
 def test_without_samples_a_rank_says_nothing() -> None:
     estimate = WindowEstimate(probability=None, window=None)
     rng = np.random.default_rng(2)
-    ranks = [edge_ranks(estimate, Window(40, 60), DesignSpace(0, 100), rng) for _ in range(500)]
+    ranks = [edge_ranks(estimate, Window(40, 60), DesignSpace(0, 100, reference="impact"), rng) for _ in range(500)]
     assert scipy.stats.kstest(np.ravel(ranks), "uniform").pvalue > 1e-3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import get_args
+from typing import Final, cast, get_args
 
 import numpy as np
 
@@ -14,11 +14,14 @@ from isiw.errors import InvalidValueError, OutOfSpaceError
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.types import FloatArray, Reference
 
-__all__ = ["IMPACT_SPACE", "VALVE_SPACE", "DesignSpace", "require_space"]
+__all__ = ["IMPACT_SPACE", "VALVE_SPACE", "DesignSpace", "missing_reference", "require_space"]
 
 
 MOST_ISIS = 10_001
 """Of a design space: a second in steps of 0.1 ms."""
+
+_UNSAID: Final = cast("Reference", "")
+"""No reference; it is the default so that its absence is refused in words, and not as a missing argument."""
 
 
 @dataclass(frozen=True)
@@ -29,23 +32,25 @@ class DesignSpace:
         low_ms: first ISI [ms].
         high_ms: last ISI [ms].
         step_ms: distance between two ISIs [ms], by default 1; the range must hold a whole number of steps.
-        reference: the event that an ISI is counted from, the `"impact"` of the hammer (the default here; in a
-            configuration it is the other one) or the `"valve"` command.
+        reference: the event that an ISI is counted from, the `"impact"` of the hammer or the `"valve"` command; it has
+            no default, as the same number is another ISI in the other one.
         tolerance_ms: how far a *realised* ISI may lie beyond the range before it is an error, and from the commanded
             one before it is a mistrial [ms]; by default 10.
 
     Raises:
         InvalidValueError: a bound that is not finite, an empty range, a step that does not fit, too many ISIs, an
-            unknown reference.
+            unknown reference, or none.
     """
 
     low_ms: float
     high_ms: float
     step_ms: float = 1.0
-    reference: Reference = "impact"
+    reference: Reference = _UNSAID
     tolerance_ms: float = 10.0
 
     def __post_init__(self) -> None:
+        if not self.reference:
+            raise missing_reference()
         check_numbers(self, "low_ms", "high_ms")
         check_numbers(self, "step_ms", above=0)
         check_numbers(self, "tolerance_ms", least=0)
@@ -59,7 +64,7 @@ class DesignSpace:
                 "the design space is narrower than a step",
                 got=(self.low_ms, self.high_ms),
                 expected=f"a range in ms of at least {self.step_ms:g} ms",
-                remedy=f"In seconds? Then DesignSpace({1e3 * self.low_ms:g}, {1e3 * self.high_ms:g}).",
+                remedy=f"In seconds? Then low_ms={1e3 * self.low_ms:g}, high_ms={1e3 * self.high_ms:g}.",
             )
         steps = (self.high_ms - self.low_ms) / self.step_ms
         if steps >= MOST_ISIS:
@@ -142,6 +147,16 @@ class DesignSpace:
                 remedy=f"ISIs count from the {self.reference}; check the reference, or log the trial as a mistrial.",
             )
         return realised_ms
+
+
+def missing_reference() -> InvalidValueError:
+    """The error to raise where nobody says which event the ISIs of a design space count from."""
+    return InvalidValueError(
+        "a design space needs its reference, the event that its ISIs count from",
+        expected='reference="impact", the impact of the hammer or the electrical pulse, or reference="valve", the '
+        "command that opens the valve",
+        remedy="Name the one that your rig counts from: the same number of milliseconds is another ISI in the other.",
+    )
 
 
 def require_space(space: object) -> None:

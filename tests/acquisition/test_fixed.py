@@ -106,10 +106,10 @@ def test_a_sweep_stays_at_one_isi_where_its_stops_lie_between_those_of_the_space
 @pytest.mark.parametrize(
     ("space", "step_ms", "asked_ms"),
     [
-        (DesignSpace(0, 320), 5.0, [0.0, 5.0, 10.0, 15.0, 20.0]),
-        (DesignSpace(0, 320), 2.0, [0.0, 2.0, 4.0, 6.0, 8.0]),
-        (DesignSpace(0, 30, step_ms=10), 5.0, [0.0, 10.0, 20.0, 30.0, 0.0]),
-        (DesignSpace(0, 40, step_ms=4), 10.0, [0.0, 12.0, 24.0, 36.0, 0.0]),
+        (DesignSpace(0, 320, reference="impact"), 5.0, [0.0, 5.0, 10.0, 15.0, 20.0]),
+        (DesignSpace(0, 320, reference="impact"), 2.0, [0.0, 2.0, 4.0, 6.0, 8.0]),
+        (DesignSpace(0, 30, step_ms=10, reference="impact"), 5.0, [0.0, 10.0, 20.0, 30.0, 0.0]),
+        (DesignSpace(0, 40, step_ms=4, reference="impact"), 10.0, [0.0, 12.0, 24.0, 36.0, 0.0]),
     ],
 )
 def test_a_sweep_is_planned_on_the_grid_of_the_space(space: DesignSpace, step_ms: float, asked_ms: list[float]) -> None:
@@ -122,7 +122,7 @@ def test_a_sweep_is_planned_on_the_grid_of_the_space(space: DesignSpace, step_ms
 @pytest.mark.parametrize(("low_ms", "high_ms", "step_ms"), [(100, 109, 0.3), (0, 1.3, 0.1), (10, 17, 0.1), (0, 8, 0.4)])
 def test_a_sweep_comes_to_the_last_isi_of_a_range_of_whole_steps(low_ms: float, high_ms: float, step_ms: float) -> None:
     stops, sweep = round((high_ms - low_ms) / step_ms) + 1, IncrementalSweep(step_ms, trials_per_isi=1)
-    space = DesignSpace(low_ms, high_ms, step_ms=step_ms)
+    space = DesignSpace(low_ms, high_ms, step_ms=step_ms, reference="impact")
     assert [sweep.planned_isi_ms(space, pairs) for pairs in range(stops)] == space.grid_ms.tolist()
     isis_ms = torch.tensor(space.grid_ms.tolist())
     assert [int(sweep(CountingPosterior(trial), isis_ms).argmax()) for trial in range(stops)] == list(range(stops))

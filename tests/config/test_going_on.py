@@ -30,7 +30,7 @@ def config(tmp_path: Path) -> Any:
 
     def made(text: str = "") -> Any:
         file = tmp_path / "s.toml"
-        space = f"[space]\nlow_ms = {SPACE.low_ms}\nhigh_ms = {SPACE.high_ms}\n"
+        space = f"[space]\nlow_ms = {SPACE.low_ms}\nhigh_ms = {SPACE.high_ms}\nreference = 'valve'\n"
         file.write_text(f'[device]\nfactory = "rig:make"\n{space}{text}')
         return load_config(file)
 

@@ -61,6 +61,15 @@ def test_a_starting_point_is_never_overwritten(template: Path) -> None:
     assert (template / "rig.py").read_bytes() == before["rig.py"]
 
 
+def test_a_starting_point_is_not_written_through_a_link_that_leads_nowhere(tmp_path: Path) -> None:
+    (tmp_path / "rg").mkdir()
+    (tmp_path / "rg" / "rig.py").symlink_to(tmp_path / "elsewhere.py")
+    with pytest.raises(ConfigError, match=r"there already.*rig\.py"):
+        write_rig_template(tmp_path / "rg")
+    assert not (tmp_path / "elsewhere.py").exists()
+    assert [path.name for path in (tmp_path / "rg").iterdir()] == ["rig.py"]
+
+
 def test_an_error_of_the_labs_own_code_is_no_wrong_setting(tmp_path: Path) -> None:
     (tmp_path / "broken_rig.py").write_text("def make(port='COM3'):\n    return None + 1\n", encoding="utf-8")
     with pytest.raises(TypeError, match="unsupported operand"):

@@ -10,6 +10,7 @@ import tomli_w
 from isiw.config import (
     RunConfig,
     Truth,
+    assumed_space,
     device_for,
     fresh_log_path,
     load_config,
@@ -18,6 +19,7 @@ from isiw.config import (
     subject_for,
     truth_of,
 )
+from isiw.design import VALVE_SPACE
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, StrategyError
 from isiw.log.reader import read_session
@@ -62,7 +64,7 @@ def test_a_file_changes_what_it_names(config_file: WriteFile) -> None:
         ("seed = -1", ["value of seed", "-1"]),
         ("log = 3", ["value of log", "3", "expected a path"]),
         ('[device]\nfactory = "rig"', ["device.factory", "module:function, such as rig:make"]),
-        ("[space]\nlow_ms = '0'", ["space.low_ms", "expected a number"]),
+        ("[space]\nreference = 'impact'\nlow_ms = '0'", ["space.low_ms", "expected a number"]),
         ("[strategy.settings]\nhit_delay_ms = [0.183, 0.006]", ["hit_delay_ms", "in seconds? Multiply by 1000"]),
         ("[limits]\nmin_iti_s = nan", ["limits.min_iti_s", "nan"]),
         ("[subject]\nkind = 'real'", ["subject.kind", "'real'", "'simulated' or 'recorded'"]),
@@ -70,9 +72,16 @@ def test_a_file_changes_what_it_names(config_file: WriteFile) -> None:
         ("[space]\nreference = 'coil'", ["space.reference", "'coil'", "'impact' or 'valve'"]),
         ("[strategy]\nname = 'foo'", ["session.toml", "value of strategy.name", "'foo'", "default or "]),
         ("[subject]\ncohort = 'foo'", ["session.toml", "value of subject.cohort", "'foo'", "nonresponder"]),
-        ("[space]\nlow_ms = 10\nhigh_ms = 5", ["session.toml", "value of space", "(10.0, 5.0)", "low_ms < high_ms"]),
-        ("[space]\nlow_ms = nan", ["session.toml", "value of space.low_ms", "got nan", "a finite number"]),
-        ("[space]\nstep_ms = 0.3", ["session.toml", "value of space", "whole number of steps"]),
+        (
+            "[space]\nreference = 'impact'\nlow_ms = 10\nhigh_ms = 5",
+            ["session.toml", "value of space", "(10.0, 5.0)", "low_ms < high_ms"],
+        ),
+        ("[space]\nhigh_ms = 320", ["value of space", "needs its reference", '"impact", the', '"valve", the', "rig"]),
+        (
+            "[space]\nreference = 'valve'\nlow_ms = nan",
+            ["session.toml", "value of space.low_ms", "got nan", "a finite number"],
+        ),
+        ("[space]\nreference = 'valve'\nstep_ms = 0.3", ["session.toml", "value of space", "whole number of steps"]),
         ("[strategy.settings]\nmax_trials = 0", ["value of strategy.settings", "max_trials", "got 0", "at least 1"]),
         ("seed = = 7", ["session.toml", "not valid TOML", "line 1"]),
     ],
@@ -295,3 +304,22 @@ def test_the_strategy_is_told_what_the_device_delivers_first(config_file: WriteF
     for cohort, stimulus in (("electrical", "electrical"), ("recruitment", "tap")):
         session = session_for(load_config(config_file(text.replace("COHORT", cohort))))
         assert session.strategy.recipe.settings["conditioning"] == stimulus
+
+
+def test_a_device_of_ones_own_needs_a_space_before_it_is_made(config_file: WriteFile) -> None:
+    config = load_config(config_file('[device]\nfactory = "nowhere:make"\n'))
+    with pytest.raises(ConfigError, match=r"needs a section \[space\].*\"impact\", the.*\"valve\", the"):
+        session_for(config)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "No [space] is given, so ISIs are 0–500 ms after the valve command, every 1 ms."),
+        ("[space]\nreference = 'valve'\n", None),
+    ],
+)
+def test_the_space_that_nobody_named_is_said(config_file: WriteFile, text: str, said: str | None) -> None:
+    config = load_config(config_file(text)).with_overrides(strategy="even", seed=3)
+    assert assumed_space(config) == said
+    assert config.design() == VALVE_SPACE

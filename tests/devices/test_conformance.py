@@ -288,7 +288,7 @@ def test_the_suite_names_what_is_wrong_with_a_rig_and_says_what_it_found(wrong: 
 
 
 def test_a_right_rig_passes_with_a_table_of_what_was_found() -> None:
-    rows = dict(check_device(rig, DesignSpace(20, 320)).rows)
+    rows = dict(check_device(rig, DesignSpace(20, 320, reference="impact")).rows)
     assert rows["impact found"] == "3 of 3"
     assert rows["background EMG"].endswith("µV RMS (a session accepts 10 at most)")
     assert len(rows["realised minus wanted ISI"].split(",")) == 3

@@ -24,7 +24,7 @@ def test_a_path_without_a_name_is_no_log() -> None:
 def test_a_file_that_is_there_is_never_written_over(tmp_path: Path) -> None:
     path = tmp_path / "s.mcap"
     path.write_bytes(b"data")
-    with pytest.raises(LogError, match="cannot be created"):
+    with pytest.raises(FileExistsError):
         DurableFile(path)
     assert path.read_bytes() == b"data"
 

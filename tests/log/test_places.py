@@ -11,14 +11,18 @@ from typing import Any, Never
 
 import pytest
 
+from hostile import IN_THE_WAY, at_once
+from isiw.devices.clock import VirtualClock
 from isiw.errors import LogError
 from isiw.log.amending import exclude
-from isiw.log.durable import Fingerprint, take_free_place
+from isiw.log.durable import Fingerprint
 from isiw.log.reader import read_session
-from isiw.log.salvage import Salvage, salvage
+from isiw.log.salvage import Salvage, salvage, salvage_file
 from isiw.log.schema import Event, Header
 from isiw.log.writer import LogWriter
+from isiw.session.loop import Session
 from log.written import write_trials
+from scripted import ScriptedDevice, scripted_strategy
 
 
 @pytest.fixture
@@ -110,30 +114,37 @@ def test_a_log_and_its_own_continuation_are_one_log(finished_log: Path) -> None:
     assert not Path(f"{finished_log}.part").exists()
 
 
-def _no_links(new: Any, old: Any) -> Never:
-    raise OSError(errno.EPERM, f"no link from {new} to {old}")
-
-
-@pytest.mark.parametrize("links", [True, False])
-def test_a_taken_name_is_left_alone_and_a_free_one_taken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: Any
+@pytest.mark.parametrize("kind", IN_THE_WAY)
+@pytest.mark.parametrize("name", ["s.mcap", "s.mcap.part"])
+def test_no_session_begins_where_something_else_than_a_file_has_its_logs_name(
+    tmp_path: Path, header: Header, kind: str, name: str
 ) -> None:
-    if not links:  # as on a memory stick
-        monkeypatch.setattr(Path, "hardlink_to", _no_links)
-    for name in ("ours", "theirs"):
-        (tmp_path / name).write_text(name)
-    with pytest.raises(FileExistsError):
-        take_free_place(tmp_path / "ours", tmp_path / "theirs")
-    assert (tmp_path / "theirs").read_text() == "theirs"
-    take_free_place(tmp_path / "ours", tmp_path / "free")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["free", "theirs"]
+    IN_THE_WAY[kind](tmp_path / name)
+    with pytest.raises(LogError, match=f"there is {kind}; got .*{name}"):
+        at_once(lambda: LogWriter.create(tmp_path / "s.mcap", header))
+    assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
-def test_a_name_that_leads_nowhere_is_taken_too(tmp_path: Path) -> None:
-    (tmp_path / "ours").write_text("ours")
-    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
-    with pytest.raises(FileExistsError):
-        take_free_place(tmp_path / "ours", tmp_path / "link")
+def test_a_log_that_is_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "s.mcap")
+    with pytest.raises(LogError, match="no regular file"):
+        at_once(lambda: salvage_file(tmp_path / "s.mcap"))
+
+
+@pytest.mark.parametrize("name", ["CON", "nul.mcap", "aux.tar.mcap", "s.mcap.", "s.mcap "])
+def test_no_log_gets_a_name_that_windows_keeps_for_itself(tmp_path: Path, header: Header, name: str) -> None:
+    with pytest.raises(LogError, match="which Windows keeps for itself"):
+        LogWriter.create(tmp_path / name, header)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_in_a_logs_way_is_told_before_the_device_is_armed(tmp_path: Path) -> None:
+    device = ScriptedDevice()
+    os.mkfifo(tmp_path / "s.mcap")
+    session = Session(device, scripted_strategy(3), log=tmp_path / "s.mcap", clock=VirtualClock())
+    with pytest.raises(LogError, match="a pipe"):
+        at_once(session.run)
+    assert device.calls == []
 
 
 def test_a_log_that_a_session_went_on_with_while_its_names_were_looked_at_does_not_go_on_twice(

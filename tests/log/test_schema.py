@@ -18,6 +18,7 @@ from isiw.strategy.threshold import ThresholdEstimate
 from isiw.trials import Channel, MistrialReason, Status, Trial
 from isiw.window import Window, WindowEstimate
 from known import instance
+from log.written import make_header
 
 
 @pytest.mark.parametrize(
@@ -160,3 +161,9 @@ def test_a_record_from_a_later_version_with_more_keys_is_read() -> None:
 def test_what_is_not_a_record_is_refused(data: bytes) -> None:
     with pytest.raises(ValueError, match="validation error"):
         decode("/intent", data)
+
+
+def test_a_logged_space_without_a_reference_counts_from_the_impact() -> None:
+    logged = json.loads(make_header().model_dump_json())
+    del logged["space"]["reference"]
+    assert Header.model_validate_json(json.dumps(logged)).space.reference == "impact"

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import os
+import time
 from pathlib import Path
 from typing import Never
 
@@ -14,9 +15,11 @@ from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Header, Waveform
 from isiw.log.writer import LogWriter
+from isiw.session.opening import open_session
 from isiw.trials import Channel
 from log.written import write_trials
 from logs import blocks_of, damage
+from scripted import scripted_strategy
 
 
 def test_a_log_is_a_part_until_it_is_closed(tmp_path: Path, header: Header) -> None:
@@ -104,9 +107,46 @@ def test_a_log_that_cannot_be_begun_leaves_no_file(
     tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(os, "fsync", full_disk)
-    with pytest.raises(LogError, match="No space left"):
+    with pytest.raises(LogError, match=r"No space left.*Make room, or choose another path\.$"):  # none to resume
         LogWriter.create(tmp_path / "s.mcap", header)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_log_that_is_gone_when_the_disk_fails_is_not_called_safe(
+    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = LogWriter.create(tmp_path / "s.mcap", header)
+    (tmp_path / "s.mcap.part").unlink()
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", full_disk)
+        with pytest.raises(LogError, match=r"No space left.*The file is gone, too"):
+            write_trials(log, [0])
+    with pytest.raises(LogError, match="rescued"):
+        log.close()
+
+
+@pytest.mark.parametrize("now_ns", [-1, -(10**18), 2**64, 10**20])
+def test_no_log_begins_by_a_clock_that_shows_a_time_no_log_can_hold(
+    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch, now_ns: int
+) -> None:
+    monkeypatch.setattr(time, "time_ns", lambda: now_ns)
+    with pytest.raises(LogError, match=r"clock is wrong.*from 1970 to 2554\. Set the clock"):
+        LogWriter.create(tmp_path / "s.mcap", header)
+    with pytest.raises(LogError, match="clock is wrong"):
+        open_session(scripted_strategy(3), tmp_path / "s.mcap")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("now_ns", [-1, 2**64])
+def test_a_clock_that_is_set_wrong_while_a_log_is_written_loses_no_trial(
+    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch, now_ns: int
+) -> None:
+    with LogWriter.create(tmp_path / "s.mcap", header) as log:
+        write_trials(log, [0])
+        monkeypatch.setattr(time, "time_ns", lambda: now_ns)
+        write_trials(log, [1, 2])
+    record = read_session(tmp_path / "s.mcap")
+    assert (len(record.table), record.losses) == (3, ())
 
 
 @pytest.mark.parametrize("trouble", ["header", "disk"])

@@ -15,7 +15,7 @@ from isiw.log.writer import LogWriter
 from isiw.signals.limits import SignalLimits
 from isiw.trials import Channel, Status, Trial
 
-SPACE = DesignSpace(0, 200)
+SPACE = DesignSpace(0, 200, reference="impact")
 
 
 def make_header(**changes: Any) -> Header:

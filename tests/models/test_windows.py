@@ -6,7 +6,7 @@ from isiw.design import DesignSpace
 from isiw.models.windows import SampledProfiles, best_window, edge_samples, ends, profile_grid, sampled_estimate
 from known import known
 
-SPACE = DesignSpace(0, 9)
+SPACE = DesignSpace(0, 9, reference="impact")
 
 
 def masks(*rows: str) -> torch.Tensor:
@@ -70,12 +70,16 @@ def test_the_best_isi_is_told_of_samples_that_have_one_and_what_is_excluded_of_a
 
 def test_a_profile_is_reported_up_to_both_ends_of_the_range() -> None:
     for high_ms in (302, 320, 500):
-        grid = profile_grid(DesignSpace(0, high_ms))
+        grid = profile_grid(DesignSpace(0, high_ms, reference="impact"))
         assert (float(grid[0]), float(grid[-1])) == (0, high_ms)
         assert (grid.diff() > 0).all()
 
 
 def test_a_profile_has_no_gaps_that_a_narrow_peak_fits_into_however_wide_the_range() -> None:
-    for space in (DesignSpace(0, 1000, 0.5), DesignSpace(0, 600), DesignSpace(0, 2100, 3)):
+    for space in (
+        DesignSpace(0, 1000, 0.5, reference="impact"),
+        DesignSpace(0, 600, reference="impact"),
+        DesignSpace(0, 2100, 3, reference="impact"),
+    ):
         assert profile_grid(space).diff().max() <= 4.0
-    assert len(profile_grid(DesignSpace(0, 400, 10))) == 41
+    assert len(profile_grid(DesignSpace(0, 400, 10, reference="impact"))) == 41

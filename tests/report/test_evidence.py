@@ -78,7 +78,7 @@ def test_a_usual_person_whose_isis_are_asked_by_the_default_has_no_change_with_t
             outcome = responder.respond(strategy.ask(), "valve")
             strategy.tell(outcome.isi_ms, outcome.mep_mv)
             told.append(Trial(k, Status.ACCEPTED, outcome.isi_ms, isi_ms=outcome.isi_ms, mep_mv=outcome.mep_mv))
-        said += changed_with_time(subject.window(isiw.DesignSpace(0, 500)), told) is not None
+        said += changed_with_time(subject.window(isiw.DesignSpace(0, 500, reference="impact")), told) is not None
     assert said == 0
 
 
@@ -184,6 +184,7 @@ def test_the_reason_of_a_pause_is_said_also_where_no_mep_was_seen(tmp_path: Path
     record = isiw.read_session(tmp_path / "zeros.mcap")
     for reason, is_said in (
         ("The session is paused: the window of the booth is open.", True),
+        ("The session was ended before its time: the window of the booth is open.", True),
         ("The limit of 4 pulses is reached.", True),
         ("There is no window, with probability 0.95.", False),
     ):

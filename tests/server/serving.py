@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import ipaddress
 import os
-import socket
 import subprocess
 import sys
 import threading
@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-import uvicorn
 
 from isiw.server import Rules, make_app
+from isiw.server.serving import Server, listening, settings_of
 from known import known
 
 TOKEN = "a token for the tests"  # noqa: S105 - of the tests
@@ -36,10 +36,9 @@ PLAN: dict[str, Any] = {
 @contextmanager
 def client_of(folder: Path, **rules: Any) -> Iterator[httpx.Client]:
     """A client of a server in this process, over a socket."""
-    config = uvicorn.Config(make_app(folder, Rules(TOKEN, **rules)), http="h11", ws="none", log_level="critical")
-    server = uvicorn.Server(config)
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    allowed = Rules(TOKEN, **rules)
+    server = Server(settings_of(make_app(folder, allowed), allowed, log_level="critical"))
+    with listening(ipaddress.IPv4Address("127.0.0.1"), 0) as listener:
         thread = threading.Thread(target=server.run, args=([listener],))
         thread.start()
         port = listener.getsockname()[1]

@@ -12,6 +12,8 @@ import pytest
 from isiw.log.reader import read_session
 from server.serving import PLAN, SETTINGS, SPACE, client_of, created, done, refused
 
+ARABIC_12 = "\u0661\u0662"
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -63,6 +65,12 @@ def test_a_whole_session_by_forms_is_that_by_json(client: httpx.Client, folder: 
         (b'{"id": "a", "unknown": 1}', "application/json", 422),
         (b'{"id": "a", "space": {"low_ms": NaN}}', "application/json", 422),
         (b'{"id": "a", "visit": {"subject": "\\ud800"}}', "application/json", 400),
+        (b'{"id": "a", "seed": 1, "seed": 2}', "application/json", 400),
+        (b'{"id": "a", "visit": {"day": 1, "day": 2}}', "application/json", 400),
+        (b'id=a&visit={"day":1,"day":2}', "application/x-www-form-urlencoded", 400),
+        (b'{"id": "a", "strategy": {"settings": {"x": ' + b"9" * 5000 + b"}}}", "application/json", 400),
+        (b"id=a&seed=1_0", "application/x-www-form-urlencoded", 422),
+        (f"id=a&seed={ARABIC_12}".encode(), "application/x-www-form-urlencoded", 422),
     ],
 )
 def test_a_malformed_body_is_refused_in_words_and_begins_nothing(
@@ -79,7 +87,8 @@ def test_a_malformed_body_is_refused_in_words_and_begins_nothing(
     [
         ({"strategy": {"name": "defualt"}}, "strategy.name", "default"),
         ({"strategy": {"name": "even", "settings": {"particels": 9}}}, "strategy.settings", "particles"),
-        ({"space": {"low_ms": 100, "high_ms": 50}}, "space", "low_ms < high_ms"),
+        ({"space": {"low_ms": 0, "high_ms": 320}}, "space", "needs its reference, the event that its ISIs count from"),
+        ({"space": {"reference": "valve", "low_ms": 100, "high_ms": 50}}, "space", "low_ms < high_ms"),
         ({"space": {"low": 100}}, "space.low", "is unknown; got 100; expected one of high_ms, low_ms"),
         ({"limits": {"max_pulses": 0}}, "limits.max_pulses", "greater than"),
         ({"protocol": {"iti_s": [9.0, 5.0]}}, "protocol", "ascend"),
@@ -123,6 +132,13 @@ def test_a_protocol_with_control_trials_is_refused_as_ask_answers_with_an_isi(cl
     assert "control trials" in refused(client.post("/sessions", json=plan), 422, "InvalidValueError")["message"]
 
 
+def test_a_trials_number_in_a_header_is_read_as_in_a_body(client: httpx.Client) -> None:
+    session = created(client, "f")
+    for odd in ("1_0", "+1", "1.0", ARABIC_12, "9" * 5000):
+        response = client.get(f"{session}/progress", headers={"Last-Event-ID": odd.encode()})  # type: ignore[arg-type] # sent as it is
+        refused(response, 422, "InvalidValueError")
+
+
 def test_a_setting_may_be_null(client: httpx.Client) -> None:
     plan = {**PLAN, "id": "d", "strategy": {"name": "even", "settings": {"hit_delay_ms": None, "particles": 10}}}
     done(client.post("/sessions", json=plan))
@@ -139,3 +155,11 @@ def test_a_path_that_is_none_is_answered_in_words(client: httpx.Client) -> None:
     assert response.headers["Allow"] == "GET"
     refused(client.get("/sessions/e/picture", params={"format": "exe"}), 422, "InvalidValueError")
     refused(client.get("/sessions/e?errors=500"), 422, "InvalidValueError")
+
+
+@pytest.mark.parametrize("name", ["CON", "nul", "aux"])
+def test_an_id_that_windows_keeps_for_itself_is_refused(client: httpx.Client, folder: Path, name: str) -> None:
+    before = list(folder.iterdir())
+    response = client.post("/sessions", json={**PLAN, "id": name})
+    assert response.json()["error"]["message"].startswith("a log cannot have this name, which Windows keeps for itself")
+    assert list(folder.iterdir()) == before

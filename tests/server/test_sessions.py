@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,8 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.log.reader import read_session
+from isiw.log.schema import Record
+from isiw.log.topics import encode
 from isiw.server.driven import DrivenSession
 from isiw.server.refusals import Refusal
 from isiw.server.requests import AskRequest, CreateRequest, TellRequest
@@ -33,6 +36,17 @@ def client(tmp_path: Path) -> Iterator[httpx.Client]:
 @pytest.fixture
 def session(client: httpx.Client) -> str:
     return created(client)
+
+
+def notes_in(log: Path) -> list[tuple[str, str | None]]:
+    return [(event.text, event.key) for event in read_session(log).events if event.kind == "note"]
+
+
+def without_key(topic: str, record: Record) -> bytes:
+    """A record as it was written before events had a field for a key."""
+    return json.dumps(
+        {name: value for name, value in json.loads(encode(topic, record)).items() if name != "key"}
+    ).encode()
 
 
 def test_a_whole_session_leaves_the_log_of_a_session(client: httpx.Client, session: str, tmp_path: Path) -> None:
@@ -204,8 +218,30 @@ def test_a_note_with_a_key_is_logged_once_also_after_resuming(
     done(client.post(f"{session}/close"))
     done(client.post(f"{session}/resume"))
     done(client.post(f"{session}/note", json=remark))
-    notes = [event.text for event in read_session(tmp_path / "P07.mcap").events if event.kind == "note"]
-    assert notes == ["coil moved: 1 = 2 & 5 µV (key n1)"]
+    assert notes_in(tmp_path / "P07.mcap") == [("coil moved: 1 = 2 & 5 µV", "n1")]
+
+
+def test_a_note_whose_text_ends_like_a_key_swallows_no_later_one(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    done(client.post(f"{session}/note", json={"text": "as in the plan (key a1)"}))
+    done(client.post(f"{session}/close"))
+    done(client.post(f"{session}/resume"))
+    done(client.post(f"{session}/note", json={"text": "coil moved", "key": "a1"}))
+    assert notes_in(tmp_path / "P07.mcap") == [("as in the plan (key a1)", None), ("coil moved", "a1")]
+
+
+def test_a_key_that_an_older_log_has_in_the_notes_text_is_still_recognised(
+    client: httpx.Client, session: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as older:
+        older.setattr("isiw.log.writer.encode", without_key)
+        done(client.post(f"{session}/note", json={"text": "coil moved (key n1)"}))
+    done(client.post(f"{session}/close"))
+    done(client.post(f"{session}/resume"))
+    for key in ("n1", "n2"):
+        done(client.post(f"{session}/note", json={"text": "again", "key": key}))
+    assert notes_in(tmp_path / "P07.mcap") == [("coil moved (key n1)", None), ("again", "n2")]
 
 
 def test_the_same_creation_once_more_is_answered_as_at_first_until_something_was_asked(client: httpx.Client) -> None:

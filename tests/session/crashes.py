@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import enum
 import os
 import stat
@@ -52,6 +53,7 @@ class Disk:
             patch.setattr(os, name, partial(self._step, getattr(os, name)))
         patch.setattr(os, "fsync", partial(self._step, partial(self._fsync, os.fsync)))
         patch.setattr(Path, "open", self._opening(Path.open))
+        patch.setattr(builtins, "open", self._opening(open))
 
     def _opening(self, usual: Callable[..., Any]) -> Callable[..., Any]:
         def opened(path: Path, mode: str = "r", *args: Any, **kwargs: Any) -> Any:

@@ -85,6 +85,7 @@ def test_a_device_that_goes_on_refusing_ends_the_session_and_it_can_be_resumed(l
     assert record.unknown == ()
     assert len(record.table) == 0
     assert pulses_s(salvage(log)) == []
+    assert [event.kind for event in record.events] == ["refused"] * 4, "the last one is not stated again as a fault"
     resumed = resume(log, ScriptedDevice(), scripted_strategy(4)).run()
     assert [trial.told for trial in resumed.trials] == [True] * 4
 

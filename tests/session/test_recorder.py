@@ -139,7 +139,7 @@ def test_a_slip_is_refused_and_can_be_put_right(log: Path) -> None:
 
 
 def test_a_pulse_before_the_impact_is_a_mistrial(log: Path) -> None:
-    with open_session(scripted_strategy(3, space=DesignSpace(0, 200)), log) as session:
+    with open_session(scripted_strategy(3, space=DesignSpace(0, 200, reference="impact")), log) as session:
         session.ask()
         with pytest.raises(InvalidValueError, match=r'came before the impact.*session.mistrial\("TMS before impact"\)'):
             session.tell(-0.5, 0.02)

@@ -21,6 +21,7 @@ from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.safeguards import Safeguards
 from isiw.session.updates import SessionUpdate
+from isiw.strategy.stopping import StopDecision
 from isiw.trials import Measurement, Stimulus
 from scripted import ScriptedDevice, scripted_strategy
 
@@ -197,6 +198,19 @@ def test_without_anybody_to_ask_a_pause_ends_the_session_and_it_can_be_resumed(l
     result = session.run()
     assert result.decision.reason == "The session is paused: Three mistrials in a row."
     assert len(result.trials) == 3
+    assert len(resume(log, ScriptedDevice(), scripted_strategy(6)).run().trials) == 6
+
+
+def test_a_session_that_was_ended_does_not_say_that_it_is_paused(log: Path) -> None:
+    def on_trial(update: SessionUpdate) -> None:
+        if update.trial.index == 2:
+            session.end("Ended on the live page.")
+
+    session = Session(ScriptedDevice(), scripted_strategy(6), log=log, on_trial=on_trial)
+    result = session.run()
+    assert result.decision == StopDecision(
+        stop=False, reason="The session was ended before its time: Ended on the live page."
+    )
     assert len(resume(log, ScriptedDevice(), scripted_strategy(6)).run().trials) == 6
 
 

@@ -191,7 +191,7 @@ def test_the_fewest_particles_allowed_do_learn() -> None:
 
 @pytest.mark.parametrize(("name", "initial"), [("nr", 6), ("nr2", 7), ("svmr", 7), ("gpr", 7)])
 def test_the_dissertations_regressions_begin_with_evenly_spaced_isis_at_both_ends(name: str, initial: int) -> None:
-    strategy = make_strategy(name, DesignSpace(0, 420))
+    strategy = make_strategy(name, DesignSpace(0, 420, reference="impact"))
     assert strategy.ask_batch(initial) == [420.0 * k / (initial - 1) for k in range(initial)]
 
 

@@ -17,7 +17,7 @@ from isiw.models.protocol import Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choosing import Choice, best_choices, candidate_isis, evenly_spaced
 
-FIVE = DesignSpace(0, 4)
+FIVE = DesignSpace(0, 4, reference="impact")
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,15 @@ def three() -> Posterior:
     return make_strategy("pf", particles=4).model.begin(VALVE_SPACE, seed=0, people=3)
 
 
-@pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE, DesignSpace(0, 1), DesignSpace(-20, 30, step_ms=0.1)])
+@pytest.mark.parametrize(
+    "space",
+    [
+        VALVE_SPACE,
+        IMPACT_SPACE,
+        DesignSpace(0, 1, reference="impact"),
+        DesignSpace(-20, 30, step_ms=0.1, reference="impact"),
+    ],
+)
 def test_candidates_are_few_evenly_spaced_and_hold_both_ends(space: DesignSpace) -> None:
     candidates = candidate_isis(space).double().numpy()
     assert len(candidates) <= 101

@@ -269,14 +269,14 @@ def test_a_seed_is_a_whole_number_also_of_a_strategy_of_ones_own(seed: Any) -> N
 
 def test_a_tie_is_asked_at_the_first_isi_and_a_score_that_is_not_finite_never() -> None:
     model = scripted_strategy().model
-    space = DesignSpace(0, 4)
+    space = DesignSpace(0, 4, reference="impact")
     tie = Scores(torch.tensor([math.inf, 0.0, math.nan, 2.0, 2.0]))
     assert Strategy(space, model, tie, Budget(3)).ask() == 3.0
 
 
 def test_where_no_score_is_finite_the_isi_is_evenly_spaced_and_says_why() -> None:
     nothing = Scores(torch.full((5,), math.nan))
-    strategy = Strategy(DesignSpace(0, 4), scripted_strategy().model, nothing, Budget(3))
+    strategy = Strategy(DesignSpace(0, 4, reference="impact"), scripted_strategy().model, nothing, Budget(3))
     asked = []
     for _ in range(3):
         asked.append(strategy.ask())
@@ -344,8 +344,11 @@ def test_a_design_goes_on_with_its_plan_however_often_a_trial_is_lost() -> None:
 def test_a_cost_is_taken_off_the_scores() -> None:
     level = Scores(torch.tensor([1.0, 2.0, 3.0, 4.0, 5.0]))
     model = scripted_strategy().model
-    assert Strategy(DesignSpace(0, 4), model, level, Budget(3)).ask() == 4.0
-    assert Strategy(DesignSpace(0, 4), model, level, Budget(3), cost=lambda isi_ms: 2 * isi_ms).ask() == 0.0
+    assert Strategy(DesignSpace(0, 4, reference="impact"), model, level, Budget(3)).ask() == 4.0
+    assert (
+        Strategy(DesignSpace(0, 4, reference="impact"), model, level, Budget(3), cost=lambda isi_ms: 2 * isi_ms).ask()
+        == 0.0
+    )
 
 
 def test_a_batch_begins_with_what_is_asked_and_repeats_no_isi_that_has_been_learnt() -> None:
@@ -360,7 +363,9 @@ def test_a_batch_begins_with_what_is_asked_and_repeats_no_isi_that_has_been_lear
 
 def test_a_batch_says_why_one_of_its_isis_is_not_the_acquisition_functions_choice() -> None:
     model = make_strategy("default", particles=50).model
-    first = Strategy(DesignSpace(0, 4), model, Scores(torch.full((5,), math.nan)), Budget(3), initial_ms=(2.0,))
+    first = Strategy(
+        DesignSpace(0, 4, reference="impact"), model, Scores(torch.full((5,), math.nan)), Budget(3), initial_ms=(2.0,)
+    )
     assert first.ask_batch(1) == [2.0]
     assert first.fallback_reason is None
     assert len(first.ask_batch(2)) == 2

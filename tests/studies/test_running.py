@@ -17,8 +17,8 @@ import psutil
 import pytest
 
 from disks import no_room
+from isiw import files
 from isiw.errors import ConfigError, InvalidValueError, StudyError
-from isiw.log import durable
 from isiw.studies import (
     Processes,
     Study,
@@ -317,7 +317,7 @@ def test_a_folder_that_is_being_written_takes_no_second_writer_and_is_still_read
 def test_who_begins_a_folder_at_the_same_moment_goes_on_with_the_same_study_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    usual = durable.put
+    usual = files.put
 
     def put_late(path: Path, content: Any, **how: Any) -> None:
         monkeypatch.setattr(store_module, "put", usual)

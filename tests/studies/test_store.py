@@ -10,9 +10,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from isiw.errors import StudyError
+from isiw.design import DesignSpace
+from isiw.errors import ConfigError, StudyError
 from isiw.studies.execution import Failure
-from isiw.studies.plan import Unit
+from isiw.studies.plan import Unit, load_study
 from isiw.studies.store import Store, begin_store, open_store
 from studies.tiny import tiny
 
@@ -136,3 +137,27 @@ def test_a_folder_that_other_code_began_is_read_and_not_gone_on_with(store: Stor
         again.require_same_code()
     path.write_text(re.sub(r'code = "\w+"\n', "", path.read_text()))
     again.require_same_code()
+
+
+def test_no_part_is_written_through_a_link_and_left_overs_go_with_the_next_run(store: Store) -> None:
+    victim, unit = store.folder / "victim", store.left()[0]
+    victim.write_text("precious")
+    (store.folder / "parts" / f"{unit.key}.part").symlink_to(victim)
+    (store.folder / "parts" / ".isiw-0123").write_text("cut off")
+    store.keep(unit, rows_of(unit))
+    with store.locked():
+        pass
+    assert victim.read_text() == "precious"
+    assert [path.suffix for path in (store.folder / "parts").iterdir()] == [".parquet"]
+    assert len(store.rows()) == 2
+
+
+def test_a_begun_study_whose_space_has_no_reference_counts_from_the_impact(tmp_path: Path) -> None:
+    begin_store(tiny(space=DesignSpace(0, 100, reference="impact")), tmp_path)
+    kept = (tmp_path / "study.toml").read_text()
+    (tmp_path / "study.toml").write_text(kept.replace('reference = "impact"\n', ""))
+    assert open_store(tmp_path).study.space.reference == load_study(tmp_path / "study.toml").space.reference == "impact"
+    new = 'strategies = ["even"]\ncohorts = ["recruitment"]\nspace = { low_ms = 0, high_ms = 9 }'
+    (tmp_path / "new.toml").write_text(new)
+    with pytest.raises(ConfigError, match=r"space.*needs its reference"):
+        load_study(tmp_path / "new.toml")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 from pathlib import Path
 
 __all__ = ["free_beside", "is_log"]
@@ -27,4 +28,4 @@ def free_beside(log: Path, suffix: str) -> Path:
     """
     stem = Path(log.name.removesuffix(".part")).stem
     names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
-    return next(path for path in (log.with_name(f"{name}{suffix}") for name in names) if not path.exists())
+    return next(path for path in (log.with_name(f"{name}{suffix}") for name in names) if not os.path.lexists(path))

@@ -29,7 +29,7 @@ def check(
     with errors_reported("Interrupted: the device is disarmed."):
         settings = isiw.config.load_config(config)
         isiw.config.require_device(settings, config)
-        device, space = isiw.config.device_for(settings), settings.space.design()
+        device, space = isiw.config.device_for(settings), settings.design()
         if not (yes or device.describe().simulated):
             typer.confirm("The check stimulates. Is the coil on a phantom?", abort=True)
         try:

@@ -74,7 +74,10 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
             day=day,
             operator=operator,
         )
-        _run_to_the_end(isiw.config.session_for(settings), config, live=live)
+        session = isiw.config.session_for(settings)
+        if (space := isiw.config.assumed_space(settings)) is not None:
+            show(space)
+        _run_to_the_end(session, config, live=live)
 
 
 @app.command(rich_help_panel=SESSIONS)

@@ -6,6 +6,7 @@ from isiw.config.next_steps import after_end, after_error
 from isiw.config.rig import write_rig_template
 from isiw.config.run import RunConfig, limits_for, load_config
 from isiw.config.session import (
+    assumed_space,
     device_for,
     fresh_log_path,
     require_device,
@@ -19,6 +20,7 @@ __all__ = [
     "Truth",
     "after_end",
     "after_error",
+    "assumed_space",
     "changes_on_resume",
     "device_for",
     "device_of_log",

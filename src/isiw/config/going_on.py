@@ -113,7 +113,7 @@ def _limits(config: RunConfig, logged: Limits) -> Limits:
 
 
 def _require_space(config: RunConfig, header: Header) -> None:
-    if "space" not in config.model_fields_set or (space := config.space.design()) == header.space:
+    if not config.space_named or (space := config.space.design()) == header.space:
         return
     differing = [(key, was, now) for key, was, now in _differing("space", header.space, space) if was != now]
     raise ConfigError(

@@ -5,6 +5,7 @@ A log never names it: what is imported is what the person at the keyboard has co
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 
 from isiw.devices.protocol import Device
 from isiw.errors import ConfigError
-from isiw.log.outputs import made_folder
+from isiw.log.outputs import write_output
 from isiw.text.named_code import named_code, require_fitting
 
 __all__ = ["TEMPLATE_FILES", "device_from_factory", "write_rig_template"]
@@ -60,11 +61,10 @@ def write_rig_template(folder: str | Path) -> tuple[Path, ...]:
     """
     target = Path(folder)
     files = tuple(target / name for name in TEMPLATE_FILES)
-    there = [str(file) for file in files if file.exists()]
+    there = [str(file) for file in files if os.path.lexists(file)]
     if there:
         raise ConfigError("the files are there already", got=", ".join(there), remedy="Choose another folder.")
-    made_folder(target)
     templates = resources.files("isiw.config") / "rig_template"
     for file in files:
-        file.write_text((templates / f"{file.name}.txt").read_text(encoding="utf-8"), encoding="utf-8")
+        write_output(file, (templates / f"{file.name}.txt").read_bytes())
     return files

@@ -31,6 +31,7 @@ from isiw.config.sections import (
     require_together,
 )
 from isiw.config.slips import require_units
+from isiw.design import DesignSpace, missing_reference
 from isiw.devices.limits import Limits
 from isiw.errors import ConfigError, did_you_mean
 from isiw.signals.limits import SignalLimits
@@ -41,7 +42,7 @@ __all__ = ["RunConfig", "limits_for", "load_config"]
 
 
 class RunConfig(Section):
-    """The whole configuration of `isiw run`; with a device, nobody is simulated."""
+    """The whole configuration of `isiw run`; with a device, nobody is simulated, and a new session needs a space."""
 
     seed: int = Field(default=0, ge=0)
     log: Path | None = None
@@ -50,7 +51,7 @@ class RunConfig(Section):
     device: DeviceConfig | None = None
     visit: VisitConfig = VisitConfig()
     subject: SubjectConfig = SubjectConfig()
-    space: SpaceConfig = SpaceConfig()
+    space: SpaceConfig = SpaceConfig(reference="valve")
     strategy: StrategyConfig = StrategyConfig()
     limits: LimitsConfig = LimitsConfig()
     protocol: VisitProtocol = VisitProtocol()
@@ -66,6 +67,26 @@ class RunConfig(Section):
                 "visit.subject. To simulate, remove [device].",
             )
         return self
+
+    @property
+    def space_named(self) -> bool:
+        """Whether the design space was given."""
+        return "space" in self.model_fields_set
+
+    def design(self) -> DesignSpace:
+        """The design space of a new session.
+
+        Raises:
+            ConfigError: a device of the lab's own, and nobody says from which event it counts.
+        """
+        if self.device is not None and not self.space_named:
+            missing = missing_reference()
+            raise ConfigError(
+                "a device of your own needs a section [space]: " + missing.what,
+                expected=missing.expected,
+                remedy="Add [space] with low_ms, high_ms and the reference that the device counts from.",
+            )
+        return self.space.design()
 
     @property
     def timeout_s(self) -> float:

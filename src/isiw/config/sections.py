@@ -10,7 +10,7 @@ from typing import Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from isiw.checks import choice
-from isiw.design import DesignSpace
+from isiw.design import DesignSpace, missing_reference
 from isiw.errors import ConfigError
 from isiw.strategy.catalogue import list_strategies, settings_for
 from isiw.subjects.cohorts import COHORTS
@@ -79,8 +79,15 @@ class SpaceConfig(Section):
     low_ms: float = 0.0
     high_ms: float = 500.0
     step_ms: float = 1.0
-    reference: Reference = "valve"
+    reference: Reference
     tolerance_ms: float = 10.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _counted_from_something(cls, values: Any) -> Any:
+        if isinstance(values, Mapping) and "reference" not in values and values.keys() <= cls.model_fields.keys():
+            raise missing_reference()
+        return values
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import itertools
 from functools import partial
 from pathlib import Path
@@ -16,6 +15,7 @@ from isiw.devices.protocol import Device
 from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import ConfigError
+from isiw.log.clock import now
 from isiw.log.durable import log_exists
 from isiw.log.schema import RUN_KEY
 from isiw.session.loop import Session
@@ -24,7 +24,15 @@ from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import SimulatedSubject
 from isiw.types import Reference
 
-__all__ = ["device_for", "fresh_log_path", "require_device", "session_for", "simulated_device", "subject_for"]
+__all__ = [
+    "assumed_space",
+    "device_for",
+    "fresh_log_path",
+    "require_device",
+    "session_for",
+    "simulated_device",
+    "subject_for",
+]
 
 SESSIONS: Final = Path("isiw-sessions")
 """The folder for logs of sessions without a path."""
@@ -32,10 +40,17 @@ SESSIONS: Final = Path("isiw-sessions")
 
 def fresh_log_path(config: RunConfig) -> Path:
     """A path in the default folder at which there is no log yet."""
-    stem = f"{dt.datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}_seed{config.seed}"
+    stem = f"{now().astimezone():%Y-%m-%d_%H-%M-%S}_seed{config.seed}"
     names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
     paths = (SESSIONS / f"{name}.mcap" for name in names)
     return next(path for path in paths if not log_exists(path))
+
+
+def assumed_space(config: RunConfig) -> str | None:
+    """What to say where a new session has the design space that nobody has named; None where it has another."""
+    if config.space_named or config.device is not None:
+        return None
+    return f"No [space] is given, so ISIs are {config.space.design()}."
 
 
 def subject_for(config: RunConfig) -> SimulatedSubject:
@@ -111,14 +126,14 @@ def session_for(config: RunConfig) -> Session:
         config: the configuration.
 
     Raises:
-        ConfigError: no recordings, or no prior, where the configuration says, or recordings that would be ignored;
-            earlier sessions of another person, or sessions or a prior of another muscle or intensity, or simulated ones
-            where the device is real.
+        ConfigError: a device without a design space; no recordings, or no prior, where the configuration says, or
+            recordings that would be ignored; earlier sessions of another person, or sessions or a prior of another
+            muscle or intensity, or simulated ones where the device is real.
         LogError: an earlier session of the person that cannot be read, or has no accepted trial.
         StrategyError: a prior for a strategy that has none of this kind.
     """
     _require_used(config.subject)
-    space = config.space.design()
+    space = config.design()
     log = config.log or fresh_log_path(config)
     device = device_for(config)
     info = device.describe()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import itertools
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,6 +13,7 @@ import pandas as pd
 import isiw
 from isiw.checks import text, whole
 from isiw.errors import InvalidValueError
+from isiw.log.clock import now
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.production import PRODUCTION_VERSION, Block, Production, ProductionHeader
 from isiw.log.records import Records
@@ -101,7 +101,7 @@ def begin_log(
         raise InvalidValueError("a task needs at least one block", remedy="Take those of isiw.interval.session_blocks.")
     header = ProductionHeader(
         isiw_version=isiw.__version__,
-        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+        created=now().isoformat(timespec="seconds"),
         subject=text("subject", subject),
         seed=whole("seed", seed, least=0),
         blocks=blocks,

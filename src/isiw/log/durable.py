@@ -1,7 +1,7 @@
 """Files that survive a crash: synced, locked while they are written, and renamed in one step over nothing else.
 
-On Windows an open file can neither be renamed nor replaced, so files are let go of for that moment. On macOS a disk is
-asked to empty its cache, which `fsync` alone does not. These branches have been type-checked, and have not been run.
+On Windows an open file can neither be renamed nor replaced, so files are let go of for that moment. These branches have
+been type-checked, and have not been run.
 """
 
 from __future__ import annotations
@@ -11,18 +11,14 @@ import os
 import shutil
 import sys
 import tempfile
-import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
 from pathlib import Path
 from typing import IO, Final, NamedTuple, Self
 
 from isiw.errors import LogError
+from isiw.files import force, new_file, sync_folder, take_free_place
 from isiw.log.locks import lock
-
-if sys.platform == "darwin":
-    import fcntl
 
 __all__ = [
     "DurableFile",
@@ -35,9 +31,6 @@ __all__ = [
     "log_exists",
     "log_of",
     "part_of",
-    "put",
-    "sync_folder",
-    "take_free_place",
 ]
 
 
@@ -96,52 +89,6 @@ def kept_for(path: Path) -> Path | None:
     return path.with_name(name) if damaged and name and (number.isdecimal() or not number) else None
 
 
-def sync_folder(folder: Path) -> None:
-    """Make a rename in this folder durable; Windows does so by itself."""
-    if sys.platform == "win32":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        _force(handle)
-    finally:
-        os.close(handle)
-
-
-def _force(handle: int) -> None:
-    """Return when what was written is on the disk."""
-    if sys.platform == "darwin":
-        with suppress(OSError):  # not every file system can
-            fcntl.fcntl(handle, fcntl.F_FULLFSYNC)
-            return
-    os.fsync(handle)
-
-
-def take_free_place(file: Path, place: Path) -> None:
-    """Rename a file to a name that nothing has, in one step that replaces nothing.
-
-    Args:
-        file: the file.
-        place: its new name.
-
-    Raises:
-        FileExistsError: there is something of this name.
-    """
-    if sys.platform == "win32":
-        file.rename(place)  # which Windows itself refuses where the name is taken
-        return
-    try:
-        place.hardlink_to(file)
-    except FileExistsError:
-        raise
-    except OSError:  # a disk without hard links
-        if os.path.lexists(place):
-            raise FileExistsError(place) from None
-        file.rename(place)
-    else:
-        file.unlink()
-    sync_folder(place.parent)
-
-
 @contextmanager
 def disk_errors(path: Path, what: str, remedy: str) -> Iterator[None]:
     """Within, an error of the operating system becomes a LogError.
@@ -157,43 +104,6 @@ def disk_errors(path: Path, what: str, remedy: str) -> Iterator[None]:
         raise LogError(f"{what}: {error.strerror}", got=str(path), remedy=remedy) from error
 
 
-_writing = partial(
-    disk_errors,
-    what="the log cannot be written",
-    remedy="What was synced before is safe. Make room, then resume the session.",
-)
-
-
-def put(path: Path, content: bytes, *, replacing: bool, through: Path | None = None) -> None:
-    """Put a whole file in its place in one step, for good.
-
-    Args:
-        path: its place.
-        content: what is in it.
-        replacing: whether a file that is there is replaced.
-        through: where it is written first; by default under a name of its own, which is gone where this fails.
-
-    Raises:
-        FileExistsError: there is a file, which is not to be replaced.
-        OSError: it cannot be written.
-    """
-    beside = through or path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-    try:
-        with beside.open("wb") as file:
-            file.write(content)
-            file.flush()
-            _force(file.fileno())
-        if replacing:
-            beside.replace(path)
-            sync_folder(path.parent)
-        else:
-            take_free_place(beside, path)
-    except BaseException:
-        with suppress(OSError):
-            beside.unlink(missing_ok=True)
-        raise
-
-
 class DurableFile:
     """A new binary file that can be renamed while it is written.
 
@@ -201,16 +111,15 @@ class DurableFile:
         path: where it is; must not exist.
 
     Raises:
-        LogError: it exists, or cannot be created.
+        LogError: it cannot be locked.
+        OSError: there is something of its name, or it cannot be created.
     """
 
     def __init__(self, path: Path) -> None:
-        with disk_errors(path, "the log cannot be created", "Choose another path."):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.touch(exist_ok=False)
-            # Appending, so that a file that is shortened behind our back stays shorter than what was written.
-            self._file: IO[bytes] = path.open("a+b")
-        self.path, self._size = path, 0
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Appending, so that a file that is shortened behind our back stays shorter than what was written.
+        self._file = new_file(path)
+        self.path, self._size, self._synced = path, 0, False
         try:
             lock(self._file, path)
         except LogError:
@@ -225,7 +134,7 @@ class DurableFile:
 
     def write(self, data: bytes) -> int:
         """Append."""
-        with _writing(self.path):
+        with self._writing():
             written = self._file.write(data)
         self._size += written
         return written
@@ -236,14 +145,31 @@ class DurableFile:
 
     def flush(self) -> None:
         """Hand everything to the operating system."""
-        with _writing(self.path):
+        with self._writing():
             self._file.flush()
 
     def sync(self) -> None:
         """Make everything so far durable."""
-        with _writing(self.path):
+        with self._writing():
             self._file.flush()
-            _force(self._file.fileno())
+            force(self._file.fileno())
+        self._synced = True
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Within, an error of the disk says what is safe; before the first `sync` nothing is, and it stays as it is."""
+        try:
+            yield
+        except OSError as error:
+            if not self._synced:
+                raise
+            safe = "What was synced before is safe. Make room, then resume the session."
+            gone = "The file is gone, too. What can be saved of it is saved when the session ends."
+            raise LogError(
+                f"the log cannot be written: {error.strerror}",
+                got=str(self.path),
+                remedy=safe if os.path.lexists(self.path) else gone,
+            ) from error
 
     def displacement(self) -> str | None:
         """What has become of the file's name or size behind its back, in words; None where it is as it was synced."""
@@ -266,11 +192,13 @@ class DurableFile:
             wanted.parent.mkdir(parents=True, exist_ok=True)
             return self._copied(wanted.parent, wanted)
         except (OSError, LogError):
-            return self._copied(Path(tempfile.gettempdir()), wanted)
+            tried = "Its folder and the one for temporary files were tried."
+            with disk_errors(wanted, "what the session still held of the log cannot be saved", tried):
+                return self._copied(Path(tempfile.gettempdir()), wanted)
 
     def _copied(self, folder: Path, wanted: Path) -> Path:
         names = (folder / f"{wanted.stem}.rescued{number or ''}{wanted.suffix}" for number in itertools.count())
-        with begun(next(name for name in names if not name.exists())) as copy:
+        with begun(next(name for name in names if not os.path.lexists(name))) as copy:
             self._file.seek(0)
             shutil.copyfileobj(self._file, copy)
             copy.close()
@@ -311,7 +239,7 @@ class DurableFile:
         try:
             self.sync()
         finally:
-            with _writing(self.path):
+            with self._writing():
                 self._file.close()
 
     def abandon(self) -> None:
@@ -325,7 +253,8 @@ def begun(path: Path) -> Iterator[DurableFile]:
     """A new file that is removed if its first records fail; once it has taken another file's place, it stays.
 
     Raises:
-        LogError: it exists, or cannot be created.
+        LogError: it cannot be locked.
+        OSError: there is something of its name, or it cannot be created.
     """
     file = DurableFile(path)
     try:
@@ -344,7 +273,7 @@ def keep_damaged(damaged: Path, target: Path) -> None:
         target: the log that it is of.
     """
     names = (damaged_of(target, number) for number in itertools.count())
-    kept = next(name for name in names if not name.exists())
+    kept = next(name for name in names if not os.path.lexists(name))
     try:
         kept.hardlink_to(damaged)
     except OSError:  # a disk without hard links

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import tomli_w
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import LogError
-from isiw.log.schema import AnyHeader, Header
+from isiw.log.schema import AnyHeader, Header, with_reference
 from isiw.signals.limits import SignalLimits
 
 __all__ = ["as_toml", "first_fault", "header_in_parts"]
 
-_SPACE: Final[TypeAdapter[DesignSpace]] = TypeAdapter(DesignSpace)
+_SPACE: Final[TypeAdapter[DesignSpace]] = TypeAdapter(Annotated[DesignSpace, BeforeValidator(with_reference)])
 
 _STAND_INS: Final[Mapping[str, Callable[[Mapping[str, Any]], object]]] = {
     "isiw_version": lambda _: "not known",

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from isiw.errors import InvalidValueError
-from isiw.log.durable import put
+from isiw.files import in_the_way, is_reserved, opened, put
 
 __all__ = ["check_output", "is_log", "made_folder", "write_output"]
 
@@ -25,7 +25,8 @@ def write_output(path: str | Path, content: bytes, *, overwrite: bool = False) -
         overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: there is a file that is not to be replaced, or a folder, or no folder can be made for it.
+        InvalidValueError: there is a file that is not to be replaced, or something else, Windows keeps the name for
+            itself, or no folder can be made for it.
         OSError: it cannot be written.
     """
     target = Path(path)
@@ -48,14 +49,17 @@ def check_output(path: str | Path, *, overwrite: bool = False) -> None:
         overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: there is a file that is not to be replaced, or a folder.
+        InvalidValueError: there is a file that is not to be replaced, or something else, or Windows keeps the name for
+            itself.
         PermissionError: its folder is read-only.
     """
     target = Path(path)
     if target.parent.is_dir() and not os.access(target.parent, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))
-    if target.is_dir():
-        raise InvalidValueError("there is a folder of this name", got=str(target), remedy="Name a file.")
+    if is_reserved(target.name):
+        raise InvalidValueError("Windows keeps this name for itself", got=str(target), remedy="Choose another name.")
+    if (other := in_the_way(target)) is not None:
+        raise InvalidValueError(f"there is {other} of this name", got=str(target), remedy="Name a file.")
     if overwrite and is_log(target):
         raise InvalidValueError("a log is never overwritten", got=str(target), remedy="Choose another path.")
     if not overwrite and target.exists():
@@ -98,5 +102,5 @@ def is_log(path: Path) -> bool:
     """
     if not path.is_file():
         return False
-    with path.open("rb") as file:
+    with opened(path) as file:
         return file.read(len(_LOG)) == _LOG

@@ -16,6 +16,7 @@ from mcap.exceptions import EndOfFile
 from mcap.stream_reader import CRCValidationError, StreamReader
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.files import opened
 from isiw.log.blocks import UNREADABLE, LostBlockError, Unpacking, marked
 from isiw.log.durable import Fingerprint, disk_errors, log_of, part_of
 from isiw.log.index import RECORD_HEAD_BYTES, counted_records
@@ -157,7 +158,7 @@ def salvage_file(path: Path) -> Salvage:
     found = Salvage(path)
     with (
         disk_errors(path, "the log cannot be read", "Check its permissions and those of its folder."),
-        path.open("rb") as file,
+        opened(path) as file,
     ):
         found.fingerprint = Fingerprint.of(file)
         found.size = found.fingerprint.size

@@ -18,11 +18,12 @@ JSON knows no infinity: where a number is not finite it is one of the strings "I
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, field_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator
 
 from isiw.checks import mean_and_sd, number
 from isiw.design import DesignSpace
@@ -56,6 +57,7 @@ __all__ = [
     "StrategyRecipe",
     "ThresholdBelief",
     "Waveform",
+    "with_reference",
 ]
 
 SCHEMA_VERSION = 4
@@ -71,6 +73,10 @@ Number: TypeAlias = Annotated[float, WithJsonSchema({"type": ["number", "string"
 Numbers: TypeAlias = Annotated[
     tuple[float, ...], WithJsonSchema({"type": "array", "items": {"type": ["number", "string"]}})
 ]
+
+
+_KEY_IN_TEXT: Final = re.compile(r" \(key ([A-Za-z0-9_-]{1,64})\)$")
+"""How the text of a note ended before there was a field for its key."""
 
 
 class _Record(BaseModel):
@@ -110,6 +116,11 @@ SERVED_KEY: Final = "isiw_serve"
 own."""
 
 
+def with_reference(space: object) -> object:
+    """A logged space; where it says no reference, its ISIs count from the impact, which once was the default."""
+    return {"reference": "impact", **space} if isinstance(space, dict) else space
+
+
 class Header(_Record):
     """What a session is, written before anything else, and again before it goes on: the last one holds.
 
@@ -123,7 +134,7 @@ class Header(_Record):
     subject: str = ""
     seed: int
     strategy: StrategyRecipe
-    space: DesignSpace
+    space: Annotated[DesignSpace, BeforeValidator(with_reference)]
     limits: Limits
     device: DeviceInfo
     signals: SignalLimits
@@ -378,12 +389,22 @@ class Event(_Record):
     """Something that happened to a session.
 
     `trial` is the one that was judged by an operator, refused or answered late, and otherwise the last one before the
-    event. What is "refused" was not delivered, whatever the intent before it says.
+    event. What is "refused" was not delivered, whatever the intent before it says. A note with the `key` of an earlier
+    one is not logged; before there was this field, a note's text ended with it.
     """
 
     kind: EventKind
     trial: TrialNumber | None = None
     text: str = ""
+    key: str | None = None
+
+    @property
+    def idempotency_key(self) -> str | None:
+        """The key of a note, in logs old and new."""
+        if self.kind != "note" or "key" in self.model_fields_set:
+            return self.key
+        found = _KEY_IN_TEXT.search(self.text)
+        return found and found[1]
 
 
 AnyHeader: TypeAlias = Header | ProductionHeader

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -13,6 +12,8 @@ from typing import IO, Self, cast
 from mcap.writer import Writer
 
 from isiw.errors import LogError
+from isiw.files import in_the_way, is_reserved, sync_folder
+from isiw.log.clock import clock_ns, log_time_ns
 from isiw.log.durable import (
     DurableFile,
     Fingerprint,
@@ -21,7 +22,6 @@ from isiw.log.durable import (
     keep_damaged,
     log_of,
     part_of,
-    sync_folder,
 )
 from isiw.log.headers import as_toml
 from isiw.log.locks import claimed, refuse_if_locked
@@ -78,18 +78,18 @@ class LogWriter:
             header: what the session is.
 
         Raises:
-            LogError: there is one already, finished or not; it is never overwritten. Or it cannot have this name, or
-                the header cannot be written.
+            LogError: there is one already, finished or not; it is never overwritten. Or it cannot have this name, the
+                header cannot be written, or the computer's clock is wrong.
         """
         target = Path(path)
-        with disk_errors(target, "the log cannot be created", "Choose another path."):
+        with disk_errors(target, "the log cannot be created", "Make room, or choose another path."):
             _require_free(target)
-        with begun(part_of(target)) as file:
-            log = cls(target, file)
-            log.begin(header)
-            log.append(header)
-            log.sync()
-            sync_folder(target.parent)
+            with begun(part_of(target)) as file:
+                log = cls(target, file)
+                log.begin(header)
+                log.append(header)
+                log.sync()
+                sync_folder(target.parent)
         return log
 
     @classmethod
@@ -109,7 +109,7 @@ class LogWriter:
 
         Raises:
             LogError: it is still being written, or has changed since it was read, another session's file is at one of
-                its two names, or a header cannot be written.
+                its two names, a header cannot be written, or the computer's clock is wrong.
         """
         target = log_of(Path(path))
         with claimed(salvage.path) as source, disk_errors(target, "the log cannot go on", "It stays as it was."):
@@ -147,7 +147,7 @@ class LogWriter:
             configuration: the header as TOML, where there is one already.
 
         Raises:
-            LogError: something in the header is not a TOML value.
+            LogError: something in the header is not a TOML value, or the computer's clock is wrong.
         """
         self._header = header
         facts = {
@@ -158,7 +158,7 @@ class LogWriter:
             "created": header.created,
         }
         configuration = configuration or as_toml(header)
-        now_ns = time.time_ns()
+        now_ns = clock_ns()
         self._writer.add_metadata("session", facts)
         self._writer.add_attachment(now_ns, now_ns, CONFIGURATION, "application/toml", configuration)
 
@@ -177,7 +177,7 @@ class LogWriter:
         topic = topic_of(record, channel_name)
         data = encode(topic, record)
         with self._lock:
-            self._copy(Message(topic, data, time.time_ns()))
+            self._copy(Message(topic, data, log_time_ns()))
         if self.on_append is not None:
             self.on_append(record, channel_name)
 
@@ -306,11 +306,19 @@ class LogWriter:
 
 
 def _require_free(target: Path) -> None:
-    if target != log_of(target) or target.suffix == _COPYING or target.is_dir():
+    if target != log_of(target) or target.suffix == _COPYING:
         raise LogError(
             "a log cannot have this name", got=str(target), remedy="Name a file; .part is added while the session runs."
         )
+    if is_reserved(target.name):
+        raise LogError(
+            "a log cannot have this name, which Windows keeps for itself",
+            got=str(target),
+            remedy="Choose another name, without a full stop or a space at its end.",
+        )
     for existing in (target, part_of(target)):
+        if (other := in_the_way(existing)) is not None:
+            raise LogError(f"no log can be here: there is {other}", got=str(existing), remedy="Choose another path.")
         if existing.exists():
             raise LogError(
                 "there is a log already, and it is never overwritten",

@@ -23,7 +23,7 @@ _OF_TIMING: Final = frozenset(
 MOST_NAMED: Final = 8
 """Lost trials that are named one by one."""
 
-_ENDING: Final[frozenset[EventKind]] = frozenset({"limit", "fault", "pause", "doubt"})
+_ENDING: Final[frozenset[EventKind]] = frozenset({"limit", "refused", "fault", "pause", "doubt"})
 
 
 class Answer(NamedTuple):

@@ -56,7 +56,7 @@ MOST_OF_THE_RANGE = 0.9
 UNUSUAL = 0.9
 """Probability from which on a person is told to be unlike most."""
 
-_OF_THE_WINDOW = re.compile(r"^(?!The session is paused).*(window|F1|particles)")
+_OF_THE_WINDOW = re.compile(r"^(?!The session (is paused|was ended)).*(window|F1|particles)")
 """Reasons of a strategy to stop that say something about the window."""
 
 JUDGED_SINCE = "Trials were judged anew after this estimate; resume the session to have it with what counts now."

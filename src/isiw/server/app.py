@@ -60,11 +60,11 @@ def guarded(app: FastAPI, rules: Rules) -> None:
         app.add_exception_handler(kind, handler)
 
 
-def _refused(request: Request, error: Exception) -> Response:
+async def _refused(request: Request, error: Exception) -> Response:
     return answered(as_refusal(error), as_200=wants_200(request.url.query))
 
 
-def _invalid(request: Request, error: Exception) -> Response:
+async def _invalid(request: Request, error: Exception) -> Response:
     """A path, query or header that cannot be used."""
     found: ErrorDetails = error.errors()[0]  # type: ignore[attr-defined] # it is the RequestValidationError
     *_, field = found["loc"]
@@ -73,7 +73,7 @@ def _invalid(request: Request, error: Exception) -> Response:
     return answered(refusal, as_200=wants_200(request.url.query))
 
 
-def _unknown(request: Request, error: Exception) -> Response:
+async def _unknown(request: Request, error: Exception) -> Response:
     """No such route, or not by this method."""
     status, words = error.status_code, error.detail  # type: ignore[attr-defined] # it is the HTTPException
     refusal = Refusal(

@@ -204,9 +204,7 @@ class DrivenSession:
 
     def note(self, request: NoteRequest) -> None:
         """Log a remark; with a key that was used before, nothing."""
-        mark = f" (key {request.key})" if request.key else ""
-        if not (mark and any(note.endswith(mark) for note in self._notes)):
-            self._note(f"{request.text}{mark}")
+        self.recorder.note(request.text, key=request.key)
 
     def exclude(self, request: ExcludeRequest) -> None:
         """Let a trial not count; one that is excluded already stays so.
@@ -249,7 +247,8 @@ class DrivenSession:
         late = trial.reason is MistrialReason.OUTCOME_UNKNOWN
         text = f"An outcome of trial {number} came too late and is not used: {words}"
         if late and text not in self._notes:
-            self._note(text)
+            self.recorder.note(text)
+            self._notes.add(text)
         raise Refusal(
             409,
             "Late" if late else "OtherOutcome",
@@ -259,10 +258,6 @@ class DrivenSession:
             remedy="It stays as it is." + (" What came too late is in the log as a note." if late else ""),
             field="trial",
         )
-
-    def _note(self, text: str) -> None:
-        self.recorder.note(text)
-        self._notes.add(text)
 
     def _concluded(self) -> TrialAnswer:
         doubts = self._doubts.copy()

@@ -36,6 +36,10 @@ class Rules:
         open_paths: what is answered without the token, as it says nothing of any session.
         stranger_s: how long whoever shows no token waits for each answer [s]; so a foreign page that asks without a
             pause, over the few connections that a browser allows it, takes little of the processor.
+        head_s: how long a request's headers may take to arrive, from the connection or its last answer on [s].
+        most_strangers: how many connections may be open that have not shown the token.
+        most_known: how many may be open that have.
+        urgent_paths: what is answered to whoever shows the token, however many connections are open.
 
     Raises:
         InvalidValueError: a token that is too short, a limit that is not positive, or a negative wait.
@@ -47,11 +51,15 @@ class Rules:
     body_s: float = 10.0
     open_paths: frozenset[str] = frozenset()
     stranger_s: float = 0.05
+    head_s: float = 5.0
+    most_strangers: int = 100
+    most_known: int = 100
+    urgent_paths: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         check_texts(self, "token")
-        check_wholes(self, "most_bytes", least=1)
-        check_numbers(self, "body_s", above=0)
+        check_wholes(self, "most_bytes", "most_strangers", "most_known", least=1)
+        check_numbers(self, "body_s", "head_s", above=0)
         check_numbers(self, "stranger_s", least=0)
         if len(self.token) < SHORTEST_TOKEN or not self.token.isascii() or not self.token.isprintable():
             raise InvalidValueError(
@@ -59,6 +67,12 @@ class Rules:
                 expected=f"at least {SHORTEST_TOKEN} letters, digits and signs",
                 remedy="Leave it out, and the server makes one.",
             )
+
+    def shows_token(self, headers: Headers) -> bool:
+        """Whether a request carries the token."""
+        kind, _, given = headers.get("authorization", "").partition(" ")
+        same = hmac.compare_digest(given.strip().encode("latin-1", "replace"), self.token.encode())
+        return same and kind.lower() == "bearer"
 
 
 class Guard:
@@ -80,19 +94,20 @@ class Guard:
         headers = Headers(scope=scope)
         as_200 = wants_200(scope["query_string"].decode("latin-1"))
         try:
-            body = await self._body(headers, receive)
-        except Refusal as refusal:  # the rest of the body is not read
-            await answered(refusal, as_200=as_200, headers={"Connection": "close"})(scope, receive, send)
-            return
-        try:
             self._require_host(headers)
             if scope["path"] in self._rules.open_paths:
                 await asyncio.sleep(self._rules.stranger_s)
-            else:
-                self._require_token(headers)
+                await self._app(scope, receive, send)  # which reads no body
+                return
+            self._require_token(headers)
         except Refusal as refusal:
             await asyncio.sleep(self._rules.stranger_s)
             await answered(refusal, as_200=as_200)(scope, receive, send)
+            return
+        try:
+            body = await self._body(headers, receive)
+        except Refusal as refusal:  # the rest of the body is not read
+            await answered(refusal, as_200=as_200, headers={"Connection": "close"})(scope, receive, send)
             return
         first: Message = {"type": "http.request", "body": body, "more_body": False}
         await self._app(scope, _beginning_with(first, receive), send)
@@ -108,9 +123,7 @@ class Guard:
             raise Refusal(403, "ForeignOrigin", "pages from elsewhere may not use the server", got=origin)
 
     def _require_token(self, headers: Headers) -> None:
-        kind, _, given = headers.get("authorization", "").partition(" ")
-        same = hmac.compare_digest(given.strip().encode("latin-1", "replace"), self._rules.token.encode())
-        if kind.lower() != "bearer" or not same:
+        if not self._rules.shows_token(headers):
             raise Refusal(
                 401, "Unauthorized", "the request has no token, or not the server's",
                 expected="the header Authorization: Bearer TOKEN",

@@ -60,7 +60,10 @@ class CreateRequest(_Request):
     id: str = Field(pattern=NAME, description="Letters, digits, - and _; the log is ID.mcap.")
     seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of the strategy.")
     visit: VisitConfig = VisitConfig()
-    space: SpaceConfig = SpaceConfig()
+    space: SpaceConfig = Field(
+        default=SpaceConfig(reference="valve"),
+        description="Without it, ISIs count from the valve command, from 0 to 500 ms.",
+    )
     strategy: StrategyConfig = StrategyConfig()
     limits: LimitsConfig = LimitsConfig()
     protocol: VisitProtocol = VisitProtocol()
@@ -170,7 +173,10 @@ def _read(kind: type[_Kind], content_type: str, body: bytes) -> _Kind:
         request = kind.model_validate_json(body, strict=True)
     except ValidationError as error:
         raise _refused(kind, first_to_tell(error.errors())) from error
-    sent = json.loads(body)  # a request does not know which of its fields were sent
+    try:
+        sent = _parsed(body)  # a request does not know which of its fields were sent
+    except (ValueError, RecursionError) as error:
+        raise Refusal(400, "MalformedBody", f"the body cannot be read: {error}") from error
     require_units(sent)
     require_together(sent)
     return request
@@ -182,9 +188,8 @@ def _form_as_json(kind: type[BaseModel], body: bytes) -> bytes:
         pairs = parse_qsl(body.decode(), keep_blank_values=True, errors="strict", max_num_fields=MOST_FIELDS)
     except ValueError as error:
         raise Refusal(400, "MalformedBody", f"the form cannot be read: {error}") from error
-    if len(dict(pairs)) < len(pairs):
-        raise Refusal(400, "MalformedBody", "a field of the form is there twice", got=sorted(name for name, _ in pairs))
-    values = {name: value if _is_text(kind, name, value) else _value(value) for name, value in pairs}
+    fields = _once_each(pairs)
+    values = {name: value if _is_text(kind, name, value) else _value(value) for name, value in fields.items()}
     return json.dumps(values).encode(errors="replace")
 
 
@@ -195,9 +200,21 @@ def _is_text(kind: type[BaseModel], name: str, value: str) -> bool:
 
 def _value(text: str) -> Any:
     try:
-        return json.loads(text) if text else None
+        return _parsed(text) if text else None
     except (ValueError, RecursionError):
         return text
+
+
+def _parsed(text: str | bytes) -> Any:
+    return json.loads(text, object_pairs_hook=_once_each)
+
+
+def _once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    fields = dict(pairs)
+    if len(fields) < len(pairs):
+        names = sorted(name for name, _ in pairs)
+        raise Refusal(400, "MalformedBody", "a field is there twice", got=names)
+    return fields
 
 
 def _refused(kind: type[BaseModel], error: ErrorDetails) -> Refusal:

@@ -52,10 +52,10 @@ _drawing = threading.Lock()
 
 
 def _errors(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    return {status: {"model": ErrorAnswer} for status in (401, 403, 408, 413, 422, 500, *statuses)}
+    return {status: {"model": ErrorAnswer} for status in (401, 403, 408, 413, 422, 500, 503, *statuses)}
 
 
-def _status_of_errors(
+async def _status_of_errors(
     errors: Annotated[
         Literal["200"] | None,
         Query(description="Answer errors with status 200, for clients that cannot read the body of an error status."),
@@ -68,7 +68,7 @@ def _status_of_errors(
 router = APIRouter(dependencies=[Depends(_status_of_errors)])
 
 
-def _sessions(request: Request) -> Sessions:
+async def _sessions(request: Request) -> Sessions:
     sessions: Sessions = request.app.state.sessions
     return sessions
 
@@ -207,10 +207,12 @@ def picture(
 def progress(
     folder: Folder,
     name: Name,
-    last: Annotated[int, Header(alias="Last-Event-ID", description="The last trial that is known.")] = -1,
+    last: Annotated[
+        str, Header(alias="Last-Event-ID", pattern="^(-1|[0-9]{1,9})$", description="The last trial that is known.")
+    ] = "-1",
 ) -> StreamingResponse:
     """The trials of an open session as Server-Sent Events, until it is closed; each has the data that tell answers."""
-    return StreamingResponse(_followed(folder.opened(name), last), media_type="text/event-stream")
+    return StreamingResponse(_followed(folder.opened(name), int(last)), media_type="text/event-stream")
 
 
 async def _followed(session: DrivenSession, last: int) -> AsyncIterator[str]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import ipaddress
 import secrets
 import socket
+import ssl
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,14 +18,23 @@ from fastapi import FastAPI
 from isiw.checks import check_texts, check_wholes
 from isiw.errors import ConfigError
 from isiw.server.app import make_app
+from isiw.server.connections import Connections
 from isiw.server.guard import LOOPBACK, Rules
 
-__all__ = ["ServerSettings", "listening", "new_token", "serve", "settings_of"]
+__all__ = ["Server", "ServerSettings", "listening", "new_token", "serve", "settings_of"]
 
 PORT: Final = 8473
 
-_MOST_CONNECTIONS: Final = 200
 _LEAVING_S: Final = 2
+
+_AT_ONCE: Final = 10
+"""Connections that are accepted before those there are heard: fewer than would push each other out."""
+
+_SILENT_S: Final = 5
+"""How long a connection may wait outside that has sent nothing yet [s]."""
+
+_WAITING: Final = 2000
+"""Connections that wait for this."""
 
 
 def new_token() -> str:
@@ -82,6 +93,14 @@ class ServerSettings:
                 "the host is not an IP address", got=self.host, expected="an IP address of this computer, or localhost"
             ) from error
 
+    def tls(self) -> ssl.SSLContext | None:
+        """What connections are encrypted by; None without a certificate."""
+        if self.certificate is None:
+            return None
+        context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+        context.load_cert_chain(self.certificate, self.key)
+        return context
+
     def rules(self) -> Rules:
         """What is let through: under this computer's own names, and the address and names by which others ask."""
         others = {self.host, socket.gethostname().lower(), socket.getfqdn().lower()}
@@ -99,39 +118,52 @@ def serve(settings: ServerSettings, ready: Callable[[str], None]) -> None:
         ConfigError: the port is taken, or the address is not this computer's.
         InvalidValueError: the folder cannot be made.
     """
-    app = make_app(settings.folder, settings.rules())
+    rules = settings.rules()
+    app = make_app(settings.folder, rules)
     with listening(settings.address, settings.port) as listener:
         host, port, *_ = listener.getsockname()
         name = f"[{host}]" if settings.address.version == 6 else host
-        config = settings_of(app, settings.certificate, settings.key)
-        config.load()  # which reads certificate and key
+        server = Server(settings_of(app, rules, settings.tls()))
         ready(f"{'https' if settings.certificate else 'http'}://{name}:{port}")
-        uvicorn.Server(config).run(sockets=[listener])
+        gc.freeze()  # to look for garbage in all that the libraries have loaded holds up every answer for 0.3 s
+        try:
+            server.run(sockets=[listener])
+        finally:
+            gc.unfreeze()
+
+
+class Server(uvicorn.Server):
+    """uvicorn's server, which accepts a few connections at a time while many wait."""
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to serve; uvicorn lets as many wait as it accepts at a time."""
+        await super().startup(sockets)
+        for listener in sockets or ():
+            listener.listen(_WAITING)
 
 
 def settings_of(
-    app: FastAPI, certificate: Path | None = None, key: Path | None = None, *, log_level: str = "error"
+    app: FastAPI, rules: Rules, tls: ssl.SSLContext | None = None, *, log_level: str = "error"
 ) -> uvicorn.Config:
     """How uvicorn serves an application of isiw.
 
     Args:
         app: the application.
-        certificate: the file of a TLS certificate.
-        key: the file of its key.
+        rules: who may ask.
+        tls: what connections are encrypted by.
         log_level: from which level on uvicorn's own messages are printed.
     """
     return uvicorn.Config(
         app,
-        http="h11",
+        http=Connections(rules, tls),  # type: ignore[arg-type] # as much a maker of protocols as their class is
+        loop="asyncio",
         ws="none",
         log_level=log_level,
         access_log=False,
         server_header=False,
         proxy_headers=False,
-        limit_concurrency=_MOST_CONNECTIONS,
+        backlog=_AT_ONCE,
         timeout_graceful_shutdown=_LEAVING_S,
-        ssl_certfile=certificate,
-        ssl_keyfile=key,
     )
 
 
@@ -147,7 +179,7 @@ def listening(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int)
     """
     family = socket.AF_INET6 if address.version == 6 else socket.AF_INET
     try:
-        listener = socket.create_server((str(address), port), family=family, backlog=_MOST_CONNECTIONS)
+        listener = socket.create_server((str(address), port), family=family, backlog=_WAITING)
     except OSError as error:
         raise ConfigError(
             f"the server cannot listen: {error.strerror}",
@@ -155,4 +187,6 @@ def listening(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int)
             remedy="Choose another port; 0 takes any that is free.",
         ) from error
     listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # or each answer waits 40 ms for the one before
+    if hasattr(socket, "TCP_DEFER_ACCEPT"):  # Linux: who says nothing waits outside for a while
+        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_DEFER_ACCEPT, _SILENT_S)
     return listener

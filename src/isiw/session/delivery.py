@@ -71,7 +71,7 @@ class Delivery:
         except Exception as error:
             if trial is None or isinstance(error, _NOTHING_GIVEN):
                 trial = None
-                self.journal.log.append(Event(kind="refused", trial=stimulus.trial, text=told(error)))
+                self.journal.refusal("refused", error, stimulus.trial)
                 raise
             if not self.pausing.due:
                 raise
@@ -87,7 +87,7 @@ class Delivery:
         try:
             self.rig.check(stimulus)
         except NotDelivered as error:
-            self.journal.event("limit", told(error))
+            self.journal.refusal("limit", error)
             raise
 
     def _answer(self, stimulus: Stimulus) -> Answer:

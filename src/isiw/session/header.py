@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import importlib.metadata
 import os
 import platform
@@ -12,6 +11,7 @@ from typing import Any, get_args
 
 import isiw
 from isiw.errors import InvalidValueError
+from isiw.log.clock import now
 from isiw.log.durable import log_of
 from isiw.log.schema import Header, StrategyRecipe
 from isiw.strategy.strategy import Strategy
@@ -73,7 +73,7 @@ def header_with(recipe: StrategyRecipe, **details: Any) -> Header:
     """
     return Header(
         isiw_version=isiw.__version__,
-        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+        created=now().isoformat(timespec="seconds"),
         seed=recipe.seed,
         strategy=recipe,
         versions={name: version for name, version in versions().items() if name != "isiw"},

@@ -61,6 +61,7 @@ class Journal:
         self.begin_after(trials or TrialTable(), events)
         self.unconcluded: Trial | None = None
         self.overruled = False
+        self._refusal: Exception | None = None
         self._log: LogWriter | None = None
         self._lock = threading.RLock()
 
@@ -72,6 +73,7 @@ class Journal:
             events: what happened meanwhile.
         """
         self.trials, self._events = trials, list(events)
+        self._keys = {event.idempotency_key for event in self._events}
 
     @property
     def last_excluded(self) -> int | None:
@@ -123,17 +125,23 @@ class Journal:
         """
         self.log.append(Event(kind=kind, trial=self.last if trial is None else trial, text=text))
 
-    def note(self, text: str, trial: int | None = None) -> None:
-        """Put a remark on disk.
+    def note(self, text: str, trial: int | None = None, key: str | None = None) -> None:
+        """Put a remark on disk; with a key that a note has already, nothing.
 
         Args:
             text: anything.
             trial: which one it is about; None for the last one.
+            key: by which a note that is sent again is known.
 
         Raises:
-            InvalidValueError: it is no text.
+            InvalidValueError: it is no text, or the key is none.
         """
-        self.event("note", checks.text("a note", text), trial)
+        checks.text("a note", text)
+        checks.text("the key of a note", key or "")
+        with self._lock:
+            if key is None or key not in self._keys:
+                self.log.append(Event(kind="note", trial=self.last if trial is None else trial, text=text, key=key))
+                self._keys.add(key)
         self.log.sync()
 
     def judge(self, verdict: Callable[[TrialTable], Event]) -> None:
@@ -155,8 +163,21 @@ class Journal:
         while faults:
             self.event("fault", faults.popleft())
 
+    def refusal(self, kind: EventKind, error: Exception, trial: int | None = None) -> None:
+        """Write that a stimulus was refused; where that ends the session, it is not written again.
+
+        Args:
+            kind: of event.
+            error: why it was refused.
+            trial: which one; None for the last one.
+        """
+        self.event(kind, told(error), trial)
+        self._refusal = error
+
     def failure(self, error: BaseException) -> None:
         """Write what ends a session before its time."""
+        if error is self._refusal:
+            return
         kind: EventKind = "limit" if isinstance(error, LimitExceededError) else "fault"
         self.event(kind, "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else told(error))
 

@@ -29,16 +29,17 @@ class Judging(ABC):
         """All trials so far."""
         return self._journal.trials
 
-    def note(self, text: str) -> None:
-        """Log a remark.
+    def note(self, text: str, *, key: str | None = None) -> None:
+        """Log a remark; with a key that a note of this session has already, nothing.
 
         Args:
             text: anything.
+            key: of your choice, so that a note which is sent again is logged once.
 
         Raises:
-            InvalidValueError: it is no text, or the session is not open.
+            InvalidValueError: text or key is no text, or the session is not open.
         """
-        self._journal.note(text)
+        self._journal.note(text, key=key)
 
     @property
     def last_excluded(self) -> int | None:

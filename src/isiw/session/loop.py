@@ -30,7 +30,7 @@ from isiw.session.pausing import Pause, Pausing
 from isiw.session.progress import fitted, progress_row, show_legend, show_progress, standing
 from isiw.session.rig import Rig, require_matching
 from isiw.session.safeguards import Safeguards
-from isiw.session.steps import Steps, paused
+from isiw.session.steps import Steps, ended, paused
 from isiw.session.terminal import is_terminal, somebody_there
 from isiw.session.updates import SessionResult, SessionUpdate
 from isiw.session.watch import Watch
@@ -370,7 +370,7 @@ class Session(Judging):
         while decision is None or not decision.stop or self._journal.overruled:
             if self._pausing.due:
                 if (reason := self._pausing.until_decided()) is not None:
-                    return paused(reason)
+                    return ended(reason) if self._pausing.asking.over else paused(reason)
                 self._steps.delivery.watch = self._steps.delivery.watch.seen()
                 continue
             try:

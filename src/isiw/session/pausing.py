@@ -94,12 +94,10 @@ class Pausing:
         return reason
 
     def _goes_on(self, reason: str) -> bool:
+        if self.asking.over:
+            return False
         self.waiting = Pause(self.asking.next(), reason)
         try:
-            return (
-                not self.asking.over
-                and self._rig.interrupts.freely(self.decide, reason) is True
-                and not self.asking.over
-            )
+            return self._rig.interrupts.freely(self.decide, reason) is True and not self.asking.over
         finally:
             self.waiting = None

@@ -20,7 +20,7 @@ from isiw.trials import Stimulus, Trial
 from isiw.visit import Control
 from isiw.window import WindowEstimate
 
-__all__ = ["Steps", "paused"]
+__all__ = ["Steps", "ended", "paused"]
 
 _NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
 
@@ -28,6 +28,11 @@ _NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
 def paused(reason: str) -> StopDecision:
     """The decision that does not stop, of a session that waits for a person."""
     return StopDecision(stop=False, reason=f"The session is paused: {reason}")
+
+
+def ended(reason: str) -> StopDecision:
+    """The decision that does not stop, of a session that a person has ended."""
+    return StopDecision(stop=False, reason=f"The session was ended before its time: {reason}")
 
 
 class Steps:

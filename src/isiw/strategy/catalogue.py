@@ -157,7 +157,9 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
 
     Args:
         name: one of `list_strategies()`.
-        space: the ISIs that may be asked; by default what can be searched without an accelerometer.
+        space: the ISIs that may be asked; by default what can be searched without an accelerometer, 0 to 500 ms *after
+            the valve command*, as the strategy says when it is printed. Give `IMPACT_SPACE` where you count from the
+            impact.
         seed: seed of all randomness, not negative.
         **settings: what differs from what the name stands for, by key; `isiw strategies NAME` lists the keys.
 

@@ -124,6 +124,8 @@ class Strategy:
             )
         )
 
+    __repr__ = __str__  # in a notebook, too, somebody sees from which event its ISIs count
+
     def restarted(self) -> Strategy:
         """The same strategy before its first trial."""
         return Strategy(

@@ -39,6 +39,7 @@ __all__ = [
     "Study",
     "StudyStrategy",
     "Unit",
+    "begun_study",
     "load_study",
     "run_unit",
     "study_from",
@@ -55,6 +56,9 @@ _MOST_SESSIONS: Final = 1_000_000
 
 Engine: TypeAlias = Literal["single", "batched"]
 HitDelay: TypeAlias = Literal["unstated", "stated"]
+
+_OF_THE_FOLDER: Final = frozenset({"checksum", "versions"})
+"""What a folder of results says besides its study."""
 
 _SPACES: Final[Mapping[str, DesignSpace]] = {"valve": VALVE_SPACE, "impact": IMPACT_SPACE}
 
@@ -275,8 +279,25 @@ def load_study(path: str | Path) -> Study:
     whole = Path(path).is_dir()
     path = Path(path) / "study.toml" if whole else path
     values = read_toml(path)
-    began = [values.pop(of_the_folder, None) for of_the_folder in ("checksum", "versions")]
-    return study_from(values, str(path), None if whole or any(began) else Path(path).resolve().parent)
+    if whole or _OF_THE_FOLDER & values.keys():
+        return begun_study(values, str(path))
+    return study_from(values, str(path), Path(path).resolve().parent)
+
+
+def begun_study(values: Mapping[str, Any], source: str) -> Study:
+    """The study of a folder of results; a table of its space without a reference once counted from the impact.
+
+    Args:
+        values: as its TOML file has them.
+        source: where they are from, for the message.
+
+    Raises:
+        ConfigError: an unknown key or a bad value.
+    """
+    plain = {key: value for key, value in values.items() if key not in _OF_THE_FOLDER}
+    if isinstance(plain.get("space"), dict):
+        plain["space"] = {"reference": "impact", **plain["space"]}
+    return study_from(plain, source)
 
 
 def _several(values: Any) -> tuple[Any, ...]:

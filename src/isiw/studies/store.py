@@ -6,9 +6,8 @@
 
 Each file is written beside its place, synced, and renamed into it by the process that runs the study, so that a file
 is whole or not there; its name holds the CRC-32 of its bytes, which tells whether it was damaged later. A part holds
-the checksum of its study, so that no other study takes its rows for its own. What is left over of a write that was
-cut off is written over when the unit is run again. One process at a time runs a study: while it does, it has
-`study.toml` locked.
+the checksum of its study, so that no other study takes its rows for its own. One process at a time runs a study: while
+it does, it has `study.toml` locked, and it begins by removing what is left over of writes that were cut off.
 """
 
 from __future__ import annotations
@@ -31,11 +30,11 @@ import torch
 
 import isiw
 from isiw.errors import StudyError
-from isiw.log.durable import put
+from isiw.files import TEMPORARY, opened, put
 from isiw.log.locks import claim
 from isiw.studies.code import code_checksum
 from isiw.studies.execution import Failure
-from isiw.studies.plan import Study, Unit, study_from, study_values
+from isiw.studies.plan import Study, Unit, begun_study, study_values
 from isiw.text.commands import command
 from isiw.text.toml_files import read_toml
 
@@ -101,6 +100,9 @@ class Store:
                     got=str(self.folder),
                     remedy="Wait for it, or run the study in another folder.",
                 )
+            for unfinished in (f"*/{TEMPORARY}*", "*/*.part"):  # the latter of earlier versions
+                for left_over in self.folder.glob(unfinished):
+                    left_over.unlink()
             yield
 
     def rows(self) -> pd.DataFrame:
@@ -189,8 +191,7 @@ def open_store(folder: str | Path) -> Store:
     """
     path = Path(folder) / "study.toml"
     values = read_toml(path)
-    checksum = values.pop("checksum", None)
-    made_with = values.pop("versions", {}).get("isiw")
+    made_with = values.get("versions", {}).get("isiw")
     if made_with != isiw.__version__:
         raise StudyError(
             f"{folder} was made with another version of isiw",
@@ -198,8 +199,8 @@ def open_store(folder: str | Path) -> Store:
             expected=isiw.__version__,
             remedy="Use that version, or begin in another folder.",
         )
-    study = study_from(values, str(path))
-    if checksum not in {None, _state(study_values(study))}:
+    study = begun_study(values, str(path))
+    if values.get("checksum") not in {None, _state(study_values(study))}:
         raise StudyError(
             f"{path} was changed since its sessions were run",
             remedy="Undo the change, or run the changed study in another folder.",
@@ -277,7 +278,8 @@ def _table(paths: Iterable[Path], order: Sequence[str], state: str) -> pd.DataFr
 
 def _read(path: Path, state: str) -> pa.Table:
     try:
-        content = path.read_bytes()
+        with opened(path) as file:
+            content = file.read()
         if path.suffixes[-2:-1] != [f".{_checksum(content)}"]:
             raise pa.ArrowInvalid("its checksum fails")
         part = pq.read_table(pa.BufferReader(content))
@@ -302,7 +304,7 @@ def _write(folder: Path, key: str, rows: pd.DataFrame, state: str) -> Path:
     pq.write_table(part.replace_schema_metadata({**(part.schema.metadata or {}), _OF_STUDY: state}), sink)
     content = sink.getvalue().to_pybytes()
     path = folder / f"{key}.{_checksum(content)}.parquet"
-    put(path, content, replacing=True, through=folder / f"{key}.part")
+    put(path, content, replacing=True)
     return path
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 import isiw
+from hostile import IN_THE_WAY, at_once
 from isiw.config import load_config, session_for
 from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
 from isiw.session.updates import SessionResult
@@ -332,8 +333,51 @@ def test_settings_that_make_no_sense_are_refused(tmp_path: Path, changed: dict[s
 
 def test_a_misspelt_setting_is_told(tmp_path: Path) -> None:
     config = tmp_path / "session.toml"
-    config.write_text(
-        f'[device]\nfactory = "isiw:FolderDevice"\n[device.settings]\nfolder = "{tmp_path}"\ninf = {{}}\n'
-    )
+    device = f'[device]\nfactory = "isiw:FolderDevice"\n[device.settings]\nfolder = "{tmp_path}"\ninf = {{}}\n'
+    config.write_text(f'{device}[space]\nreference = "impact"\n')
     with pytest.raises(ConfigError, match=r"do not fit the function.*inf"):
         session_for(load_config(config))
+
+
+def test_no_request_is_written_through_a_link_whatever_its_name(tmp_path: Path) -> None:
+    victim, place = tmp_path / "victim.toml", tmp_path / "shared"
+    place.mkdir()
+    victim.write_text("precious")
+    for name in ("request.txt.new", "request.txt"):
+        (place / name).symlink_to(victim)
+    with pytest.raises(DeviceError):
+        device(place, stage_timeout_s=0.1, stop_timeout_s=0.1).stage()
+    assert victim.read_text() == "precious"
+    assert not (place / "request.txt").is_symlink()
+    assert sorted(path.name for path in place.iterdir()) == ["request.txt", "request.txt.new"]
+
+
+@pytest.mark.parametrize("kind", IN_THE_WAY)
+def test_what_is_no_file_in_the_place_of_an_answer_is_not_waited_for(tmp_path: Path, kind: str) -> None:
+    made = device(tmp_path, stage_timeout_s=0.5, stop_timeout_s=0.1)
+
+    def answer() -> None:
+        wait_for((tmp_path / "request.txt").exists)
+        IN_THE_WAY[kind](tmp_path / request_in(tmp_path)["answer"])
+
+    hostile = threading.Thread(target=answer)
+    hostile.start()
+    with pytest.raises(DeviceError):
+        at_once(made.stage)
+    hostile.join()
+
+
+def test_an_answer_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
+    made = device(tmp_path, stage_timeout_s=2.0, stop_timeout_s=0.1)
+    (tmp_path / "secret").write_text("password=1234\nend\n")
+
+    def answer() -> None:
+        wait_for((tmp_path / "request.txt").exists)
+        (tmp_path / request_in(tmp_path)["answer"]).symlink_to(tmp_path / "secret")
+
+    hostile = threading.Thread(target=answer)
+    hostile.start()
+    with pytest.raises(DeviceError, match="cannot be read") as raised:
+        made.stage()
+    hostile.join()
+    assert "password" not in str(raised.value)

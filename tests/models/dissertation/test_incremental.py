@@ -135,9 +135,9 @@ def test_a_strategy_steps_by_5_ms_after_twelve_trials_whatever_the_range(space: 
 
 
 def test_in_a_coarser_space_each_of_its_isis_has_twelve_trials() -> None:
-    plan = SweepModel().begin(DesignSpace(0, 100, step_ms=10), 0).proposed_isis_ms()[0].tolist()
+    plan = SweepModel().begin(DesignSpace(0, 100, step_ms=10, reference="impact"), 0).proposed_isis_ms()[0].tolist()
     assert plan == [isi_ms for isi_ms in range(0, 101, 10) for _ in range(12)]
-    finer = SweepModel().begin(DesignSpace(0, 30, step_ms=2), 0).proposed_isis_ms()[0].tolist()
+    finer = SweepModel().begin(DesignSpace(0, 30, step_ms=2, reference="impact"), 0).proposed_isis_ms()[0].tolist()
     assert finer[::12] == [0.0, 6.0, 12.0, 18.0, 24.0, 30.0]
 
 

@@ -203,7 +203,7 @@ def test_one_gaussian_needs_no_second_amplitude() -> None:
 
 @pytest.mark.parametrize("high_ms", [5.0, 20.0, 50.0])
 def test_two_gaussians_are_fitted_in_a_range_that_is_narrower_than_a_window(high_ms: Any) -> None:
-    space, rng = DesignSpace(0, high_ms, 1.0), np.random.default_rng(2)
+    space, rng = DesignSpace(0, high_ms, 1.0, reference="impact"), np.random.default_rng(2)
     isi_ms = np.linspace(0, high_ms, 12)
     mep_mv = 0.01 + 0.05 * np.exp(-0.5 * ((isi_ms - high_ms / 2) / 5) ** 2) + 0.002 * rng.standard_normal(12)
     curve = NonlinearRegression(peaks=2).fit(isi_ms, mep_mv, space, rng)

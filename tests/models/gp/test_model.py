@@ -89,7 +89,7 @@ def test_it_conforms(changed: dict[str, Any]) -> None:
 
 
 def test_it_conforms_from_the_impact_and_in_a_narrow_space() -> None:
-    for space in (IMPACT_SPACE, DesignSpace(20, 60)):
+    for space in (IMPACT_SPACE, DesignSpace(20, 60, reference="impact")):
         check_model(lambda: FEW, space)
 
 

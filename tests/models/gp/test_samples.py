@@ -17,7 +17,7 @@ from isiw.models.shared.history import PersonTrials
 from isiw.window import Window, window_from_excess
 from known import known
 
-SPACE = DesignSpace(0, 320)
+SPACE = DesignSpace(0, 320, reference="impact")
 GRID_MS = torch.tensor(SPACE.grid_ms)
 PATH_ISIS_MS = torch.linspace(0, 320, 81, dtype=torch.float64)
 

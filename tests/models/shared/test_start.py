@@ -61,7 +61,9 @@ def test_where_no_start_is_expected_all_are_as_likely() -> None:
 
 
 def test_a_range_with_a_part_of_the_usual_starts_has_only_their_share_of_them() -> None:
-    space = DesignSpace(165, 365)  # of the usual starts, 0 to 115 ms, its 100 ms margin holds 50 / 115
+    space = DesignSpace(
+        165, 365, reference="impact"
+    )  # of the usual starts, 0 to 115 ms, its 100 ms margin holds 50 / 115
     start = starts_ms(StartPrior(USUAL, p_anywhere=0.5), space)
     usual = 0.5 * 50 / 115
     in_margin = (usual + 0.5 * 50 / 300) / (usual + 0.5)

@@ -8,7 +8,6 @@ other answer ever has. Both are lines of `key=value` and then a line `end`, whic
 from __future__ import annotations
 
 import io
-import os
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -23,6 +22,7 @@ from isiw.devices.protocol import Answer, DeviceInfo
 from isiw.devices.transports.exchange import Exchange, Request, Verb, described
 from isiw.devices.transports.reply import LONGEST_REPLY, Reply
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError
+from isiw.files import opened, written_beside
 from isiw.trials import Channel, Measurement, Stimulus, Sweep
 from isiw.types import FloatArray
 
@@ -157,7 +157,7 @@ def _waveforms(path: Path, columns: int) -> FloatArray:
 def _text(path: Path, largest: int) -> str | None:
     """The text of a file; None where there is none, or where it is just being written."""
     try:
-        with path.open("rb") as file:
+        with opened(path, links=False) as file:
             content = file.read(largest + 1)
     except (FileNotFoundError, PermissionError):  # Windows denies access to a file that is being renamed or written
         return None
@@ -203,20 +203,20 @@ class _Folder:
             ) from error
 
     def _put(self, text: str, until_s: float) -> None:
-        beside = self._place / f"{REQUEST}.new"
-        with beside.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        while True:
-            try:
-                beside.replace(self._place / REQUEST)
-            except PermissionError:  # on Windows, while the other side has it open
-                if time.monotonic() > until_s:
-                    raise
-                time.sleep(self._poll_s)
-            else:
-                return
+        beside = written_beside(self._place / REQUEST, text.encode())
+        try:
+            while True:
+                try:
+                    beside.replace(self._place / REQUEST)
+                except PermissionError:  # on Windows, while the other side has it open
+                    if time.monotonic() > until_s:
+                        raise
+                    time.sleep(self._poll_s)
+                else:
+                    return
+        except OSError:
+            _remove(beside)
+            raise
 
     def reply(self, request: Request, wait_s: float) -> Reply | None:
         """The answer to a request, where it is there and whole."""

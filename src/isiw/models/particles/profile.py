@@ -159,7 +159,7 @@ class ProfilePrior:
                 "ISIs after an electrical pulse count from the pulse, and there is no valve command",
                 got=f'reference "{space.reference}"',
                 expected='reference "impact", which is the pulse here',
-                remedy='Make the space with isiw.DesignSpace(0, 100), or set reference = "impact" under [space].',
+                remedy='Set reference="impact" in isiw.DesignSpace, or reference = "impact" under [space].',
             )
         delay_ms = self.start.hit_delay_ms
         if delay_ms is not None and space.reference == "valve" and delay_ms[0] > space.high_ms:

@@ -8,16 +8,15 @@ import threading
 from types import TracebackType
 from typing import Final, Self
 
-import uvicorn
 from fastapi import FastAPI
 
 import isiw
 from isiw.checks import whole
 from isiw.server.app import guarded
 from isiw.server.guard import Rules
-from isiw.server.live.routes import FILES, router
+from isiw.server.live.routes import FILES, URGENT, router
 from isiw.server.live.view import View
-from isiw.server.serving import listening, new_token, settings_of
+from isiw.server.serving import Server, listening, new_token, settings_of
 from isiw.session.loop import Session
 
 __all__ = ["LivePage", "make_live_app", "watch"]
@@ -26,18 +25,18 @@ _ADDRESS: Final = ipaddress.IPv4Address("127.0.0.1")
 _LEAVING_S: Final = 5.0
 
 
-def make_live_app(session: Session, view: View, token: str) -> FastAPI:
+def make_live_app(session: Session, view: View, rules: Rules) -> FastAPI:
     """The application that serves a session's page.
 
     Args:
         session: the session.
         view: what is shown of it.
-        token: what updates and buttons must carry.
+        rules: who may look on and press its buttons.
     """
     app = FastAPI(title="isiw", version=isiw.__version__, docs_url=None, redoc_url=None, openapi_url=None)
     app.state.session, app.state.view = session, view
     app.include_router(router)
-    guarded(app, Rules(token, open_paths=frozenset(FILES)))
+    guarded(app, rules)
     return app
 
 
@@ -51,11 +50,12 @@ class LivePage:
 
     def __init__(self, session: Session, port: int) -> None:
         self._view, token = View(session), new_token()
-        app = make_live_app(session, self._view, token)
-        config = settings_of(app, log_level="critical")  # the screen is the operator's
+        rules = Rules(token, open_paths=frozenset(FILES), urgent_paths=URGENT)
+        app = make_live_app(session, self._view, rules)
+        config = settings_of(app, rules, log_level="critical")  # the screen is the operator's
         self._listener = listening(_ADDRESS, port)
         self.url = f"http://{_ADDRESS}:{self._listener.getsockname()[1]}/#{token}"
-        self._server = uvicorn.Server(config)
+        self._server = Server(config)
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="isiw live page", daemon=True)
         session.follow(self._view)
         self._thread.start()

@@ -20,7 +20,7 @@ from isiw.server.refusals import Refusal
 from isiw.server.requests import ExcludeRequest, GoOnRequest, IncludeRequest, NoteRequest, body_of
 from isiw.session.loop import Session
 
-__all__ = ["FILES", "file_of", "router"]
+__all__ = ["FILES", "URGENT", "file_of", "router"]
 
 GLANCE_S, MOST_S = 0.05, 0.5
 """How often is looked for news, and how long at most where none is put together for a while [s]."""
@@ -39,6 +39,9 @@ FILES: Final = {
     "/plotly.js": ("text/javascript", get_plotlyjs),
 }
 """What says nothing of the session: the files of the page, by path, with their type."""
+
+URGENT: Final = frozenset({"/pause", "/stop"})
+"""What is answered however much there is to do."""
 
 _POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; connect-src 'self'; "
@@ -93,19 +96,19 @@ for _path in FILES:
     router.get(_path)(_serving(_path))
 
 
-def _view(request: Request) -> View:
+async def _view(request: Request) -> View:
     view: View = request.app.state.view
     return view
 
 
-def _session(request: Request) -> Session:
+async def _session(request: Request, view: Annotated[View, Depends(_view)]) -> Session:
     """The session, while it runs.
 
     Raises:
         Refusal: it does not.
     """
     session: Session = request.app.state.session
-    _view(request).seen()
+    view.seen()
     if not session.running:
         raise Refusal(409, "NotRunning", "the session is not running", remedy="Nothing was done.")
     return session
@@ -141,9 +144,9 @@ async def _followed(view: View) -> AsyncIterator[str]:
 
 
 @router.post("/pause")
-def pause(session: Running) -> OkAnswer:
+async def pause(session: Running) -> OkAnswer:
     """Disarm now, and pause."""
-    session.pause(f"Paused {BY_PAGE}.")
+    await asyncio.to_thread(session.pause, f"Paused {BY_PAGE}.")  # threads that other calls cannot all be holding
     return OkAnswer()
 
 
@@ -160,9 +163,9 @@ def resume(session: Running, body: Annotated[GoOnRequest, Depends(body_of(GoOnRe
 
 
 @router.post("/stop")
-def stop(session: Running) -> OkAnswer:
+async def stop(session: Running) -> OkAnswer:
     """Disarm now, and end the session, which can be resumed later."""
-    session.end(f"Ended {BY_PAGE}.")
+    await asyncio.to_thread(session.end, f"Ended {BY_PAGE}.")
     return OkAnswer()
 
 
@@ -183,5 +186,5 @@ def include(session: Running, body: Annotated[IncludeRequest, Depends(body_of(In
 @router.post("/note")
 def note(session: Running, body: Annotated[NoteRequest, Depends(body_of(NoteRequest))]) -> OkAnswer:
     """Log a remark."""
-    session.note(body.text)
+    session.note(body.text, key=body.key)
     return OkAnswer()

@@ -1,0 +1,195 @@
+"""Creates, replaces and opens files in folders that others can write to: whole, synced, and through no link.
+
+A file is written under a new random name, and takes its place in one step. What is opened to be read is a regular file,
+since a pipe in its place would keep isiw waiting for ever.
+
+On Windows the names of devices are refused. On macOS a disk is asked to empty its cache, which `fsync` alone does not.
+These branches have been type-checked, and have not been run.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import stat
+import sys
+import uuid
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Final
+
+if sys.platform == "darwin":
+    import fcntl
+
+__all__ = [
+    "TEMPORARY",
+    "force",
+    "in_the_way",
+    "is_reserved",
+    "new_file",
+    "opened",
+    "put",
+    "sync_folder",
+    "take_free_place",
+    "written_beside",
+]
+
+TEMPORARY: Final = ".isiw-"
+"""What the name of a file begins with until it takes its place; a process that is killed may leave it behind."""
+
+_RESERVED: Final = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])\s*([.:].*)?", re.IGNORECASE)
+_KINDS: Final = {
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFDIR: "a folder",
+}
+
+
+def is_reserved(name: str) -> bool:
+    """Whether Windows takes a file's name for a device, or for another name: `CON`, `aux.mcap`, `log.`."""
+    return bool(_RESERVED.fullmatch(name)) or name.endswith((".", " "))
+
+
+def in_the_way(path: Path) -> str | None:
+    """What has a file's name and is no file, in words; None where there is a file, or nothing.
+
+    Raises:
+        OSError: its folder may not be read.
+    """
+    try:
+        mode = path.stat().st_mode
+    except OSError as error:
+        if path.is_symlink():
+            return "a link that leads nowhere"
+        if isinstance(error, FileNotFoundError | NotADirectoryError):
+            return None
+        raise
+    return None if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "something else")
+
+
+def opened(path: Path, *, links: bool = True) -> IO[bytes]:
+    """A regular file, open for reading.
+
+    Args:
+        path: the file.
+        links: whether it may be a link to one.
+
+    Raises:
+        OSError: it cannot be opened, or is no regular file.
+    """
+    without_waiting = getattr(os, "O_NONBLOCK", 0) | (0 if links else getattr(os, "O_NOFOLLOW", 0))
+    file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | without_waiting))  # noqa: SIM115 - pathlib has no opener; the caller closes it
+    if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        return file
+    file.close()
+    raise OSError(errno.EINVAL, "it is no regular file", str(path))
+
+
+def new_file(path: Path) -> IO[bytes]:
+    """A file that was not there, open for reading and appending.
+
+    Raises:
+        FileExistsError: there is something of this name, be it a link that leads nowhere.
+        OSError: it cannot be made.
+    """
+    return open(path, "a+b", opener=lambda name, flags: os.open(name, flags | os.O_EXCL, 0o666))
+
+
+def written_beside(path: Path, content: bytes) -> Path:
+    """A new file beside a path, under a random name; synced.
+
+    Args:
+        path: the path.
+        content: what is in it.
+
+    Raises:
+        OSError: it cannot be written, and is gone.
+    """
+    beside = path.with_name(f"{TEMPORARY}{uuid.uuid4().hex}")
+    with new_file(beside) as file:
+        try:
+            file.write(content)
+            file.flush()
+            force(file.fileno())
+        except BaseException:
+            _removed(beside)
+            raise
+    return beside
+
+
+def put(path: Path, content: bytes, *, replacing: bool) -> None:
+    """Put a whole file in its place in one step, for good.
+
+    Args:
+        path: its place.
+        content: what is in it.
+        replacing: whether a file or a link that is there is replaced.
+
+    Raises:
+        FileExistsError: there is a file, which is not to be replaced.
+        OSError: it cannot be written.
+    """
+    beside = written_beside(path, content)
+    try:
+        if replacing:
+            beside.replace(path)
+            sync_folder(path.parent)
+        else:
+            take_free_place(beside, path)
+    except BaseException:
+        _removed(beside)
+        raise
+
+
+def _removed(file: Path) -> None:
+    with suppress(OSError):
+        file.unlink(missing_ok=True)
+
+
+def take_free_place(file: Path, place: Path) -> None:
+    """Rename a file to a name that nothing has, in one step that replaces nothing.
+
+    Args:
+        file: the file.
+        place: its new name.
+
+    Raises:
+        FileExistsError: there is something of this name.
+    """
+    if sys.platform == "win32":
+        file.rename(place)  # which Windows itself refuses where the name is taken
+        return
+    try:
+        place.hardlink_to(file)
+    except FileExistsError:
+        raise
+    except OSError:  # a disk without hard links
+        if os.path.lexists(place):
+            raise FileExistsError(place) from None
+        file.rename(place)
+    else:
+        file.unlink()
+    sync_folder(place.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make a rename in this folder durable; Windows does so by itself."""
+    if sys.platform == "win32":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        force(handle)
+    finally:
+        os.close(handle)
+
+
+def force(handle: int) -> None:
+    """Return when what was written is on the disk."""
+    if sys.platform == "darwin":
+        with suppress(OSError):  # not every file system can
+            fcntl.fcntl(handle, fcntl.F_FULLFSYNC)
+            return
+    os.fsync(handle)
