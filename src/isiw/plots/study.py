@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final, Literal, TypeAlias
@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from isiw.checks import choice
 from isiw.plots.style import FAINT, INK, explain, save_figure, saying, strategy_colours, tidied
@@ -58,26 +59,33 @@ def study_figure(table: pd.DataFrame, picture: StudyPicture = "f1") -> Figure:
     draw_panel = STUDY_PICTURES[choice("the picture of a study", picture, STUDY_PICTURES)]
     played = table[table["people"] > 0]
     colours = strategy_colours(sorted(played["strategy"].unique()))
+    cohorts = played["cohort"].unique()
     apart = picture == "f1" and len(colours) > _MOST_IN_A_PANEL
-    wanted = [(cohort, name) for cohort in played["cohort"].unique() for name in (colours if apart else [None])]
-    columns = min(_COLUMNS, max(1, len(colours) if apart else len(wanted)))
-    lines = max(1, -(-len(wanted) // columns))
-    figure = Figure(figsize=(0.8 + 3.2 * columns, 1.2 + 2.7 * lines), layout="constrained")
-    panels = list(figure.subplots(lines, columns, squeeze=False, sharey=True).flat)
-    for axes, (cohort, name) in zip(panels, wanted, strict=False):
-        tidied(axes)
-        of_cohort = played[played["cohort"] == cohort].sort_values("trial")
-        curves = {each: of_cohort[of_cohort["strategy"] == each] for each in colours}
-        if name is None:
-            draw_panel(axes, curves, colours)
-        else:
-            _draw_f1_of(axes, curves, name, colours[name])
-        axes.set_title(cohort if name is None else f"{cohort}: {name}", fontsize=10, loc="left", color=INK)
-        axes.set_xlim(left=0)
-    for axes in panels[len(wanted) :]:
+    columns = len(colours) if apart else min(_COLUMNS, max(1, len(cohorts)))
+    lines = max(1, len(cohorts) if apart else -(-len(cohorts) // columns))
+    width, height = (1.8, 1.8) if apart else (3.2, 2.7)
+    figure = Figure(figsize=(0.8 + width * columns, 1.2 + height * lines), layout="constrained")
+    panels = figure.subplots(lines, columns, squeeze=False, sharey=True)
+    for axes in panels.flat[len(cohorts) * (len(colours) if apart else 1) :]:
         axes.set_visible(False)
+    for number, cohort in enumerate(cohorts):
+        of_cohort = played[played["cohort"] == cohort].sort_values("trial")
+        curves = {name: of_cohort[of_cohort["strategy"] == name] for name in colours}
+        if apart:
+            _draw_apart(panels[number], cohort, curves, colours)
+        else:
+            axes = panels.flat[number]
+            draw_panel(axes, curves, colours)
+            _title(axes, cohort)
     explain(figure, ncols=2 * columns)
     return figure
+
+
+def _title(axes: Axes, title: str) -> None:
+    tidied(axes)
+    axes.set_title(title, fontsize=10, loc="left", color=INK)
+    axes.set_xlim(left=0)
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=5, integer=True))
 
 
 _Curves: TypeAlias = Mapping[str, pd.DataFrame]
@@ -91,14 +99,15 @@ def _draw_f1(axes: Axes, curves: _Curves, colours: _Colours) -> None:
     _name_f1_axes(axes)
 
 
-def _draw_f1_of(axes: Axes, curves: _Curves, name: str, colour: str) -> None:
-    """One strategy with its band, before the means of the others."""
-    for other, curve in curves.items():
-        if other != name:
-            shown = _from_first_estimate(curve)
-            axes.plot(shown["trial"], shown["f1"], color=FAINT, lw=0.8, label="the other strategies")
-    draw_curve(axes, curves[name], name, colour)
-    _name_f1_axes(axes)
+def _draw_apart(row: Sequence[Axes], cohort: str, curves: _Curves, colours: _Colours) -> None:
+    """A panel a strategy: its mean with its band, before the means of the others."""
+    for axes, name in zip(row, curves, strict=True):
+        for curve in (_from_first_estimate(curve) for other, curve in curves.items() if other != name):
+            axes.plot(curve["trial"], curve["f1"], color=FAINT, lw=0.8, label="the other strategies")
+        draw_curve(axes, curves[name], name, colours[name])
+        _name_f1_axes(axes)
+        _title(axes, f"{cohort}: {name}" if axes is row[0] else name)
+        axes.label_outer()
 
 
 def _name_f1_axes(axes: Axes) -> None:

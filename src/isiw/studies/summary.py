@@ -158,13 +158,13 @@ def means_table(summary: pd.DataFrame, compared: pd.DataFrame | None = None) -> 
     lines = list[str]()
     for cohort, means in summary[summary["people"] > 0].groupby("cohort"):
         people = sorted(means["people"].unique())
-        lines.append(f"{cohort}: mean F1, ± half of its 95 % interval; {_counted(people)}")
-        lines += _block(means, "f1", "f1_low", "f1_high", "0.2f")
+        lines.append(f"{cohort}: mean F1 [95 % interval]; {_counted(people)}")
+        lines += _block(means, "f1", "f1_low", "f1_high", ".2f")
         of_cohort = None if compared is None else compared[compared["cohort"] == cohort]
         if of_cohort is not None and len(of_cohort):
             reference = of_cohort["reference"].iloc[0]
             lines.append(f"minus {reference}, the same people; intervals that hold together with 95 % probability")
-            lines += _block(of_cohort, "difference", "low", "high", "+0.2f")
+            lines += _block(of_cohort, "difference", "low", "high", "+.2f")
         lines.append("")
     return "\n".join(lines).rstrip()
 
@@ -176,7 +176,7 @@ def _counted(people: Sequence[int]) -> str:
 def _block(table: pd.DataFrame, mean: str, low: str, high: str, form: str) -> Iterator[str]:
     """A heading and a line a strategy; of too many marks some are left out, evenly, and the last is kept."""
     width = max(8, int(table["strategy"].str.len().max()))
-    cell = 16 if form.startswith("+") else 8
+    cell = 16 if form.startswith("+") else 13
     marks = sorted(table["trial"].unique())
     most = max(1, (COLUMNS - width - 2) // (cell + 2))
     kept = [marks[i] for i in sorted({round(each) for each in np.linspace(0, len(marks) - 1, most)})][-most:]
@@ -188,13 +188,10 @@ def _block(table: pd.DataFrame, mean: str, low: str, high: str, form: str) -> It
 
 
 def _cell(row: pd.Series, mean: str, low: str, high: str, form: str) -> str:
-    value = _without_zero(f"{row[mean]:{form}}")
-    if math.isnan(row[low]):
-        return value
-    if form.startswith("+"):
-        return f"{value} [{_without_zero(f'{row[low]:{form}}')} {_without_zero(f'{row[high]:{form}}')}]"
-    return f"{value} ±{_without_zero(f'{max(row[high] - row[mean], row[mean] - row[low]):.2f}')}"
+    value, lowest, highest = (_figure(row[name], form) for name in (mean, low, high))
+    return value if math.isnan(row[low]) else f"{value} [{lowest} {highest}]"
 
 
-def _without_zero(figure: str) -> str:
-    return figure.replace("0.", ".", 1) if figure.lstrip("+-").startswith("0.") else figure
+def _figure(value: float, form: str) -> str:
+    text = f"{value:{form}}"
+    return text.replace("0.", ".", 1) if text.lstrip("+-").startswith("0.") else text
