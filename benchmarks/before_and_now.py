@@ -196,8 +196,8 @@ def _ends(path: Path) -> pd.DataFrame:
     stimuli = last["stop_trial"].fillna(last["trial"])
     by_then = rows[rows["trial"] >= rows.set_index(who).index.map(stimuli)].groupby(who).head(1).set_index(who)
     decided = last["converged"] == 1.0
-    none = decided & last["stop_reason"].str.startswith(("There is no window", "There is probably no window"))
-    told = by_then["reported_window"].astype(bool).reindex(last.index)
+    told = by_then["reported_window"].reindex(last.index).fillna(last["reported_window"]).astype(bool)
+    none = decided & ~told
     ends = last[[]].assign(
         stimuli=stimuli,
         f1=last["stop_f1"].fillna(last["f1"]),

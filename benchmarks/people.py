@@ -24,6 +24,7 @@ from benchmarks.provenance import facts_of
 from benchmarks.tables import write_tables
 from benchmarks.zero_trials import without_any_trial
 from isiw.models.particles.prior import Prior
+from isiw.strategy.stopping import StopKind
 from isiw.studies import Study, StudyStrategy
 
 MARKS = (5, 10, 15, 20, 25, 30, 40, 50, 60, 80)
@@ -49,7 +50,7 @@ def at_stopping(rows: pd.DataFrame) -> pd.DataFrame:
     values = {name: last[f"stop_{name}"].where(stopped, last[name]) for name in names}
     ends = last.assign(**values, stimuli=last["stop_trial"].where(stopped, last["trial"]))
     grouped = ends.groupby("cohort")
-    said_none = ends["stop_reason"].str.startswith("There is no window")
+    said_none = ends["stop_kind"] == StopKind.ABSENT
     return _means(grouped, ["stimuli", *names]).assign(stopped_on_none=said_none.groupby(ends["cohort"]).mean())
 
 

@@ -20,7 +20,7 @@ import pandas as pd
 import isiw
 from benchmarks.provenance import command_of, made_with
 from isiw.design import VALVE_SPACE
-from isiw.signals.doubts import stopped_after
+from isiw.signals.amplitudes import stopped_after
 from isiw.types import FloatArray
 
 RESULTS = Path(__file__).parent / "results" / "silence.md"

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial, TrialTable
+from isiw.findings import Kind
+from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial, TrialTable
 
 NOT_FINITE = [math.nan, math.inf, -math.inf]
 
@@ -25,7 +26,7 @@ def excluding(index: int) -> Callable[[Trial], Trial]:
 
 
 def mistrial(index: int) -> Trial:
-    return Trial(index, Status.MISTRIAL, 100.0, reason=MistrialReason.NO_PULSE)
+    return Trial(index, Status.MISTRIAL, 100.0, reason=Kind.NO_PULSE)
 
 
 def test_a_stimulus_without_an_isi_is_tms_alone() -> None:
@@ -92,7 +93,7 @@ def test_a_mistrial_needs_a_reason_and_an_accepted_trial_has_none() -> None:
     with pytest.raises(InvalidValueError, match="needs a reason"):
         Trial(0, Status.MISTRIAL, 10.0)
     with pytest.raises(InvalidValueError, match="has none"):
-        Trial(0, Status.ACCEPTED, 10.0, reason=MistrialReason.NO_PULSE, mep_mv=0.1)
+        Trial(0, Status.ACCEPTED, 10.0, reason=Kind.NO_PULSE, mep_mv=0.1)
 
 
 def test_the_error_of_an_isi_is_realised_minus_commanded() -> None:
@@ -108,7 +109,7 @@ def test_an_accepted_trial_needs_its_mep() -> None:
 def test_status_and_reason_may_be_given_in_words() -> None:
     words: dict[str, Any] = {"status": "mistrial", "reason": "no impact"}
     trial = Trial(0, commanded_isi_ms=10.0, **words)
-    assert (trial.status, trial.reason) == (Status.MISTRIAL, MistrialReason.NO_IMPACT)
+    assert (trial.status, trial.reason) == (Status.MISTRIAL, Kind.NO_IMPACT)
 
 
 def test_a_reason_outside_the_closed_list_is_refused() -> None:
@@ -155,7 +156,7 @@ def test_the_frame_of_no_trials_has_the_same_columns() -> None:
 
 
 def test_an_amplitude_in_microvolts_is_no_measurement_and_no_trial() -> None:
-    with pytest.raises(InvalidValueError, match=r"more than any amplifier gives.*divide it by 1000"):
+    with pytest.raises(InvalidValueError, match=r"more than any amplifier gives.*Divide by 1000"):
         Measurement(2000.0, 50.0)
     with pytest.raises(InvalidValueError, match=r"more than any amplifier gives"):
         Trial(0, Status.ACCEPTED, 50.0, isi_ms=50.0, mep_mv=2000.0)

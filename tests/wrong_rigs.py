@@ -11,6 +11,7 @@ from isiw.design import DesignSpace
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import SimulatedDevice
+from isiw.findings import Kind
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Channel, Stimulus, Sweep
 from isiw.types import Reference
@@ -91,6 +92,18 @@ NAMED: Mapping[str, str] = {
     "dead amplifier": "flat line",
 }
 """By what words each is told."""
+
+KINDS: Mapping[str, set[Kind]] = {
+    "tense muscle": {Kind.BACKGROUND_ACTIVITY},
+    "inverted accelerometer": {Kind.INVERTED},
+    "µV as mV": {Kind.LOUD},
+    "V as mV": {Kind.QUIET},
+    "swapped channels": {Kind.SWAPPED},
+    "no impact": {Kind.NO_IMPACT},
+    "wrong rate": {Kind.STRAY_EDGE, Kind.TMS_BEFORE_IMPACT, Kind.ISI_OFF},
+    "dead amplifier": {Kind.FLAT_LINE},
+}
+"""As what each may be found."""
 
 
 def rig(wrong: str | None = None, seed: int = 0, *, accelerometer: bool = True) -> SimulatedDevice:

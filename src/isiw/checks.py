@@ -16,6 +16,7 @@ from typing import Any, TypedDict, TypeVar, Unpack
 import numpy as np
 
 from isiw.errors import InvalidValueError, did_you_mean
+from isiw.findings import AMPLITUDE_MV, DELAY_MS, SHARE
 
 __all__ = [
     "MOST_MEP_MV",
@@ -40,10 +41,6 @@ __all__ = [
 ]
 
 _T = TypeVar("_T")
-
-
-LEAST_DELAY_MS = 1.0
-"""No hammer hits so soon after its command, nor does a shock travel so fast: such a delay is in seconds."""
 
 MOST_DELAY_MS = 10_000.0
 """Longer than any stimulus takes [ms]."""
@@ -98,7 +95,7 @@ def amplitude(what: str, value: object) -> float:
             f"{what} is more than any amplifier gives",
             got=value,
             expected=f"an amplitude in mV, at most {MOST_MEP_MV:g}",
-            remedy="Is it in µV? Then divide it by 1000.",
+            remedy=AMPLITUDE_MV.slip(plain),
         )
     return plain
 
@@ -165,12 +162,12 @@ def mean_and_sd(what: str, value: object) -> tuple[float, float]:
             f"{what} must be a mean and an SD [ms]", got=value, remedy="Give both, such as (183.1, 6.0)."
         )
     mean, sd = (number(what, each, above=0, most=MOST_DELAY_MS) for each in pair)
-    if mean < LEAST_DELAY_MS:
+    if (slip := DELAY_MS.slip(mean)) is not None:
         raise InvalidValueError(
             f"{what} is shorter than any rig's",
             got=(mean, sd),
             expected="a mean and an SD in ms, such as (183.1, 6.0)",
-            remedy="Is it in seconds? Multiply by 1000.",
+            remedy=slip,
         )
     return mean, sd
 
@@ -298,7 +295,7 @@ def check_probabilities(owner: object, *names: str, optional: bool = False, **bo
     for name in names:
         value = getattr(owner, name)
         if not (optional and value is None):
-            remedy = "Is it in %? Divide by 100." if isinstance(value, int | float) and 1 < value <= 100 else None
+            remedy = SHARE.slip(value) if isinstance(value, int | float) and value <= 100 else None
             _put(owner, name, number(f"{type(owner).__name__}.{name}", value, remedy=remedy, **bounds))
 
 

@@ -18,7 +18,8 @@ import pandas as pd
 
 from isiw.checks import choice, number, whole
 from isiw.errors import InvalidValueError
-from isiw.signals.plausibility import LARGEST_MV, require_amplitude
+from isiw.findings import AMPLITUDE_MV
+from isiw.signals.values import require_amplitude
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
@@ -101,7 +102,7 @@ def response_counts(isi_ms: ArrayLike, mep_mv: ArrayLike, threshold_mv: float) -
     if not (np.isfinite(isi).all() and np.isfinite(mep).all()):
         raise InvalidValueError("ISIs and MEPs must be finite", remedy="Leave mistrials out.")
     _require_amplitudes(mep)
-    threshold_mv = number("threshold_mv", threshold_mv, above=0, most=LARGEST_MV)
+    threshold_mv = number("threshold_mv", threshold_mv, above=0, most=AMPLITUDE_MV.most)
     trials = pd.DataFrame({"isi_ms": isi, "response": mep > threshold_mv})
     table = trials.groupby("isi_ms").agg(trials=("response", "count"), responses=("response", "sum"))
     table["share"] = table["responses"] / table["trials"]

@@ -12,8 +12,9 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-from isiw.checks import check_amplitude, check_numbers, check_texts, check_wholes, text
+from isiw.checks import check_amplitude, check_numbers, check_texts, check_wholes, choice, text
 from isiw.errors import InvalidValueError
+from isiw.findings import MISTRIALS, Kind
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.types import FloatArray
 
@@ -22,7 +23,6 @@ __all__ = [
     "RESPONSE_MV",
     "Channel",
     "Measurement",
-    "MistrialReason",
     "Status",
     "Stimulus",
     "Sweep",
@@ -42,26 +42,6 @@ class Status(StrEnum):
 
     ACCEPTED = "accepted"
     MISTRIAL = "mistrial"
-
-
-class MistrialReason(StrEnum):
-    """Why a delivered trial is not told. The list is closed."""
-
-    NO_IMPACT = "no impact"
-    NO_PULSE = "no pulse"
-    TMS_BEFORE_IMPACT = "TMS before impact"
-    BACKGROUND_ACTIVITY = "background activity"
-    SATURATION = "saturation"
-    MISSING_CHANNEL = "missing channel"
-    ISI_OFF = "ISI off by more than the tolerance"
-    IMPLAUSIBLE = "implausible amplitude"
-    REJECTED = "rejected"
-    OUTCOME_UNKNOWN = "outcome unknown"
-
-    @classmethod
-    def of(cls, text: str) -> MistrialReason:
-        """The reason of these words; `REJECTED` where the list has none."""
-        return next((reason for reason in cls if reason == text), cls.REJECTED)
 
 
 @dataclass(frozen=True)
@@ -235,7 +215,7 @@ class Trial:
     index: int
     status: Status
     commanded_isi_ms: float | None
-    reason: MistrialReason | None = None
+    reason: Kind | None = None
     isi_ms: float | None = None
     isi_sd_ms: float = 0.0
     mep_mv: float | None = None
@@ -245,13 +225,13 @@ class Trial:
     t_tms_ms: float | None = None
     excluded: bool = False
     tap_alone: bool = False
-    overruled: MistrialReason | None = None
+    overruled: Kind | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "status", Status(self.status))
         for name in ("reason", "overruled"):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, MistrialReason(getattr(self, name)))
+                object.__setattr__(self, name, choice("Trial.reason", Kind(getattr(self, name)), MISTRIALS))
         if (self.status is Status.MISTRIAL) != (self.reason is not None):
             raise InvalidValueError("a mistrial needs a reason and an accepted trial has none", got=self.reason)
         if self.tap_alone and self.commanded_isi_ms is not None:
@@ -271,7 +251,7 @@ class Trial:
             stimulus.trial,
             Status.MISTRIAL,
             stimulus.isi_ms,
-            MistrialReason.OUTCOME_UNKNOWN,
+            Kind.OUTCOME_UNKNOWN,
             tap_alone=stimulus.tap_alone,
         )
 
@@ -288,7 +268,7 @@ class Trial:
     @property
     def is_control(self) -> bool:
         """Whether it was TMS alone or a tap alone; of what nobody knows the outcome of, it may have been a pair."""
-        return self.commanded_isi_ms is None and self.reason is not MistrialReason.OUTCOME_UNKNOWN
+        return self.commanded_isi_ms is None and self.reason is not Kind.OUTCOME_UNKNOWN
 
     @property
     def isi_error_ms(self) -> float | None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from isiw.checks import check_numbers, check_probabilities, check_texts, check_wholes, number
 from isiw.errors import InvalidValueError
+from isiw.findings import INTERVAL_S
 
 __all__ = ["Control", "Visit", "VisitProtocol", "different_muscles", "interval_s"]
 
@@ -22,9 +23,6 @@ _FINEST_SHARE = 1000
 
 MOST_APART_PCT_RMT = 10.0
 """Intensities of one person's visits that are further apart are not the same: MEPs grow, and windows widen, with it."""
-
-MOST_ITI_S = 1000.0
-"""Nobody waits a quarter of an hour between two trials: such an interval is in ms."""
 
 
 class Control(StrEnum):
@@ -208,12 +206,12 @@ def interval_s(what: str, value: object) -> float:
         InvalidValueError: anything else.
     """
     plain_s = number(what, value, least=0)
-    if plain_s > MOST_ITI_S:
+    if (slip := INTERVAL_S.slip(plain_s)) is not None:
         raise InvalidValueError(
             f"{what} is longer than anybody waits between two stimuli",
             got=value,
-            expected=f"at most {MOST_ITI_S:g} s",
-            remedy="Is it in ms? Divide by 1000.",
+            expected=f"at most {INTERVAL_S.most:g} s",
+            remedy=slip,
         )
     return plain_s
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from isiw.checks import check_probabilities, number
 from isiw.errors import InvalidValueError
-from isiw.text.found import finding, lacking, nothing_found
+from isiw.findings import lacking
+from isiw.text.summary import summary
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
@@ -20,13 +21,17 @@ __all__ = [
     "LEAST_DEPRESSED_MV",
     "MIN_EXCESS_MV",
     "MIN_EXCESS_OF_BASELINE",
+    "SURE",
     "BestISI",
     "Enhancement",
     "Interval",
     "ProfileBand",
     "Window",
     "WindowEstimate",
+    "depression",
     "least_excess_mv",
+    "nothing_found",
+    "rules_out",
     "window_from_excess",
 ]
 
@@ -39,7 +44,45 @@ MIN_EXCESS_OF_BASELINE = 0.10
 LEAST_DEPRESSED_MV = 0.05
 """Where the expected MEP without a tap is smaller there is none to depress: what counts as an MEP [Rossini2015]."""
 
+SURE = 0.95
+"""Probability from which on it is said outright that there is a window, or none; below it "probably", or undecided."""
+
 Interval: TypeAlias = tuple[float, float]
+
+
+def rules_out(probability: float | None) -> bool:
+    """Whether nothing reported means that there is none; with more probability than this it is undecided.
+
+    Args:
+        probability: that there is a window, or a depression; None where the method has none.
+    """
+    return probability is None or 1 - probability >= SURE
+
+
+def nothing_found(probability: float | None, *, has_answer: bool) -> str:
+    """What is said in short where no window is reported.
+
+    Args:
+        probability: that there is a window; None where the method has none.
+        has_answer: whether the method has one yet.
+    """
+    if not has_answer:
+        return "no answer yet"
+    if probability is not None and probability >= 0.5:
+        return "window not reported"
+    return "no window" if rules_out(probability) else "undecided"
+
+
+def depression(depressed: Window | None, probability: float | None) -> tuple[object, float] | None:
+    """Which ISIs depress the MEP, in short, and the probability of any; None where nobody looked.
+
+    Args:
+        depressed: those that are reported.
+        probability: that there are any; None where nobody looked.
+    """
+    if probability is None:
+        return None
+    return depressed or ("nowhere" if rules_out(probability) else "undecided"), probability
 
 
 @dataclass(frozen=True)
@@ -273,10 +316,10 @@ class WindowEstimate:
         if self.too_little is not None:
             return self.too_little
         start, end = self.interval(0.9) or ((None, None), (None, None))
-        depressed = self.depressed, self.depressed_probability
+        depressed = depression(self.depressed, self.depressed_probability)
         nothing = nothing_found(self.probability, has_answer=self.has_answer)
         edges = (self.start_ms, *start), (self.end_ms, *end)
-        return finding(self.probability, self.window, nothing, *edges, depressed)
+        return summary(self.probability, self.window, nothing, *edges, depressed)
 
     @property
     def has_answer(self) -> bool:
@@ -292,7 +335,8 @@ class WindowEstimate:
     @property
     def too_little(self) -> str | None:
         """What is said where too little was measured to speak of a window; None where enough was."""
-        return lacking(self.pairs, silent=self.silent)
+        found = lacking(self.pairs, silent=self.silent)
+        return None if found is None else f"{found}"
 
     def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:
         """Credible intervals of start and end, given that there is a window [ms].

@@ -252,7 +252,7 @@ def test_a_session_that_pauses_where_nobody_is_ends_with_a_code_of_its_own(isiw:
     ("lines", "words"),
     [
         ('[subject]\ndata = "recordings"\n', "would be ignored"),
-        ("[visit]\nintensity_pct_rmt = 1.2\n", "probably a ratio"),
+        ("[visit]\nintensity_pct_rmt = 1.2\n", "Is it in parts of 1?"),
     ],
 )
 def test_what_would_be_ignored_or_is_in_the_wrong_unit_is_refused(

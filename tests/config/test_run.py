@@ -119,8 +119,8 @@ def test_of_a_misspelt_value_the_one_that_was_meant_is_named(config_file: WriteF
         ("[protocol]\ntms_alone = 10", "Is it in %"),
         ("[strategy.settings]\nstop_expected_f1 = 92", "Is it in %"),
         ("[strategy.settings]\nstop_no_window = 95", "Is it in %"),
-        ("[strategy.settings]\nstop_width_ms = 0.025", "probably in s;.*Multiply it by 1000"),
-        ("[visit]\nintensity_pct_mso = 0.6", "probably a ratio"),
+        ("[strategy.settings]\nstop_width_ms = 0.025", r"Is it in s\? Multiply by 1000"),
+        ("[visit]\nintensity_pct_mso = 0.6", r"Is it in parts of 1\? Multiply by 100"),
     ],
 )
 def test_a_slip_of_unit_is_refused_with_the_unit_that_it_is_probably_in(

@@ -10,6 +10,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.replay import RecordedTrials
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError
+from isiw.findings import Kind
 from isiw.log.reader import SessionRecord, read_session
 from isiw.metrics import f1
 from isiw.session.loop import Session
@@ -17,13 +18,13 @@ from isiw.session.updates import SessionResult
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
-from isiw.trials import Measurement, MistrialReason, Status, Stimulus, Trial, TrialTable
+from isiw.trials import Measurement, Status, Stimulus, Trial, TrialTable
 from known import instance
 
 TABLE = TrialTable(
     (
         Trial(0, Status.ACCEPTED, 10.0, isi_ms=11.0, mep_mv=0.01),
-        Trial(1, Status.MISTRIAL, 10.0, MistrialReason.NO_IMPACT),
+        Trial(1, Status.MISTRIAL, 10.0, Kind.NO_IMPACT),
         Trial(2, Status.ACCEPTED, 50.0, isi_ms=49.0, mep_mv=0.05),
         Trial(3, Status.ACCEPTED, 50.0, isi_ms=51.0, mep_mv=0.06, excluded=True),
         Trial(4, Status.ACCEPTED, 50.0, isi_ms=52.0, mep_mv=0.07),
@@ -99,7 +100,7 @@ def test_with_the_usual_tolerance_recorded_trials_far_from_the_ask_are_mistrials
     recording: SessionRecord, tmp_path: Path
 ) -> None:
     result = run_again(recording, tmp_path / "again.mcap", tolerance_ms=10.0)
-    lost = [trial for trial in result.trials if trial.reason is MistrialReason.ISI_OFF]
+    lost = [trial for trial in result.trials if trial.reason is Kind.ISI_OFF]
     assert lost
     for trial in result.trials:
         assert trial.isi_ms is not None

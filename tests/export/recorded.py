@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from isiw.findings import Kind
 from isiw.log.schema import Estimate, Event, Intent, Record, Waveform
 from isiw.log.writer import LogWriter
-from isiw.trials import Channel, MistrialReason, Status, Trial
+from isiw.trials import Channel, Status, Trial
 from isiw.visit import Visit
 from log.written import make_header
 
@@ -52,7 +53,7 @@ def write_sweeps(
 
 def _trial(trial: int) -> Trial:
     if trial == 1:
-        return Trial(trial, Status.MISTRIAL, 30.0, MistrialReason.NO_IMPACT, t_tms_ms=20.0)
+        return Trial(trial, Status.MISTRIAL, 30.0, Kind.NO_IMPACT, t_tms_ms=20.0)
     return Trial(
         trial, Status.ACCEPTED, 30.0, isi_ms=30.0, mep_mv=0.1 + trial / 7, background_rms_uv=2.0, t_hit_ms=-10.0,
         t_tms_ms=20.0,

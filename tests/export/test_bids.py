@@ -20,9 +20,10 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.export import export_logs
 from isiw.export.emg import Layout, Run
+from isiw.findings import Kind
 from isiw.log.reader import read_session
 from isiw.text.stimuli import STIMULI
-from isiw.trials import Channel, MistrialReason, Status, Stimulus, Trial
+from isiw.trials import Channel, Status, Stimulus, Trial
 from isiw.visit import Visit
 
 OLD_LOGS = Path(__file__).parents[1] / "data" / "logs"
@@ -280,7 +281,7 @@ def test_a_sweep_whose_trial_is_lost_is_there_with_an_unknown_outcome(tmp_path: 
         (Trial(0, Status.ACCEPTED, 30.0, isi_ms=30.0, mep_mv=0.1), "paired"),
         (Trial(0, Status.ACCEPTED, None, mep_mv=0.1), "TMS alone"),
         (Trial(0, Status.ACCEPTED, None, tap_alone=True), "tap alone"),
-        (Trial(0, Status.MISTRIAL, None, MistrialReason.NO_PULSE), "TMS alone"),
+        (Trial(0, Status.MISTRIAL, None, Kind.NO_PULSE), "TMS alone"),
         (Trial.unknown(Stimulus(0, None)), "unknown"),
         (Trial.unknown(Stimulus(0, 30.0)), "paired"),
     ],

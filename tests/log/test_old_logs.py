@@ -12,11 +12,11 @@ import pytest
 
 import isiw
 from isiw.errors import OtherVersionsWarning
+from isiw.findings import Kind
 from isiw.plots import save_session_plot
 from isiw.report import final_statement
 from isiw.session.replay import strategy_of
 from isiw.session.updates import SessionUpdate
-from isiw.trials import MistrialReason
 
 FOLDER = Path(__file__).parents[1] / "data" / "logs"
 LOGS = sorted(path.name for path in FOLDER.glob("*.mcap*"))
@@ -105,7 +105,7 @@ def test_the_killed_session_delivers_what_is_left_of_its_budget(copy: Callable[[
         warnings.simplefilter("ignore", OtherVersionsWarning)
         trials = isiw.resume(log, isiw.SimulatedDevice(person("killed"))).run().trials
     assert len(trials) == 6
-    assert [trial.reason for trial in trials].count(MistrialReason.OUTCOME_UNKNOWN) == 1
+    assert [trial.reason for trial in trials].count(Kind.OUTCOME_UNKNOWN) == 1
 
 
 def test_the_recorded_waveforms_are_there() -> None:

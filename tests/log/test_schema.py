@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
+from isiw.findings import Kind
 from isiw.log.production import Production
 from isiw.log.salvage import salvage
 from isiw.log.schema import Estimate, Event, Header, Intent, PulseOutcome, Record, ThresholdBelief, Waveform
@@ -15,7 +16,7 @@ from isiw.log.topics import CHANNEL_IDS, decode, encode, json_schema, topic_of
 from isiw.log.writer import LogWriter
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold import ThresholdEstimate
-from isiw.trials import Channel, MistrialReason, Status, Trial
+from isiw.trials import Channel, Status, Trial
 from isiw.window import Window, WindowEstimate
 from known import instance
 from log.written import make_header
@@ -27,7 +28,7 @@ from log.written import make_header
         Intent(trial=3, isi_ms=0.1 + 0.2, t_s=1.5),
         Intent(trial=3, isi_ms=None),
         Trial(0, Status.ACCEPTED, 12.0, isi_ms=12.345678901234567, mep_mv=1e-17, background_rms_uv=3.0),
-        Trial(1, Status.MISTRIAL, None, MistrialReason.OUTCOME_UNKNOWN),
+        Trial(1, Status.MISTRIAL, None, Kind.OUTCOME_UNKNOWN),
         Estimate(trial=1, probability=None, start_ms=-math.inf, end_ms=math.inf, stop=True, reason="µ"),
         Event(kind="fault", text="line one\nline two"),
         Intent(trial=3, isi_ms=None, intensity_pct_mso=62.0),

@@ -7,11 +7,12 @@ from typing import Any
 
 import pytest
 
+from isiw.findings import Kind
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate, Event, Intent, Record
 from isiw.report.answers import Answer, answers
 from isiw.session.loop import Session
-from isiw.trials import MistrialReason, Status, Trial
+from isiw.trials import Status, Trial
 from scripted import ScriptedDevice, scripted_strategy
 
 
@@ -38,7 +39,7 @@ def answer(record: SessionRecord, question: str) -> Answer:
 
 def test_timing_is_said_by_the_median_and_the_largest_error_and_what_it_cost(record: SessionRecord) -> None:
     trials = [trial(0, isi_ms=51.0), trial(1, isi_ms=48.0), trial(2, isi_ms=54.0, t_hit_ms=1.0)]
-    lost = [trial(3, isi_ms=63.0, reason=MistrialReason.ISI_OFF), trial(4, reason=MistrialReason.SATURATION)]
+    lost = [trial(3, isi_ms=63.0, reason=Kind.ISI_OFF), trial(4, reason=Kind.SATURATION)]
     _, said, detail = answer(with_history(record, [*trials, *lost]), "timing")
     assert said == "not in 1 of 5 trials"
     assert detail == (
@@ -59,7 +60,7 @@ def test_a_tense_muscle_is_not_at_rest_where_nobody_rejected_the_trial(record: S
 
 
 def test_a_tense_muscle_is_not_at_rest_where_the_trial_was_lost_for_another_reason(record: SessionRecord) -> None:
-    trials = [trial(0, background_rms_uv=80.0, reason=MistrialReason.SATURATION), trial(1, background_rms_uv=1.0)]
+    trials = [trial(0, background_rms_uv=80.0, reason=Kind.SATURATION), trial(1, background_rms_uv=1.0)]
     assert answer(with_history(record, trials), "at rest").answer == "not in 1 of 2 trials"
 
 
@@ -95,7 +96,7 @@ def test_timing_after_an_electrical_pulse_is_that_of_the_two_pulses(record: Sess
 
 
 def test_a_muscle_that_was_never_at_rest_is_not_unknown(record: SessionRecord) -> None:
-    trials = [trial(k, background_rms_uv=30.0 + k, reason=MistrialReason.BACKGROUND_ACTIVITY) for k in range(3)]
+    trials = [trial(k, background_rms_uv=30.0 + k, reason=Kind.BACKGROUND_ACTIVITY) for k in range(3)]
     _, said, detail = answer(with_history(record, trials), "at rest")
     assert said == "not in 3 of 3 trials"
     assert detail == (
@@ -110,7 +111,7 @@ def test_a_rest_that_is_known_of_some_trials_only_is_not_told_of_all(record: Ses
 
 
 def test_a_trial_that_an_operator_accepted_was_still_not_at_rest(record: SessionRecord) -> None:
-    tense = trial(0, background_rms_uv=30.0, reason=MistrialReason.BACKGROUND_ACTIVITY).accepted_anyway()
+    tense = trial(0, background_rms_uv=30.0, reason=Kind.BACKGROUND_ACTIVITY).accepted_anyway()
     _, said, detail = answer(with_history(record, [tense, trial(1, background_rms_uv=1.0)]), "at rest")
     assert said == "not in 1 of 2 trials"
     assert detail.endswith("Rejected for this: 1 background activity, accepted by the operator.")
@@ -129,7 +130,7 @@ def test_why_it_stopped_is_the_last_decisions_reason(record: SessionRecord) -> N
 
 def test_lost_trials_are_named_as_far_as_they_are_few(record: SessionRecord) -> None:
     def lost(count: int) -> str:
-        bad = [trial(k, reason=MistrialReason.SATURATION) for k in range(1, count + 1)]
+        bad = [trial(k, reason=Kind.SATURATION) for k in range(1, count + 1)]
         return answer(replace(record, history=(trial(0), *bad), delivered=0), "lost").answer
 
     assert [lost(0), lost(1), lost(2)] == ["none", "1 of 2: trial 1", "2 of 3: trials 1, 2"]
@@ -172,5 +173,5 @@ def test_what_is_not_known_of_some_stimuli_is_not_told_of_all(record: SessionRec
 def test_a_device_that_repeats_what_was_wanted_hides_no_trial_that_was_lost_for_its_timing(
     record: SessionRecord,
 ) -> None:
-    lost = trial(1, isi_ms=None, mep_mv=None, reason=MistrialReason.NO_IMPACT)
+    lost = trial(1, isi_ms=None, mep_mv=None, reason=Kind.NO_IMPACT)
     assert answer(with_history(record, [trial(0), lost]), "timing").answer == "not in 1 of 2 trials"

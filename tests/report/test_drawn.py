@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from isiw.findings import TOO_FEW
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, drawn
-from isiw.text.found import TOO_FEW
 from isiw.trials import Channel
 from report.sessions import pulsed, tapped
 
@@ -81,7 +81,7 @@ def test_a_name_that_a_page_could_obey_is_plain(record: SessionRecord) -> None:
 
 def test_a_belief_that_hardly_a_trial_bears_names_no_window(tmp_path: Path) -> None:
     shown = drawn(tapped(tmp_path / "s.mcap", trials=6))["beliefs"]
-    assert (shown[0]["found"], shown[0]["window"]) == (TOO_FEW, [])
+    assert (shown[0]["found"], shown[0]["window"]) == (f"{TOO_FEW}", [])
     last = shown[max(shown)]
     assert last["found"].startswith("The tap probably enhances the MEP at ISIs of")
     assert last["found"].split("ISIs of ")[1].startswith(f"{last['window'][0][0]:g}–")

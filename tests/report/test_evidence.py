@@ -10,9 +10,9 @@ import pytest
 
 import isiw
 from isiw.errors import LogError
+from isiw.findings import NO_MEP
 from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_stood_out
-from isiw.strategy.stopping import StopDecision
-from isiw.text.found import NO_MEP
+from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import Status, Trial
 from isiw.window import Window
 from scripted import scripted_strategy
@@ -162,7 +162,7 @@ def test_zeros_below_a_high_detection_limit_are_a_finding(
             session.tell(session.ask(), 0.0)
     record = isiw.read_session(tmp_path / "zeros.mcap")
     assert record.is_silent == strategy.estimate().silent == silent
-    assert (str(strategy.estimate()) == NO_MEP) == (NO_MEP in str(record)) == silent
+    assert (str(strategy.estimate()) == str(NO_MEP)) == (str(NO_MEP) in str(record)) == silent
     assert bool(recwarn.list) == silent
 
 
@@ -171,8 +171,8 @@ def test_a_strategy_finds_nothing_without_an_mep_and_goes_on() -> None:
     for _ in range(70):
         strategy.learn(strategy.ask(), 0.0)
     assert (strategy.estimate().probability or 1.0) < 0.1
-    assert str(strategy.estimate()) == NO_MEP
-    assert strategy.decision() == StopDecision(stop=False, reason=NO_MEP)
+    assert str(strategy.estimate()) == str(NO_MEP)
+    assert strategy.decision() == StopDecision(stop=False, reason=str(NO_MEP), kind=StopKind.TOO_LITTLE)
     strategy.learn(strategy.ask(), 0.2)
     assert strategy.estimate().rests_on_data
 
@@ -182,11 +182,6 @@ def test_the_reason_of_a_pause_is_said_also_where_no_mep_was_seen(tmp_path: Path
         for _ in range(4):
             session.tell(session.ask(), 0.0)
     record = isiw.read_session(tmp_path / "zeros.mcap")
-    for reason, is_said in (
-        ("The session is paused: the window of the booth is open.", True),
-        ("The session was ended before its time: the window of the booth is open.", True),
-        ("The limit of 4 pulses is reached.", True),
-        ("There is no window, with probability 0.95.", False),
-    ):
-        last = record.estimates[-1].model_copy(update={"reason": reason})
-        assert (reason in isiw.report.final_statement(replace(record, history=(*record.history, last)))) == is_said
+    for kind, is_said in ((StopKind.PAUSED, True), (StopKind.LIMIT, True), (StopKind.ABSENT, False)):
+        last = record.estimates[-1].model_copy(update={"reason": "So it is.", "stop_kind": kind})
+        assert ("So it is." in isiw.report.final_statement(replace(record, history=(*record.history, last)))) == is_said

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from isiw.findings import Kind
 from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Event, Intent, Record
 from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
 from isiw.session.loop import Session
-from isiw.trials import Measurement, MistrialReason, Status, Trial
+from isiw.trials import Measurement, Status, Trial
 from scripted import ScriptedDevice, scripted_strategy
 
 
@@ -31,7 +32,7 @@ def counted(record: SessionRecord) -> dict[str, tuple[str, str]]:
 def test_a_trial_is_told_with_what_was_asked_realised_and_measured() -> None:
     trial = Trial(3, Status.ACCEPTED, 50.0, isi_ms=51.26, mep_mv=0.0512, background_rms_uv=2.04)
     assert trial_row(trial) == (3, "50 ms", "51.3 ms", "51 µV", "2 µV", "")
-    lost = Trial(4, Status.MISTRIAL, 50.0, MistrialReason.BACKGROUND_ACTIVITY, mep_mv=0.07)
+    lost = Trial(4, Status.MISTRIAL, 50.0, Kind.BACKGROUND_ACTIVITY, mep_mv=0.07)
     assert trial_row(lost)[3:] == ("mistrial: background activity", "–", "70 µV were measured")
     assert trial_row(lost.accepted_anyway()).remark == "accepted by the operator; had been: background activity"
 
@@ -78,7 +79,7 @@ def test_a_log_without_times_says_so(record: SessionRecord) -> None:
 
 
 def test_stimuli_of_unknown_outcome_are_counted_whether_there_is_a_trial_of_them_or_not(record: SessionRecord) -> None:
-    unknown = Trial(6, Status.MISTRIAL, 190.0, MistrialReason.OUTCOME_UNKNOWN)
+    unknown = Trial(6, Status.MISTRIAL, 190.0, Kind.OUTCOME_UNKNOWN)
     history = (*record.history, Intent(trial=6, isi_ms=190.0), unknown, Intent(trial=7, isi_ms=10.0))
     said = counted(replace(record, history=history))
     assert said["stimuli delivered"][0] == "8"

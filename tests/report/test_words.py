@@ -14,6 +14,7 @@ from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate, Event, Intent, StrategyRecipe
 from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, trial_rows, truth_sentence
 from isiw.session.loop import Session
+from isiw.strategy.stopping import StopKind
 from isiw.trials import Channel, Measurement, Status, Trial
 from isiw.window import Window
 from known import instance
@@ -58,14 +59,21 @@ def test_an_edge_beyond_the_range_is_said_in_words(record: SessionRecord, low: f
 
 
 def test_where_too_few_pairs_are_left_no_reason_speaks_of_a_window(record: SessionRecord) -> None:
-    known = with_estimate(record, reason="The window is known, with an expected F1 of 0.93.", stop=True)
+    known = with_estimate(record, reason="F1 is high.", stop=True, stop_kind=StopKind.KNOWN)
     left = [
         replace(entry, isi_ms=None, commanded_isi_ms=None) if isinstance(entry, Trial) and entry.index > 1 else entry
         for entry in known.history
     ]
     said = final_statement(type(record)(record.path, record.header, tuple(left), {}, (), True))
     assert said.startswith("Too little was measured to speak of a window: 1 pair of stimuli counts, of 4 trials.")
-    assert "The window is known" not in said
+    assert "F1 is high." not in said
+
+
+def test_a_reason_of_a_users_own_rule_is_printed_whatever_its_words(record: SessionRecord) -> None:
+    over = with_estimate(record, reason="The lab's time window is over.", stop=True)
+    silent = replace(over, history=tuple(replace(e, mep_mv=0.0) if isinstance(e, Trial) else e for e in over.history))
+    assert not silent.rests_on_data
+    assert "The lab's time window is over." in final_statement(silent)
 
 
 def test_after_an_electrical_pulse_no_tap_is_spoken_of(record: SessionRecord) -> None:

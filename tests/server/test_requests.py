@@ -99,7 +99,7 @@ def test_a_malformed_body_is_refused_in_words_and_begins_nothing(
         ({"space": {"refrence": "impact"}}, "space.refrence", "Did you mean reference?"),
         ({"space": {"reference": "impct"}}, "space.reference", "Did you mean impact?"),
         ({"limits": {"min_iti_s": 5000.0}}, None, "Is it in ms?"),
-        ({"visit": {"intensity_pct_rmt": 1.2}}, None, "probably a ratio"),
+        ({"visit": {"intensity_pct_rmt": 1.2}}, None, "Is it in parts of 1?"),
     ],
 )
 def test_a_plan_that_cannot_be_is_refused_by_the_name_of_its_field(

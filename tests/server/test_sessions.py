@@ -13,6 +13,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, LogError
+from isiw.findings import TOO_FEW, Kind
 from isiw.log.reader import read_session
 from isiw.log.schema import Record
 from isiw.log.topics import encode
@@ -22,8 +23,6 @@ from isiw.server.requests import AskRequest, CreateRequest, TellRequest
 from isiw.server.sessions import Sessions
 from isiw.session.journal import Journal
 from isiw.strategy.catalogue import make_strategy
-from isiw.text.found import TOO_FEW
-from isiw.trials import MistrialReason
 from server.serving import PLAN, SETTINGS, SPACE, client_of, created, done, mep_mv, refused, told
 
 
@@ -144,9 +143,9 @@ def test_no_window_is_named_where_too_little_was_told(client: httpx.Client, sess
 
     nothing: dict[str, object] = {"probability": None, "segments_ms": [], "start_ms": None, "expected_f1": None}
     told(client, session, 2)
-    assert estimate() == {"text": TOO_FEW, **nothing}
+    assert estimate() == {"text": f"{TOO_FEW}", **nothing}
     done(client.post(f"{session}/close"))
-    assert estimate() == {"text": TOO_FEW, **nothing}
+    assert estimate() == {"text": f"{TOO_FEW}", **nothing}
     done(client.post(f"{session}/resume"))
     told(client, session, 1)
     assert estimate()["probability"] is not None
@@ -284,7 +283,7 @@ def test_who_resumes_an_open_session_does_not_know_what_came_of_its_open_trial(
     for _ in range(2):
         assert "note" in refused(client.post(f"{session}/tell", json=late), 409, "Late")["remedy"]
     record = read_session(tmp_path / "P07.mcap")
-    assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert record.table[0].reason is Kind.OUTCOME_UNKNOWN
     assert [event.text for event in record.events] == [
         f"An outcome of trial 0 came too late and is not used: isi_ms={isi_ms} mep_mv=0.1"
     ]

@@ -14,6 +14,7 @@ from forked import Forked
 from isiw.devices.deadlines import Deadlines
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LogError, NotDelivered
+from isiw.findings import Kind
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
@@ -21,7 +22,7 @@ from isiw.session.lastresort import STILL_ARMED
 from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.safeguards import Safeguards
-from isiw.trials import Channel, Measurement, MistrialReason, Stimulus, Sweep
+from isiw.trials import Channel, Measurement, Stimulus, Sweep
 from known import known
 from scripted import ScriptedDevice, scripted_strategy, told_to
 
@@ -55,7 +56,7 @@ def test_whatever_a_device_fails_with_the_stimulus_may_have_been_given(log: Path
     device = ScriptedDevice(refusing(1, error))
     with pytest.raises(type(error)):
         Session(device, scripted_strategy(9), log=log, limits=limits).run()
-    assert [trial.reason for trial in read_session(log).table] == [MistrialReason.OUTCOME_UNKNOWN]
+    assert [trial.reason for trial in read_session(log).table] == [Kind.OUTCOME_UNKNOWN]
     assert not [event for event in read_session(log).events if event.kind == "refused"]
 
 
@@ -127,7 +128,7 @@ def test_a_delivery_past_its_deadline_ends_the_session_disarmed(log: Path, relea
         Session(device, scripted_strategy(), log=log, timeout_s=0.05, safeguards=guards).run()
     assert device.calls[:2] == ["stage", "stop"]
     record = read_session(log)
-    assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert record.table[0].reason is Kind.OUTCOME_UNKNOWN
     assert "DeviceTimeoutError" in record.events[-1].text
 
 
@@ -147,7 +148,7 @@ def test_an_answer_past_its_deadline_is_logged_as_late_with_its_waveforms_and_no
     record = read_session(log)
     assert [(event.kind, event.trial) for event in record.events] == [("late", 0), ("fault", 0)]
     assert record.sweep(0)["emg"].values.shape == (300,)
-    assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert record.table[0].reason is Kind.OUTCOME_UNKNOWN
     assert told_to(strategy) == ()
 
 
@@ -211,7 +212,7 @@ def test_a_channel_that_json_cannot_hold_is_an_error_and_the_log_stays_whole(log
     record = read_session(log)
     assert record.losses == ()
     assert record.finished
-    assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert record.table[0].reason is Kind.OUTCOME_UNKNOWN
 
 
 def test_two_sessions_do_not_drive_one_device_at_once(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
+from isiw.findings import Kind
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate, Intent
 from isiw.models.particles import ParticleModel
@@ -25,7 +26,7 @@ from isiw.session.updates import SessionUpdate
 from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Recipe, Strategy
-from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
+from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from known import instance, known
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 
@@ -213,7 +214,7 @@ def test_a_device_that_fails_leaves_an_intact_log_and_is_stopped(log: Path, erro
     assert record.finished
     assert record.losses == ()
     assert [trial.status for trial in record.table] == [Status.ACCEPTED, Status.ACCEPTED, Status.MISTRIAL]
-    assert record.table[2].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert record.table[2].reason is Kind.OUTCOME_UNKNOWN
     assert record.table[2].commanded_isi_ms == device.delivered[2].isi_ms
     assert (record.events[-1].kind, record.events[-1].trial) == ("fault", 2)
     assert device.calls == ["stage", "stop", "unstage"]
@@ -227,7 +228,7 @@ def test_an_impossible_amplitude_is_an_error_that_names_it(log: Path, mep_mv: fl
     record, message = run_failing(session, InvalidValueError)
     assert "mep_mv" in message
     assert repr(mep_mv) in message
-    assert record.table[0].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert record.table[0].reason is Kind.OUTCOME_UNKNOWN
     assert told_to(session.strategy) == ()
 
 
@@ -272,7 +273,7 @@ def test_an_isi_that_is_off_is_a_mistrial_and_asked_again(log: Path) -> None:
     session = Session(device, scripted_strategy(3), log=log)
     session.run()
     record = read_session(log)
-    assert record.table[1].reason is MistrialReason.ISI_OFF
+    assert record.table[1].reason is Kind.ISI_OFF
     assert device.delivered[1].isi_ms == device.delivered[2].isi_ms
     assert len(told_to(session.strategy)) == 2
 
@@ -280,7 +281,7 @@ def test_an_isi_that_is_off_is_a_mistrial_and_asked_again(log: Path) -> None:
 def test_an_active_muscle_is_a_mistrial(log: Path) -> None:
     device = ScriptedDevice(lambda stimulus: Measurement(0.1, stimulus.isi_ms, background_rms_uv=10.5))
     result = Session(device, scripted_strategy(3), log=log).run()
-    assert {trial.reason for trial in result.trials} == {MistrialReason.BACKGROUND_ACTIVITY}
+    assert {trial.reason for trial in result.trials} == {Kind.BACKGROUND_ACTIVITY}
     assert {trial.told for trial in result.trials} == {False}
     assert result.decision.reason == "The budget of 3 stimuli is used up."
 
@@ -288,7 +289,7 @@ def test_an_active_muscle_is_a_mistrial(log: Path) -> None:
 def test_a_device_that_measures_keeps_the_sessions_limits(log: Path) -> None:
     device = ScriptedDevice(lambda stimulus: Measurement(0.1, known(stimulus.isi_ms) + 3.0))
     result = Session(device, scripted_strategy(2), log=log, signals=SignalLimits(isi_tolerance_ms=2.0)).run()
-    assert {trial.reason for trial in result.trials} == {MistrialReason.ISI_OFF}
+    assert {trial.reason for trial in result.trials} == {Kind.ISI_OFF}
 
 
 def test_an_error_of_the_observer_ends_the_session_with_an_intact_log(log: Path) -> None:

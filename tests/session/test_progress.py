@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from isiw.findings import Kind
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.session.progress import COLUMNS, PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
 from isiw.session.updates import SessionUpdate
 from isiw.strategy.stopping import StopDecision
 from isiw.text.stimuli import STIMULI
-from isiw.trials import MistrialReason, Status, Trial
+from isiw.trials import Status, Trial
 from isiw.window import Window, WindowEstimate
 from scripted import SPACE, ScriptedDevice, scripted_strategy
 
@@ -33,7 +34,7 @@ def test_progress_tells_trial_isi_mep_window_intervals_and_what_is_left() -> Non
 
 
 def test_progress_of_a_method_without_posterior_has_gaps() -> None:
-    trial = Trial(3, Status.MISTRIAL, None, MistrialReason.NO_IMPACT)
+    trial = Trial(3, Status.MISTRIAL, None, Kind.NO_IMPACT)
     assert progress_row(update_with(WindowEstimate(None, None), trial)) == (
         "3", "TMS alone", "mistrial: no impact", "", "none", "", "", "17"
     )  # fmt: skip

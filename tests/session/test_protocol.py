@@ -15,12 +15,13 @@ from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
 from isiw.errors import DeviceError, InvalidValueError
+from isiw.findings import Kind
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.session.resume import resume
 from isiw.session.updates import SessionUpdate
-from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
+from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
 from isiw.visit import Control, Visit, VisitProtocol
 from scripted import ALONE_MS, FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 
@@ -158,7 +159,7 @@ def test_a_lost_control_costs_neither_budget_nor_a_retry(log: Path) -> None:
     rig.answer = answer
     result = Session(rig, scripted_strategy(10), log=log, protocol=protocol).run()
     assert sum(trial.reason is None for trial in result.trials) == 10
-    assert sum(trial.reason is MistrialReason.BACKGROUND_ACTIVITY for trial in result.trials) >= 5
+    assert sum(trial.reason is Kind.BACKGROUND_ACTIVITY for trial in result.trials) >= 5
     assert result.decision.reason == "The budget of 10 stimuli is used up."
 
 
@@ -203,7 +204,7 @@ def test_a_tap_alone_without_an_impact_is_a_mistrial_and_a_pulse_in_it_an_error(
     tap = Stimulus(0, None, tap_alone=True)
     space = DesignSpace(0, 300, reference="impact")
     trial = isiw.signals.judge(Sweep({"emg": emg, "acceleration": flat}, t_valve_ms=500.0), tap, space)
-    assert (trial.reason, trial.tap_alone) == (MistrialReason.NO_IMPACT, True)
+    assert (trial.reason, trial.tap_alone) == (Kind.NO_IMPACT, True)
     trial = isiw.signals.judge(Sweep({"emg": emg}, t_hit_ms=600.0), tap, space)
     assert (trial.status, trial.mep_mv) == (Status.ACCEPTED, None)
     assert trial.background_rms_uv == pytest.approx(2.0, rel=0.2)

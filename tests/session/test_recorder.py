@@ -27,6 +27,7 @@ from isiw.errors import (
     LogError,
     StrategyError,
 )
+from isiw.findings import Kind
 from isiw.log.amending import exclude
 from isiw.log.reader import read_session
 from isiw.log.schema import Estimate, Intent
@@ -40,7 +41,7 @@ from isiw.session.recorder import Recorder
 from isiw.session.resume import resume
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
-from isiw.trials import MistrialReason, Trial, TrialTable
+from isiw.trials import Trial, TrialTable
 from isiw.types import Reference
 from known import known
 from logs import cut_after
@@ -144,7 +145,7 @@ def test_a_pulse_before_the_impact_is_a_mistrial(log: Path) -> None:
         with pytest.raises(InvalidValueError, match=r'came before the impact.*session.mistrial\("TMS before impact"\)'):
             session.tell(-0.5, 0.02)
         session.mistrial("TMS before impact")
-    assert [trial.reason for trial in read_session(log).table] == [MistrialReason.TMS_BEFORE_IMPACT]
+    assert [trial.reason for trial in read_session(log).table] == [Kind.TMS_BEFORE_IMPACT]
 
 
 def test_an_isi_that_nobody_knows_is_not_learnt_from(log: Path) -> None:
@@ -172,7 +173,7 @@ def test_mistrials_count_with_their_reason_and_are_asked_again(log: Path) -> Non
         assert session.ask() == isi_ms
         session.mistrial("the person laughed")
     record = read_session(log)
-    assert [trial.reason for trial in record.table] == [MistrialReason.NO_IMPACT, MistrialReason.REJECTED]
+    assert [trial.reason for trial in record.table] == [Kind.NO_IMPACT, Kind.REJECTED]
     assert [(event.kind, event.text) for event in record.events] == [("note", "the person laughed")]
 
 
@@ -180,10 +181,10 @@ def test_three_mistrials_in_a_row_are_a_warning(log: Path) -> None:
     with open_session(scripted_strategy(9), log) as session:
         for _ in range(2):
             session.ask()
-            session.mistrial(MistrialReason.NO_IMPACT)
+            session.mistrial(Kind.NO_IMPACT)
         session.ask()
         with pytest.warns(ImplausibleDataWarning, match="air supply") as warned:
-            session.mistrial(MistrialReason.NO_IMPACT)
+            session.mistrial(Kind.NO_IMPACT)
     assert [warning.filename for warning in warned] == [__file__]
 
 
@@ -192,7 +193,7 @@ def test_doubts_go_to_who_wants_them_in_place_of_a_warning(log: Path) -> None:
     with open_session(scripted_strategy(9), log, on_doubt=doubts.append) as session:
         for _ in range(3):
             session.ask()
-            session.mistrial(MistrialReason.NO_IMPACT)
+            session.mistrial(Kind.NO_IMPACT)
     assert len(doubts) == 1
     with open_session(scripted_strategy(9), log, resume=True, on_doubt=doubts.append) as session:
         for mep_mv in (8.0, 6.0, 12.0):
@@ -426,7 +427,7 @@ def test_an_excluded_trial_is_unlearnt_and_stays_so(log: Path) -> None:
         after = session.ask()
     with open_session(scripted_strategy(9), log, resume=True) as resumed:
         assert [isi for isi, _ in told_to(resumed.strategy)] == [asked[0], asked[2]]
-        assert resumed.trials[3].reason is MistrialReason.OUTCOME_UNKNOWN
+        assert resumed.trials[3].reason is Kind.OUTCOME_UNKNOWN
         assert resumed.ask() == after
 
 
@@ -596,7 +597,7 @@ def test_tms_alone_counts_also_where_what_was_told_of_it_was_refused(log: Path, 
         with pytest.raises(LimitExceededError):
             session.ask()
     table = read_session(log).table
-    assert [trial.reason for trial in table] == [MistrialReason.OUTCOME_UNKNOWN, None]
+    assert [trial.reason for trial in table] == [Kind.OUTCOME_UNKNOWN, None]
     assert table[0].commanded_isi_ms is None
 
 

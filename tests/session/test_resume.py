@@ -16,6 +16,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Readiness
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
+from isiw.findings import Kind
 from isiw.log.amending import exclude
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
@@ -30,7 +31,7 @@ from isiw.session.updates import SessionUpdate
 from isiw.strategy.catalogue import make_strategy, remade_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
-from isiw.trials import Measurement, MistrialReason, Stimulus
+from isiw.trials import Measurement, Stimulus
 from isiw.visit import VisitProtocol
 from known import known
 from log.written import make_header
@@ -102,7 +103,7 @@ def test_a_stimulus_without_outcome_becomes_a_mistrial_and_is_asked_again(
     device = ScriptedDevice()
     session = resume(interrupted, device, scripted_strategy(10))
     result = session.run()
-    assert result.trials[4].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert result.trials[4].reason is Kind.OUTCOME_UNKNOWN
     assert result.trials[4].commanded_isi_ms == uninterrupted[4]
     assert device.delivered[0].trial == 5
     assert device.delivered[0].isi_ms == uninterrupted[4]
@@ -386,7 +387,7 @@ def lose_trial_1(log: Path) -> None:
 def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted: Path) -> None:
     lose_trial_1(interrupted)
     result = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
-    assert result.trials[1].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert result.trials[1].reason is Kind.OUTCOME_UNKNOWN
     assert len(result.trials) == 10
     assert "fails its checksum" in read_session(interrupted).events[-1].text
     again = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
@@ -411,7 +412,7 @@ def test_what_was_asked_before_an_exclusion_is_compared_as_it_was_asked(
     kill_during_trial_4(interrupted, uninterrupted[4])
     exclude(interrupted, 1, "sneezed")
     result = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
-    assert result.trials[4].reason is MistrialReason.OUTCOME_UNKNOWN
+    assert result.trials[4].reason is Kind.OUTCOME_UNKNOWN
     again = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert again.trials == result.trials
 
@@ -536,7 +537,7 @@ def test_a_killed_session_loses_nothing_and_asks_the_same_again(
     device = ScriptedDevice()
     result = resume(log, device, scripted_strategy(10)).run()
     assert [stimulus.isi_ms for stimulus in device.delivered] == uninterrupted[4 : 10 - open_intents]
-    assert [t.reason for t in result.trials if t.reason] == [MistrialReason.OUTCOME_UNKNOWN] * open_intents
+    assert [t.reason for t in result.trials if t.reason] == [Kind.OUTCOME_UNKNOWN] * open_intents
     assert len(result.trials) == 10
     assert not log.with_name("s.mcap.part").exists()
 
@@ -573,7 +574,7 @@ def test_a_log_without_its_end_does_not_go_on_before_somebody_says_how_many_stim
 def test_the_stimuli_of_a_lost_end_are_counted_and_their_numbers_not_used_again(cut: Path) -> None:
     device = ScriptedDevice()
     result = resume(cut, device, scripted_strategy(10), lost_pulses=2).run()
-    assert [trial.reason for trial in list(result.trials)[4:6]] == [MistrialReason.OUTCOME_UNKNOWN] * 2
+    assert [trial.reason for trial in list(result.trials)[4:6]] == [Kind.OUTCOME_UNKNOWN] * 2
     assert [stimulus.trial for stimulus in device.delivered] == [6, 7, 8, 9]
     after = read_session(cut)
     assert (len(after.table), after.losses, after.end_lost) == (10, (), False)

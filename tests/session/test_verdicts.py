@@ -16,6 +16,7 @@ import isiw
 from forked import Forked
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError
+from isiw.findings import Kind
 from isiw.log.amending import exclude, include
 from isiw.log.reader import read_session
 from isiw.log.schema import Estimate, Event, Intent
@@ -27,7 +28,7 @@ from isiw.session.resume import resume
 from isiw.session.safeguards import Safeguards
 from isiw.session.updates import SessionUpdate
 from isiw.strategy.catalogue import make_strategy
-from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
+from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
 from scripted import ScriptedDevice, scripted_strategy, told_to
 
 Act: TypeAlias = Callable[[Session], None]
@@ -117,7 +118,7 @@ def test_a_mistrial_with_an_mep_can_be_accepted_and_keeps_what_it_was_rejected_f
     session = session_that({3: lambda session: session.accept(1)}, log, loud_in(1))
     result = session.run()
     trial = result.trials[1]
-    assert (trial.status, trial.overruled) == (Status.ACCEPTED, MistrialReason.BACKGROUND_ACTIVITY)
+    assert (trial.status, trial.overruled) == (Status.ACCEPTED, Kind.BACKGROUND_ACTIVITY)
     assert told_to(session.strategy)[1] == pytest.approx((trial.isi_ms, trial.mep_mv))
     assert read_session(log).table == result.trials
     assert verdicts(log) == [("acceptance", 1, "Accepted by the operator all the same: background activity.")]
@@ -147,7 +148,7 @@ def test_no_operator_accepts_an_amplitude_that_no_muscle_gives(log: Path) -> Non
         return Sweep({"emg": emg}, t_valve_ms=-(stimulus.isi_ms or 0.0), t_tms_ms=0.0)
 
     def refused(session: Session) -> None:
-        assert session.trials[2].reason is MistrialReason.IMPLAUSIBLE
+        assert session.trials[2].reason is Kind.IMPLAUSIBLE
         with pytest.raises(InvalidValueError, match=r"trial 2 cannot be accepted: .*194 mV is more than any"):
             session.accept(2)
 
@@ -268,7 +269,7 @@ def test_a_killed_and_resumed_session_has_them_all_and_asks_what_it_would_have_a
         assert killed.returncode == -signal.SIGKILL
     session = resume(log, loud_in(), scripted_strategy(8))
     assert [trial.index for trial in session.trials if not trial.told] == [0, 2]
-    assert session.trials[1].overruled is MistrialReason.BACKGROUND_ACTIVITY
+    assert session.trials[1].overruled is Kind.BACKGROUND_ACTIVITY
     result = session.run()
     kinds = ["note", "exclusion", "exclusion", "exclusion", "inclusion", "acceptance", "resume"]
     assert [kind for kind, _, _ in verdicts(log)] == kinds

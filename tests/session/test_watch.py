@@ -12,6 +12,7 @@ from isiw.design import DesignSpace
 from isiw.devices.callback import CallbackDevice
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
+from isiw.findings import Kind, Severity
 from isiw.log.reader import read_session
 from isiw.plots.session import session_figure
 from isiw.report import final_statement
@@ -19,11 +20,11 @@ from isiw.session import progress_row
 from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.safeguards import Safeguards
-from isiw.session.watch import Watch
 from isiw.signals import SignalLimits
+from isiw.signals.watch import Watch
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial, TrialTable
+from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial, TrialTable
 from scripted import ScriptedDevice, scripted_strategy
 from wrong_rigs import NAMED, SPACE, WRONG, rig
 
@@ -113,7 +114,7 @@ def test_a_resumed_session_has_lost_as_many_trials_as_before(log: Path) -> None:
 
 def test_volts_are_no_trials(log: Path) -> None:
     result = Session(ScriptedDevice(lambda s: Measurement(2e-5, s.isi_ms)), scripted_strategy(20), log=log).run()
-    assert {trial.reason for trial in result.trials} == {MistrialReason.IMPLAUSIBLE}
+    assert {trial.reason for trial in result.trials} == {Kind.IMPLAUSIBLE}
     assert "Is it in V?" in result.decision.reason
 
 
@@ -153,7 +154,7 @@ def test_an_mep_outside_its_window_pauses_the_session_once(log: Path) -> None:
 
 
 def early(isi_ms: float, commanded_ms: float) -> Trial:
-    return Trial(0, Status.MISTRIAL, commanded_ms, MistrialReason.TMS_BEFORE_IMPACT, isi_ms=isi_ms)
+    return Trial(0, Status.MISTRIAL, commanded_ms, Kind.TMS_BEFORE_IMPACT, isi_ms=isi_ms)
 
 
 def test_what_a_person_was_asked_to_look_at_is_told_with_the_finding_though_the_session_went_on(log: Path) -> None:
@@ -172,7 +173,7 @@ def test_a_pulse_that_is_early_within_the_tolerance_is_nobodys_fault(
     watch = Watch(SPACE, SignalLimits(), max_in_a_row=3)
     for _ in range(3):
         watch = watch.after(early(isi_ms, commanded_ms), Measurement(0.02, isi_ms))
-    assert (watch.reason is not None) is paused
+    assert (watch.pause is not None) is paused
 
 
 def test_pulses_that_are_early_at_one_isi_for_ever_pause_the_session() -> None:
@@ -182,9 +183,10 @@ def test_pulses_that_are_early_at_one_isi_for_ever_pause_the_session() -> None:
         for time in range(1, 10):
             watch = watch.after(replace(alone, mep_mv=0.1 + time / 100), Measurement(0.1, None))
             watch = watch.after(early(-1.0, isi_ms), Measurement(0.02, -1.0))
-            assert (watch.reason is not None) == (time == 9)
-        assert f"At {isi_ms:g} ms the pulse came before the impact 9 times in a row" in str(watch.reason)
-    assert watch.seen().after(early(-1.0, 1.0), Measurement(0.02, -1.0)).reason is None
+            assert (watch.pause is not None) == (time == 9)
+        assert watch.pause is not None
+        assert watch.pause.kind is Kind.EARLY_AT_ONE_ISI
+    assert watch.seen().after(early(-1.0, 1.0), Measurement(0.02, -1.0)).pause is None
 
 
 def test_a_fault_of_trials_that_count_is_shown_once() -> None:
@@ -196,16 +198,18 @@ def test_a_fault_of_trials_that_count_is_shown_once() -> None:
     answer = Measurement(0.1, 40.0, background_rms_uv=900.0)
     for trial in loud[:3]:
         watch = watch.after(trial, answer)
-    assert "more than any muscle's at rest" in (watch.reason or "")
+    assert watch.pause is not None
+    assert (watch.pause.kind, watch.pause.severity) == (Kind.LOUD, Severity.PAUSE)
     watch = watch.seen()
     for trial in loud[3:]:
         watch = watch.after(trial, answer)
-        assert watch.reason is None
-    resumed = Watch(SPACE, watch.signals, max_in_a_row=3).resumed(TrialTable(()), watch.seen_reasons)
+        assert watch.pause is None
+    resumed = Watch(SPACE, watch.signals, max_in_a_row=3).resumed(TrialTable(()), watch.paused_for)
     for trial in loud[3:]:
         resumed = resumed.after(trial, answer)
-        assert resumed.reason is None
-    lost = Trial(0, Status.MISTRIAL, 40.0, MistrialReason.ISI_OFF, isi_ms=90.0)
+        assert resumed.pause is None
+    lost = Trial(0, Status.MISTRIAL, 40.0, Kind.ISI_OFF, isi_ms=90.0)
     for _ in range(3):
         watch = watch.after(lost, Measurement(0.1, 90.0))
-    assert "Something was wrong in 3 trials in a row" in (watch.reason or "")
+    assert watch.pause is not None
+    assert watch.pause.kind is Kind.ISI_OFF

@@ -11,8 +11,9 @@ from isiw.design import DesignSpace
 from isiw.devices.robot.presets import preset
 from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.errors import DeviceError, InvalidValueError
+from isiw.findings import Kind
 from isiw.signals import SignalLimits, is_saturated, judge, judge_measurement
-from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep
+from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
 from isiw.types import ArrayLike, FloatArray
 from known import known
 from signals.made import sweep_of
@@ -65,38 +66,38 @@ def test_the_unit_of_the_emg_is_converted(unit: tuple[str, float]) -> None:
 
 def mistrial_of(
     sweep: Sweep, stimulus: Stimulus = PAIR, space: DesignSpace = IMPACT, limits: SignalLimits | None = None
-) -> MistrialReason | None:
+) -> Kind | None:
     judged = judge(sweep, stimulus, space, limits)
     assert judged.status is Status.MISTRIAL
-    measured = judged.reason is MistrialReason.BACKGROUND_ACTIVITY  # which an operator may still accept
+    measured = judged.reason is Kind.BACKGROUND_ACTIVITY  # which an operator may still accept
     assert (judged.mep_mv is not None) is measured
     return judged.reason
 
 
 def test_no_impact() -> None:
     noise = np.random.default_rng(0).standard_normal(5000)
-    assert mistrial_of(with_channel(sweep_of(), "acceleration", noise)) is MistrialReason.NO_IMPACT
+    assert mistrial_of(with_channel(sweep_of(), "acceleration", noise)) is Kind.NO_IMPACT
 
 
 def test_no_pulse() -> None:
-    assert mistrial_of(sweep_of(t_tms_ms=None)) is MistrialReason.NO_PULSE
+    assert mistrial_of(sweep_of(t_tms_ms=None)) is Kind.NO_PULSE
 
 
 def test_tms_before_the_impact_is_a_mistrial_from_the_impact_and_a_trial_from_the_valve() -> None:
     early = sweep_of(t_tms_ms=670.0)
-    assert mistrial_of(early, Stimulus(0, 0.0)) is MistrialReason.TMS_BEFORE_IMPACT
+    assert mistrial_of(early, Stimulus(0, 0.0)) is Kind.TMS_BEFORE_IMPACT
     assert judge(early, Stimulus(0, 170.0), VALVE).reason is None
 
 
 def test_background_activity() -> None:
     emg = sweep_of().channels["emg"].values + 0.02 * np.random.default_rng(2).standard_normal(5000)
-    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is MistrialReason.BACKGROUND_ACTIVITY
+    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is Kind.BACKGROUND_ACTIVITY
 
 
 def test_saturation() -> None:
     emg = np.clip(sweep_of().channels["emg"].values, -0.03, 0.03)
-    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is MistrialReason.SATURATION
-    assert mistrial_of(sweep_of(), limits=SignalLimits(full_scale_mv=0.04)) is MistrialReason.SATURATION
+    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is Kind.SATURATION
+    assert mistrial_of(sweep_of(), limits=SignalLimits(full_scale_mv=0.04)) is Kind.SATURATION
 
 
 def with_mep(peak_mv: float, seed: int, *, turn_ms: float = 2.0, rate_hz: float = 5000.0) -> FloatArray:
@@ -175,10 +176,10 @@ def test_a_clipped_mep_of_a_coarse_converter_is_saturated() -> None:
 
 
 def test_an_isi_that_is_off_by_more_than_the_tolerance() -> None:
-    assert mistrial_of(sweep_of(), Stimulus(0, 85.0)) is MistrialReason.ISI_OFF
+    assert mistrial_of(sweep_of(), Stimulus(0, 85.0)) is Kind.ISI_OFF
     assert judge(sweep_of(), Stimulus(0, 95.0), IMPACT).reason is None
     narrow = SignalLimits(isi_tolerance_ms=2.0)
-    assert mistrial_of(sweep_of(), Stimulus(0, 95.0), limits=narrow) is MistrialReason.ISI_OFF
+    assert mistrial_of(sweep_of(), Stimulus(0, 95.0), limits=narrow) is Kind.ISI_OFF
 
 
 @pytest.mark.parametrize("name", ["emg", "acceleration"])
@@ -188,17 +189,17 @@ def test_an_isi_that_is_off_by_more_than_the_tolerance() -> None:
     ids=["empty", "constant", "NaN", "other length"],
 )
 def test_a_malformed_channel_is_a_missing_channel_and_never_a_number(name: str, values: FloatArray) -> None:
-    assert mistrial_of(with_channel(sweep_of(), name, values)) is MistrialReason.MISSING_CHANNEL
+    assert mistrial_of(with_channel(sweep_of(), name, values)) is Kind.MISSING_CHANNEL
 
 
 def test_a_channel_that_is_not_there_is_a_missing_channel() -> None:
-    assert mistrial_of(without(sweep_of(), "emg")) is MistrialReason.MISSING_CHANNEL
-    assert mistrial_of(without(sweep_of(), "acceleration")) is MistrialReason.MISSING_CHANNEL
-    assert mistrial_of(sweep_of(t_valve_ms=None), space=VALVE) is MistrialReason.MISSING_CHANNEL
+    assert mistrial_of(without(sweep_of(), "emg")) is Kind.MISSING_CHANNEL
+    assert mistrial_of(without(sweep_of(), "acceleration")) is Kind.MISSING_CHANNEL
+    assert mistrial_of(sweep_of(t_valve_ms=None), space=VALVE) is Kind.MISSING_CHANNEL
 
 
 def test_a_sweep_that_ends_before_the_mep_is_a_missing_channel() -> None:
-    assert mistrial_of(sweep_of(t_tms_ms=980.0), Stimulus(0, 300.0)) is MistrialReason.MISSING_CHANNEL
+    assert mistrial_of(sweep_of(t_tms_ms=980.0), Stimulus(0, 300.0)) is Kind.MISSING_CHANNEL
 
 
 @pytest.mark.parametrize("name", ["emg", "acceleration"])
@@ -210,7 +211,7 @@ def test_an_unknown_unit_is_an_error(name: str) -> None:
 def test_a_rate_in_khz_is_an_error() -> None:
     sweep = sweep_of()
     slow = {name: replace(channel, rate_hz=5.0) for name, channel in sweep.channels.items()}
-    with pytest.raises(InvalidValueError, match="Hz, not kHz"):
+    with pytest.raises(InvalidValueError, match="Is it in kHz"):
         judge(replace(sweep, channels=slow), PAIR, IMPACT)
 
 
@@ -313,7 +314,7 @@ def sweep(emg: Channel, **times: Any) -> Sweep:
 
 def test_a_sweep_with_too_little_rest_is_a_missing_channel() -> None:
     emg = Channel(np.random.default_rng(3).standard_normal(450), 3000.0, "uV", t0_ms=-20.0)
-    assert mistrial_of(sweep(emg), Stimulus(0, None)) is MistrialReason.MISSING_CHANNEL
+    assert mistrial_of(sweep(emg), Stimulus(0, None)) is Kind.MISSING_CHANNEL
 
 
 @pytest.mark.parametrize(
@@ -327,15 +328,15 @@ def test_invalid_limits_are_errors(wrong: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("isi_ms", "commanded_ms", "space", "limits", "reason"),
     [
-        (-3.0, 5.0, IMPACT, None, MistrialReason.TMS_BEFORE_IMPACT),
+        (-3.0, 5.0, IMPACT, None, Kind.TMS_BEFORE_IMPACT),
         (-3.0, 5.0, VALVE, None, None),
         (105.0, 100.0, IMPACT, None, None),
-        (105.0, 100.0, IMPACT, SignalLimits(isi_tolerance_ms=2.0), MistrialReason.ISI_OFF),
+        (105.0, 100.0, IMPACT, SignalLimits(isi_tolerance_ms=2.0), Kind.ISI_OFF),
         (None, None, IMPACT, None, None),
     ],
 )
 def test_a_measurement_is_judged_by_the_rules_of_a_sweep(
-    isi_ms: float, commanded_ms: float, space: DesignSpace, limits: SignalLimits | None, reason: MistrialReason | None
+    isi_ms: float, commanded_ms: float, space: DesignSpace, limits: SignalLimits | None, reason: Kind | None
 ) -> None:
     judged = judge_measurement(Measurement(0.1, isi_ms), Stimulus(0, commanded_ms), space, limits)
     assert judged.reason is reason
@@ -386,13 +387,13 @@ def test_a_clipped_mep_is_saturated_also_one_step_below_the_full_scale(full_scal
     swing = 9.0 * np.sin(2 * np.pi * (times - 798.0) / 14.0) * ((times > 798.0) & (times < 812.0))
     emg = np.clip(sweep_of().channels["emg"].values + swing, -5.0 * 32767 / 32768, 5.0 * 32767 / 32768)
     clipped, limits = with_channel(sweep_of(), "emg", emg), SignalLimits(full_scale_mv=full_scale_mv)
-    assert mistrial_of(clipped, limits=limits) is MistrialReason.SATURATION
+    assert mistrial_of(clipped, limits=limits) is Kind.SATURATION
 
 
 def test_an_amplifier_that_blanks_the_mep_has_recorded_none() -> None:
     emg = sweep_of().channels["emg"].values.copy()
     emg[3895:4065] = 0.0  # from 1 ms before the pulse to 33 ms after it
-    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is MistrialReason.MISSING_CHANNEL
+    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is Kind.MISSING_CHANNEL
     emg[3960:] = sweep_of().channels["emg"].values[3960:]  # 12 ms after the pulse the MEP is yet to come
     assert judge(with_channel(sweep_of(), "emg", emg), PAIR, IMPACT).reason is None
 
@@ -401,13 +402,13 @@ def test_a_rig_that_fills_up_what_it_did_not_record_hides_no_blanking() -> None:
     emg = sweep_of().channels["emg"].values.copy()
     emg[3895:4050] = 0.0  # until 30 ms after the pulse
     emg[:200] = 0.0
-    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is MistrialReason.MISSING_CHANNEL
+    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is Kind.MISSING_CHANNEL
 
 
 def test_a_coarse_converter_blanks_nothing() -> None:
     coarse = np.round(sweep_of().channels["emg"].values / 0.02) * 0.02  # ten times the noise at rest
     reason = judge(with_channel(sweep_of(), "emg", coarse), PAIR, IMPACT).reason
-    assert reason is not MistrialReason.MISSING_CHANNEL
+    assert reason is not Kind.MISSING_CHANNEL
 
 
 @pytest.mark.parametrize("samples", [-1, 1])
@@ -416,7 +417,7 @@ def test_channels_may_differ_by_a_sample(samples: int) -> None:
     acceleration = sweep.channels["acceleration"]
     slower = np.resize(acceleration.values[::5], 1000 + samples)
     assert judge(with_channel(sweep, "acceleration", slower, rate_hz=1000.0), PAIR, IMPACT).reason is not (
-        MistrialReason.MISSING_CHANNEL
+        Kind.MISSING_CHANNEL
     )
 
 
@@ -447,7 +448,7 @@ def test_a_coarse_amplifiers_quiet_trials_are_not_taken_for_blanked_ones() -> No
     for _ in range(300):
         emg = np.round(rng.normal(0.0, 0.0015, 5000) / 0.005) * 0.005
         quiet = with_channel(sweep_of(t_valve_ms=None, t_hit_ms=680.0), "emg", emg)
-        assert judge(quiet, PAIR, IMPACT).reason is not MistrialReason.MISSING_CHANNEL
+        assert judge(quiet, PAIR, IMPACT).reason is not Kind.MISSING_CHANNEL
 
 
 def test_a_pulse_that_was_to_come_before_the_impact_counts() -> None:
@@ -455,13 +456,13 @@ def test_a_pulse_that_was_to_come_before_the_impact_counts() -> None:
     space = DesignSpace(-50, 100, reference="impact")
     assert judge(early, Stimulus(0, -30.0), space).isi_ms == -30.0
     assert judge(early, Stimulus(0, -30.0), space).reason is None
-    assert mistrial_of(early, Stimulus(0, 0.0), space) is MistrialReason.TMS_BEFORE_IMPACT
+    assert mistrial_of(early, Stimulus(0, 0.0), space) is Kind.TMS_BEFORE_IMPACT
 
 
 def test_a_glitch_beyond_any_amplifier_is_a_mistrial() -> None:
     emg = sweep_of().channels["emg"].values.copy()
     emg[4005] = 2000.0
-    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is MistrialReason.IMPLAUSIBLE
+    assert mistrial_of(with_channel(sweep_of(), "emg", emg)) is Kind.IMPLAUSIBLE
 
 
 @pytest.mark.parametrize("valve_ms", [5.0, -100.0])

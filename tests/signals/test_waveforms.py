@@ -29,7 +29,7 @@ def test_one_waveform_becomes_a_row_and_stacked_ones_are_flattened() -> None:
 @pytest.mark.parametrize(
     ("values", "rate_hz", "message"),
     [
-        ([0.0, 1.0], 3.0, "Rates are in Hz, not kHz"),
+        ([0.0, 1.0], 3.0, "Is it in kHz"),
         ([0.0, 1.0], np.nan, "sampling rate is too low"),
         ([], 3000.0, "EMG is empty"),
         ([0.0, np.inf], 3000.0, "not finite"),

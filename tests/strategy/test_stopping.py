@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
+from isiw.findings import NO_MEP
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.settling import EdgeVariance, ParticleSpread, SweptPast
 from isiw.strategy.stopping import (
@@ -21,12 +22,12 @@ from isiw.strategy.stopping import (
     Progress,
     SmallGain,
     StopDecision,
+    StopKind,
     StoppingRule,
     looks_back,
     stimuli_left,
 )
 from isiw.strategy.strategy import Strategy
-from isiw.text.found import NO_MEP, TOO_FEW
 from isiw.window import WindowEstimate
 
 
@@ -154,7 +155,7 @@ def test_before_ten_stimuli_nothing_is_known_of_what_ten_add() -> None:
 
 def test_no_window_is_never_concluded_from_data_without_an_mep() -> None:
     nothing = Progress(30, 30, WindowEstimate(0.01, None, silent=True))
-    assert NoWindow()(nothing) == StopDecision(stop=False, reason=NO_MEP)
+    assert NoWindow()(nothing) == StopDecision(stop=False, reason=str(NO_MEP), kind=StopKind.TOO_LITTLE)
 
 
 @pytest.mark.parametrize("rule", [NoWindow(0.5), ExpectedF1(0.5, 0.0), CredibleWidth(100.0, min_probability=0.0)])
@@ -165,7 +166,7 @@ def test_nothing_is_concluded_from_what_was_believed_beforehand(
     believed = WindowEstimate(0.2, None, edge_samples_ms=np.array(edges_with_width(5.0)), expected_f1=0.9, pairs=pairs)
     decision = rule(Progress(9, 9, believed))
     assert decision.stop == stop
-    assert (decision.reason == TOO_FEW) == (not stop)
+    assert (decision.kind is StopKind.TOO_LITTLE) == (not stop)
 
 
 def test_any_of_gives_the_reason_of_the_first_rule_that_stops() -> None:
@@ -183,7 +184,7 @@ def test_any_of_goes_on_with_all_reasons() -> None:
 def test_what_several_rules_say_is_said_once() -> None:
     few = Progress(2, 2, WindowEstimate(0.5, None, pairs=2, expected_f1=0.5))
     decision = AnyOf((NoWindow(), ExpectedF1(), Budget(9)))(few)
-    assert decision.reason == f"{TOO_FEW} 7 stimuli are left."
+    assert decision.kind is StopKind.TOO_LITTLE
 
 
 def test_any_of_no_rules_would_never_stop_and_is_refused() -> None:

@@ -9,14 +9,18 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from isiw.errors import ConfigError
+from isiw.findings import INTENSITY_PCT, STOP_WIDTH_MS, Scale
 
 __all__ = ["require_units"]
 
-LEAST_PCT: Final = 3.0
-"""Nobody stimulates with so low an intensity; 1.2 is meant as 120 %."""
+_SCALES: Final[Mapping[tuple[str, ...], Scale]] = {
+    ("visit", "intensity_pct_rmt"): INTENSITY_PCT,
+    ("visit", "intensity_pct_mso"): INTENSITY_PCT,
+    ("strategy", "settings", "stop_width_ms"): STOP_WIDTH_MS,
+}
 
-SHORTEST_S, LONGEST_S = 0.005, 1.0
-"""A width between these is in seconds, which no interval of an edge is in ms; what is below is to stop nothing."""
+STOPS_NOTHING_MS: Final = 0.005
+"""A smaller width to stop at is there to stop nothing."""
 
 
 def require_units(values: Mapping[str, Any]) -> None:
@@ -28,9 +32,15 @@ def require_units(values: Mapping[str, Any]) -> None:
     Raises:
         ConfigError: one does.
     """
-    for name in ("intensity_pct_rmt", "intensity_pct_mso"):
-        _require_percent(f"visit.{name}", _given(values, "visit", name))
-    _require_ms("strategy.settings.stop_width_ms", _given(values, "strategy", "settings", "stop_width_ms"))
+    for keys, scale in _SCALES.items():
+        value = _given(values, *keys)
+        slip = None if value is None else scale.slip(value)
+        if slip is not None and not (scale is STOP_WIDTH_MS and (value or 0.0) < STOPS_NOTHING_MS):
+            remedy = f"{slip} If no width is to end the session, write 0.001." if scale is STOP_WIDTH_MS else slip
+            expected = f"at least {scale.least:g}"
+            raise ConfigError(
+                f"{'.'.join(keys)} is probably in another unit", got=value, expected=expected, remedy=remedy
+            )
 
 
 def _given(values: Any, *keys: str) -> float | None:
@@ -38,23 +48,3 @@ def _given(values: Any, *keys: str) -> float | None:
     for key in keys:
         values = values.get(key) if isinstance(values, Mapping) else None
     return values if isinstance(values, int | float) else None
-
-
-def _require_percent(key: str, intensity_pct: float | None) -> None:
-    if intensity_pct is not None and intensity_pct < LEAST_PCT:
-        raise ConfigError(
-            f"{key} is in %, and this is probably a ratio",
-            got=intensity_pct,
-            expected=f"at least {LEAST_PCT:g}",
-            remedy="Multiply it by 100: 90 for 90 %.",
-        )
-
-
-def _require_ms(key: str, width_ms: float | None) -> None:
-    if width_ms is not None and SHORTEST_S <= width_ms < LONGEST_S:
-        raise ConfigError(
-            f"{key} is in ms, and this is probably in s",
-            got=width_ms,
-            expected=f"at least {LONGEST_S:g}",
-            remedy="Multiply it by 1000: 25 for 25 ms. If no width is to end the session, write 0.001.",
-        )

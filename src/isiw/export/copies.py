@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from isiw.findings import Kind
 from isiw.log.durable import part_of
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import only_in, salvage_file
 from isiw.log.verdicts import VERDICTS
 from isiw.text.numbers import counted
-from isiw.trials import MistrialReason
 
 __all__ = ["once_each", "stimuli"]
 
@@ -112,7 +112,7 @@ def _is_damaged(record: SessionRecord) -> bool:
 
 
 def _unknown(record: SessionRecord) -> list[int]:
-    return [trial.index for trial in record.table if trial.reason is MistrialReason.OUTCOME_UNKNOWN]
+    return [trial.index for trial in record.table if trial.reason is Kind.OUTCOME_UNKNOWN]
 
 
 def _of_same_stimuli(one: SessionRecord, other: SessionRecord) -> bool:

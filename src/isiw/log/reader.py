@@ -11,6 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
+from isiw.findings import lacking
 from isiw.log.frames import trial_frame
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.onsets import Onset
@@ -26,10 +27,9 @@ from isiw.log.schema import (
     Record,
 )
 from isiw.log.verdicts import VERDICTS, under_all
-from isiw.signals.doubts import is_silent
+from isiw.signals.amplitudes import is_silent
 from isiw.strategy.stopping import StopDecision
 from isiw.text.commands import command
-from isiw.text.found import lacking
 from isiw.trials import Channel, Stimulus, Trial, TrialTable
 
 __all__ = ["SessionRecord", "of_production", "read_any", "read_salvaged", "read_session", "require_records"]
@@ -140,7 +140,8 @@ class SessionRecord:
     @property
     def too_little(self) -> str | None:
         """What is said where too little was measured to speak of a window; None where enough was."""
-        return lacking(self.pairs, silent=self.is_silent)
+        found = lacking(self.pairs, silent=self.is_silent)
+        return None if found is None else f"{found}"
 
     @property
     def pairs(self) -> int:

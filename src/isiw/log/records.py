@@ -9,6 +9,7 @@ from typing import Final, TypeVar
 from pydantic import ValidationError
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.log.earlier import with_kinds
 from isiw.log.headers import first_fault, header_in_parts
 from isiw.log.onsets import Onsets
 from isiw.log.production import Production, ProductionHeader
@@ -96,6 +97,7 @@ class Records:
         """Take one more record."""
         try:
             record, unread = _decoded(message)
+            record = with_kinds(record)
             if isinstance(record, Waveform):
                 self.waveforms[record.trial, message.topic.removeprefix("/")] = record.channel()
         except ValueError as error:

@@ -30,16 +30,17 @@ from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError
+from isiw.findings import Kind
 from isiw.log.production import Production, ProductionHeader
 from isiw.signals.limits import SignalLimits
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, ThresholdEstimate
-from isiw.text.found import finding, nothing_found
 from isiw.text.stimuli import STIMULI, StimulusWords
+from isiw.text.summary import summary
 from isiw.trials import Channel, Trial
 from isiw.types import Conditioning, FloatArray
 from isiw.visit import Visit, VisitProtocol
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window, WindowEstimate, depression, nothing_found
 
 __all__ = [
     "MOST_TRIALS",
@@ -233,10 +234,10 @@ class Estimate(_Record):
     that there is more than one segment. `hypotheses` and `unusual` are probabilities by name, `best_isi_ms` is the
     median and the ends of the 90 % interval; `excluded_mv` and `excluded_pct_rmt` are the largest enhancement that is
     excluded with 90 % probability. Nine of ten next MEPs lie between `predicted_low_mv` and `predicted_high_mv`, at the
-    ISIs of the profile. `chosen_by` says what chose the next ISI (`isiw.strategy.choosing.ChosenBy`), and `scores` are
-    those of the acquisition function at `scored_ms`; both are empty where nothing is asked next. `depressed_ms` are the
-    segments in which the tap depresses the MEP, and `depressed_probability` is that there are any; None where nobody
-    looked for them.
+    ISIs of the profile. `stop_kind` says what the decision rests on, `chosen_by` what chose the next ISI
+    (`isiw.strategy.choosing.ChosenBy`), and `scores` are those of the acquisition function at `scored_ms`; both are
+    empty where nothing is asked next. `depressed_ms` are the segments in which the tap depresses the MEP, and
+    `depressed_probability` is that there are any; None where nobody looked for them.
     """
 
     trial: TrialNumber
@@ -271,6 +272,7 @@ class Estimate(_Record):
     next_isi_ms: float | None = None
     stop: bool = False
     reason: str = ""
+    stop_kind: StopKind = StopKind.OWN
 
     @classmethod
     def of(cls, trial: int, estimate: WindowEstimate, decision: StopDecision, next_isi_ms: float | None) -> Self:
@@ -308,14 +310,15 @@ class Estimate(_Record):
             next_isi_ms=next_isi_ms,
             stop=decision.stop,
             reason=decision.reason,
+            stop_kind=decision.kind,
             **_profile(estimate),
         )
 
     def __str__(self) -> str:
         start = (self.start_ms, self.start_low_ms, self.start_high_ms)
         end = (self.end_ms, self.end_low_ms, self.end_high_ms)
-        depressed = self.depressed, self.depressed_probability
-        return finding(self.probability, self.window, self.nothing, start, end, depressed)
+        depressed = depression(self.depressed, self.depressed_probability)
+        return summary(self.probability, self.window, self.nothing, start, end, depressed)
 
     @property
     def has_answer(self) -> bool:
@@ -340,7 +343,7 @@ class Estimate(_Record):
     @property
     def decision(self) -> StopDecision:
         """Whether the session stops here, and why."""
-        return StopDecision(self.stop, self.reason)
+        return StopDecision(self.stop, self.reason, self.stop_kind)
 
 
 def _edges(window: Window | None) -> tuple[float, ...]:
@@ -390,10 +393,12 @@ class Event(_Record):
 
     `trial` is the one that was judged by an operator, refused or answered late, and otherwise the last one before the
     event. What is "refused" was not delivered, whatever the intent before it says. A note with the `key` of an earlier
-    one is not logged; before there was this field, a note's text ended with it.
+    one is not logged; before there was this field, a note's text ended with it. `finding` is
+    what a doubt or a pause is about.
     """
 
     kind: EventKind
+    finding: Kind | None = None
     trial: TrialNumber | None = None
     text: str = ""
     key: str | None = None

@@ -9,9 +9,10 @@ from typing import Final
 from isiw.checks import text
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.findings import Kind
 from isiw.log.schema import Event, EventKind
-from isiw.signals.plausibility import implausible_amplitude
-from isiw.trials import MistrialReason, Trial, TrialTable
+from isiw.signals.values import implausible_amplitude
+from isiw.trials import Trial, TrialTable
 
 __all__ = ["LOOKED_AT", "VERDICTS", "acceptance", "excluded_by", "exclusion", "inclusion", "under", "under_all"]
 
@@ -127,9 +128,9 @@ def _require_of_a_muscle(trial: Trial, mep_mv: float) -> None:
     slip = implausible_amplitude(mep_mv)
     if slip is not None:
         raise InvalidValueError(
-            f"trial {trial.index} cannot be accepted: {slip.what}", got=mep_mv, remedy=f"{slip.remedy} {_KEPT}"
+            f"trial {trial.index} cannot be accepted: {slip.text}", got=mep_mv, remedy=f"{slip.remedy} {_KEPT}"
         )
-    if mep_mv == 0 and trial.reason is MistrialReason.IMPLAUSIBLE:
+    if mep_mv == 0 and trial.reason is Kind.IMPLAUSIBLE:
         raise InvalidValueError(
             f"trial {trial.index} cannot be accepted: its EMG does not move in the MEP window",
             got=mep_mv,

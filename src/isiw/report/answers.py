@@ -8,18 +8,17 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate, Event, EventKind
 from isiw.report.tables import lost_rows
 from isiw.report.words import counts_sentence
-from isiw.signals.agreement import contradicts_its_times, timed_isi_ms
-from isiw.trials import MistrialReason, Trial
+from isiw.signals.values import contradicts_its_times, timed_isi_ms
+from isiw.trials import Trial
 
 __all__ = ["Answer", "answers"]
 
-_OF_TIMING: Final = frozenset(
-    {MistrialReason.NO_IMPACT, MistrialReason.NO_PULSE, MistrialReason.TMS_BEFORE_IMPACT, MistrialReason.ISI_OFF}
-)
+_OF_TIMING: Final = frozenset({Kind.NO_IMPACT, Kind.NO_PULSE, Kind.TMS_BEFORE_IMPACT, Kind.ISI_OFF})
 MOST_NAMED: Final = 8
 """Lost trials that are named one by one."""
 
@@ -101,7 +100,7 @@ def _known(record: SessionRecord, *, measured: bool) -> int:
 def _rest(record: SessionRecord) -> Answer:
     question, limit_uv = "Was the muscle at rest?", record.header.signals.background_uv
     levels_uv = [t.background_rms_uv for t in record.table if t.background_rms_uv is not None]
-    reasons = frozenset({MistrialReason.BACKGROUND_ACTIVITY})
+    reasons = frozenset({Kind.BACKGROUND_ACTIVITY})
     rejected = _rejected_for(record, reasons)
     tense = sum((trial.background_rms_uv or 0.0) > limit_uv for trial in _not_for(record, reasons))
     verdict = _verdict(record, len(rejected) + tense, len(levels_uv))
@@ -111,14 +110,14 @@ def _rest(record: SessionRecord) -> Answer:
     return Answer(question, verdict, f"EMG before the pulse: {sizes}; {limit_uv:g} µV are allowed. {_listed(rejected)}")
 
 
-def _rejected_for(record: SessionRecord, reasons: frozenset[MistrialReason]) -> list[str]:
+def _rejected_for(record: SessionRecord, reasons: frozenset[Kind]) -> list[str]:
     """Why trials were rejected, one entry each, for any of some reasons; those that an operator accepted too."""
     lost = [str(trial.reason) for trial in record.table if trial.reason in reasons]
     overruled = [f"{t.overruled}, accepted by the operator" for t in record.table if t.overruled in reasons]
     return lost + overruled
 
 
-def _not_for(record: SessionRecord, reasons: frozenset[MistrialReason]) -> list[Trial]:
+def _not_for(record: SessionRecord, reasons: frozenset[Kind]) -> list[Trial]:
     """The trials that count, or were rejected for other reasons: of those too it is known whether this was right."""
     return [trial for trial in record.table if trial.reason not in reasons and trial.overruled not in reasons]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from isiw.log.reader import SessionRecord
-from isiw.text.found import SURE, rules_out
+from isiw.window import SURE, rules_out
 
 __all__ = ["depression_sentence"]
 

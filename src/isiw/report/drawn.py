@@ -7,12 +7,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from isiw.findings import lacking
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.report.tables import trial_row
 from isiw.report.words import finding_sentence
 from isiw.text import plain
-from isiw.text.found import lacking
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
 
@@ -82,7 +82,7 @@ def _belief(record: SessionRecord, estimate: Estimate) -> dict[str, Any]:
     pairs = sum(trial.index <= estimate.trial and trial.isi_ms is not None for trial in record.table.told)
     nothing = lacking(pairs, silent=record.is_silent)
     window = estimate.window if nothing is None else None
-    found = nothing or finding_sentence(record, estimate)
+    found = finding_sentence(record, estimate) if nothing is None else f"{nothing}"
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
     bands = {
         "profile": estimate.profile_mv,

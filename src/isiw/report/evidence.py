@@ -12,9 +12,9 @@ from typing import Final, Literal
 import numpy as np
 from scipy.stats import combine_pvalues, kendalltau, mannwhitneyu
 
+from isiw.findings import NO_MEP
 from isiw.log.reader import SessionRecord
-from isiw.signals.doubts import stopped_after
-from isiw.text.found import NO_MEP
+from isiw.signals.amplitudes import stopped_after
 from isiw.text.numbers import counted
 from isiw.trials import Trial
 from isiw.window import Window

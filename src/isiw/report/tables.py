@@ -6,11 +6,12 @@ from collections import Counter
 from itertools import groupby, pairwise
 from typing import NamedTuple
 
+from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
 from isiw.session.progress import asked, outcome
 from isiw.text.stimuli import TAP, StimulusWords
-from isiw.trials import MistrialReason, Trial
+from isiw.trials import Trial
 
 __all__ = ["Counted", "TrialRow", "counted_rows", "event_rows", "lost_rows", "trial_row"]
 
@@ -94,7 +95,7 @@ def counted_rows(record: SessionRecord) -> list[Counted]:
     isis_ms = [isi_ms for isi_ms in wanted_ms if isi_ms is not None]
     asked_ms = f"{min(isis_ms):g}–{max(isis_ms):g} ms" if isis_ms else "–"
     kept = "limits" not in record.unread
-    unknown = sum(trial.reason is MistrialReason.OUTCOME_UNKNOWN for trial in record.table) + len(record.unknown)
+    unknown = sum(trial.reason is Kind.OUTCOME_UNKNOWN for trial in record.table) + len(record.unknown)
     shortest_s = _shortest_s(record)
     return [
         Counted("stimuli delivered", f"{record.given}", f"at most {limits.max_pulses}" if kept else ""),

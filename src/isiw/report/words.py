@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from pathlib import Path
 
@@ -24,10 +23,10 @@ from isiw.report.evidence import (
 from isiw.session.header import OWN_LOOP
 from isiw.session.progress import asked, outcome
 from isiw.strategy.catalogue import known_settings, list_strategies
+from isiw.strategy.stopping import OF_THE_WINDOW
 from isiw.text.commands import command
-from isiw.text.found import SURE, rules_out
 from isiw.text.numbers import counted
-from isiw.window import MIN_EXCESS_MV, Window
+from isiw.window import MIN_EXCESS_MV, SURE, Window, rules_out
 
 __all__ = [
     "JUDGED_SINCE",
@@ -56,9 +55,6 @@ MOST_OF_THE_RANGE = 0.9
 UNUSUAL = 0.9
 """Probability from which on a person is told to be unlike most."""
 
-_OF_THE_WINDOW = re.compile(r"^(?!The session (is paused|was ended)).*(window|F1|particles)")
-"""Reasons of a strategy to stop that say something about the window."""
-
 JUDGED_SINCE = "Trials were judged anew after this estimate; resume the session to have it with what counts now."
 """What is said where `SessionRecord.is_judged_since`."""
 
@@ -82,7 +78,7 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
             fit_sentence(record),
             _unstated_hit_delay(record),
             _expects_a_tap(record),
-            last.reason if record.rests_on_data or not _OF_THE_WINDOW.search(last.reason) else "",
+            last.reason if record.rests_on_data or last.stop_kind not in OF_THE_WINDOW else "",
         ]
     if record.end_lost:
         sentences.append(

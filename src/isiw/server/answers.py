@@ -6,9 +6,10 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from isiw.findings import Kind
 from isiw.log.schema import Estimate, Number, Numbers
 from isiw.strategy.stopping import StopDecision
-from isiw.trials import MistrialReason, Status, Trial
+from isiw.trials import Status, Trial
 
 __all__ = [
     "AskAnswer",
@@ -108,7 +109,7 @@ class TrialAnswer(OkAnswer):
 
     trial: int
     status: Status
-    reason: MistrialReason | None = None
+    reason: Kind | None = None
     isi_ms: float | None = None
     mep_mv: float | None = None
     stop: bool
@@ -141,7 +142,7 @@ class TrialRow(BaseModel):
 
     trial: int
     status: Status
-    reason: MistrialReason | None
+    reason: Kind | None
     commanded_isi_ms: float | None
     isi_ms: float | None
     mep_mv: float | None

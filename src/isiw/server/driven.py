@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import Final
 
 from isiw.errors import InvalidValueError, LimitExceededError, LogError
+from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.server.answers import AskAnswer, EstimateAnswer, SessionAnswer, TrialAnswer, TrialRow
@@ -15,7 +16,7 @@ from isiw.server.refusals import Refusal, failed
 from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, NoteRequest, TellRequest
 from isiw.session.recorder import Recorder
 from isiw.strategy.stopping import StopDecision
-from isiw.trials import MistrialReason, Status, Trial
+from isiw.trials import Status, Trial
 
 __all__ = ["DrivenSession", "not_open"]
 
@@ -191,7 +192,7 @@ class DrivenSession:
             Refusal: the trial has another outcome, or was not asked for.
         """
         if request.trial in self._outcomes:
-            return self._known(request.trial, (MistrialReason.of(request.reason),), f"mistrial, {request.reason}")
+            return self._known(request.trial, (Kind.of_mistrial(request.reason),), f"mistrial, {request.reason}")
         self._require_next(request.trial, asked=True)
         self.recorder.mistrial(request.reason)
         return self._concluded()
@@ -199,7 +200,7 @@ class DrivenSession:
     def give_up(self) -> None:
         """Make an open trial a mistrial: nobody knows what came of it."""
         if self.recorder.asked is not None:
-            self.recorder.mistrial(MistrialReason.OUTCOME_UNKNOWN)
+            self.recorder.mistrial(Kind.OUTCOME_UNKNOWN)
             self._concluded()
 
     def note(self, request: NoteRequest) -> None:
@@ -244,7 +245,7 @@ class DrivenSession:
         trial = self.recorder.trials[number]
         if told == _recorded(trial):
             return self._outcomes[number]
-        late = trial.reason is MistrialReason.OUTCOME_UNKNOWN
+        late = trial.reason is Kind.OUTCOME_UNKNOWN
         text = f"An outcome of trial {number} came too late and is not used: {words}"
         if late and text not in self._notes:
             self.recorder.note(text)

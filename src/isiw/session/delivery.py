@@ -11,9 +11,9 @@ from isiw.log.schema import Event
 from isiw.session.journal import Journal
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig
-from isiw.session.watch import Watch
 from isiw.signals.judgement import judge, judge_measurement
 from isiw.signals.limits import SignalLimits
+from isiw.signals.watch import Watch
 from isiw.text.shown import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
@@ -31,7 +31,7 @@ class Delivery:
         rig: delivers.
         journal: where it is written.
         pausing: whether a failure comes of being disarmed for a pause.
-        watch: what speaks for a pause.
+        watch: finds what is wrong with a trial, and what speaks for a pause.
         space: what the ISIs are judged by.
         signals: what the sweeps are judged by.
         timeout_s: how long the device may take [s].

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from isiw import checks
 from isiw.devices.protocol import Answer
 from isiw.errors import InvalidValueError, LimitExceededError, told
+from isiw.findings import Kind
 from isiw.log.schema import Event, EventKind, Intent, Waveform
 from isiw.log.verdicts import excluded_by, under_all
 from isiw.log.writer import LogWriter
@@ -115,15 +116,16 @@ class Journal:
         """The number of the last trial; None before the first."""
         return len(self.trials) - 1 if self.trials else None
 
-    def event(self, kind: EventKind, text: str, trial: int | None = None) -> None:
+    def event(self, kind: EventKind, text: str, trial: int | None = None, finding: Kind | None = None) -> None:
         """Write that something happened, behind the last trial.
 
         Args:
             kind: what kind of thing.
             text: what, in words.
             trial: which one it is about; None for the last one.
+            finding: what was found, of a doubt or a pause.
         """
-        self.log.append(Event(kind=kind, trial=self.last if trial is None else trial, text=text))
+        self.log.append(Event(kind=kind, trial=self.last if trial is None else trial, text=text, finding=finding))
 
     def note(self, text: str, trial: int | None = None, key: str | None = None) -> None:
         """Put a remark on disk; with a key that a note has already, nothing.

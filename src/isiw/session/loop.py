@@ -33,8 +33,8 @@ from isiw.session.safeguards import Safeguards
 from isiw.session.steps import Steps, ended, paused
 from isiw.session.terminal import is_terminal, somebody_there
 from isiw.session.updates import SessionResult, SessionUpdate
-from isiw.session.watch import Watch
 from isiw.signals.limits import SignalLimits
+from isiw.signals.watch import Watch
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
@@ -187,7 +187,7 @@ class Session(Judging):
         self._header = header
         self._open_log, self._first_records = open_log, first_records
         self._own_earlier_s, self._resumed = earlier_s, True
-        pauses = [event.text for event in events if event.kind == "pause"]
+        pauses = [event.finding for event in events if event.kind == "pause" and event.finding is not None]
         self._steps.delivery.watch = self._steps.delivery.watch.resumed(trials, pauses)
 
     def run(self, *, progress: bool | None = None, keys: bool = True) -> SessionResult:

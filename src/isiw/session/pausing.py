@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from isiw.findings import Finding, Kind
 from isiw.session.asking import Asking
 from isiw.session.journal import Journal
 from isiw.session.operator import goes_on
@@ -35,6 +36,7 @@ class Pausing:
         self._rig, self._journal = rig, journal
         self.decide = safeguards.on_pause or goes_on
         self.reason: str | None = None
+        self._finding: Kind | None = None
         self.waiting: Pause | None = None
         self.asking = Asking()
 
@@ -49,8 +51,16 @@ class Pausing:
         Args:
             reason: why, for the operator and the log.
         """
-        self.reason = reason
+        self.reason, self._finding = reason, None
         self._rig.disarm()
+
+    def because(self, finding: Finding) -> None:
+        """Pause before the next stimulus for something that was found.
+
+        Args:
+            finding: what was found.
+        """
+        self.reason, self._finding = f"{finding}", finding.kind
 
     def end(self, reason: str) -> None:
         """Disarm, and end before the next stimulus, whatever is answered to a pause; from any thread.
@@ -74,7 +84,8 @@ class Pausing:
         if interrupts.ending:
             raise KeyboardInterrupt
         reason, self.reason = self.reason or _INTERRUPTED, None
-        self._journal.event("pause", reason)
+        self._journal.event("pause", reason, finding=self._finding)
+        self._finding = None
         self._journal.log.sync()
         if not self._goes_on(reason):
             if interrupts.heard:

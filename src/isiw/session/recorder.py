@@ -14,17 +14,20 @@ from isiw.devices.clock import ROUNDING_S, Clock
 from isiw.devices.pacing import Pacing
 from isiw.devices.protocol import Readiness
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, warn
+from isiw.findings import Finding, Kind, Severity
 from isiw.log.schema import Event, Header
 from isiw.log.writer import LogWriter
 from isiw.session.believed import believed
 from isiw.session.journal import Journal, learn, relearned
 from isiw.session.judging import Judging
-from isiw.signals.doubts import doubt_of, doubt_of_isi, doubts_of
-from isiw.signals.faults import remedy_for
-from isiw.signals.plausibility import require_isi_sd, require_plausible
+from isiw.signals.checklist import findings
+from isiw.signals.evidence import Evidence, told_of
+from isiw.signals.rig import remedy_for
+from isiw.signals.values import isi_far, require_isi_sd, require_plausible
+from isiw.signals.watch import Doubts
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
-from isiw.trials import MistrialReason, Status, Stimulus, Trial, TrialTable
+from isiw.trials import Status, Stimulus, Trial, TrialTable
 from isiw.window import WindowEstimate
 
 __all__ = ["Recorder"]
@@ -64,12 +67,7 @@ class Recorder(Judging):
         self._lock = threading.RLock()
         self._pacing = Pacing(header.limits, clock, earlier_s)
         self._detection_limit_mv = header.detection_limit_mv
-        self._doubts = doubts_of(*self._amplitudes())
-
-    def _amplitudes(self) -> tuple[tuple[float, ...], float | None, tuple[float | None, ...]]:
-        """What `doubt_of` takes of the trials so far."""
-        meps_mv, isis_ms = self.trials.amplitudes
-        return meps_mv, self._detection_limit_mv, isis_ms
+        self._doubts = Doubts.seen(told_of(self.trials), self._detection_limit_mv)
 
     @property
     def asked(self) -> Stimulus | None:
@@ -179,16 +177,17 @@ class Recorder(Judging):
         trial = Trial(asked.trial, Status.ACCEPTED, asked.isi_ms, isi_ms=isi_ms, mep_mv=mep_mv,
                       isi_sd_ms=isi_sd_ms, background_rms_uv=background_rms_uv)  # fmt: skip
         self._conclude(trial)
-        off, odd = doubt_of_isi(isi_ms, asked.isi_ms, self.strategy.space), doubt_of(*self._amplitudes())
-        self._doubts = self._doubts.after(off, odd)
+        evidence = Evidence(told=told_of(self.trials), detection_limit_mv=self._detection_limit_mv)
+        off = isi_far(isi_ms, asked.isi_ms, self.strategy.space)
+        self._doubts = self._doubts.after((off, *findings(evidence)))
         if self._doubts.new is not None:
-            self._warn(self._doubts.new.text)
+            self._warn(self._doubts.new)
 
-    def mistrial(self, reason: MistrialReason | str) -> None:
+    def mistrial(self, reason: Kind | str) -> None:
         """That the trial of the ISI that was asked is lost: it counts as a stimulus, and is not told.
 
         Args:
-            reason: a `MistrialReason` or its value; any other text is logged as a note, under "rejected".
+            reason: a `Kind` or its value; any other text is logged as a note, under "rejected".
 
         Raises:
             InvalidValueError: nothing was asked.
@@ -197,7 +196,7 @@ class Recorder(Judging):
         Warns:
             ImplausibleDataWarning: as many mistrials in a row as pause a session.
         """
-        known = MistrialReason.of(reason)
+        known = Kind.of_mistrial(reason)
         with self._lock:
             self._catch_up()
             asked = self._require_asked()
@@ -207,7 +206,7 @@ class Recorder(Judging):
         lost = len(list(itertools.takewhile(lambda trial: trial.reason is not None, reversed(self.trials.trials))))
         if lost == self._limits.max_consecutive_mistrials:
             mistrials = "1 mistrial" if lost == 1 else f"{lost} mistrials in a row, the last one"
-            self._warn(f"{mistrials}: {known}. {remedy_for(known)}")
+            self._warn(Finding(known, Severity.DOUBT, f"{mistrials}: {known}", remedy_for(known)))
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         with self._lock:
@@ -276,10 +275,10 @@ class Recorder(Judging):
         self._log.append(believed(self.strategy, trial, self.strategy.decision(), None))
         self._log.sync()
 
-    def _warn(self, text: str) -> None:
-        self._journal.event("doubt", text)
+    def _warn(self, doubt: Finding) -> None:
+        self._journal.event("doubt", f"{doubt}", finding=doubt.kind)
         self._log.sync()
         if self._on_doubt is not None:
-            self._on_doubt(text)
+            self._on_doubt(f"{doubt}")
         else:
-            warn(text, ImplausibleDataWarning)
+            warn(f"{doubt}", ImplausibleDataWarning)

@@ -14,7 +14,7 @@ from isiw.session.pace import Pace
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig
 from isiw.session.updates import SessionUpdate
-from isiw.strategy.stopping import StopDecision, stimuli_left
+from isiw.strategy.stopping import StopDecision, StopKind, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus, Trial
 from isiw.visit import Control
@@ -27,7 +27,7 @@ _NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
 
 def paused(reason: str) -> StopDecision:
     """The decision that does not stop, of a session that waits for a person."""
-    return StopDecision(stop=False, reason=f"The session is paused: {reason}")
+    return StopDecision.not_yet(StopKind.PAUSED, f"The session is paused: {reason}")
 
 
 def ended(reason: str) -> StopDecision:
@@ -93,7 +93,7 @@ class Steps:
             self.log_estimate(len(self._journal.trials) - 1)
 
     def _stop_at_limit(self) -> StopDecision:
-        decision = StopDecision(stop=True, reason=f"The limit of {self._header.limits.max_pulses} pulses is reached.")
+        decision = StopDecision.now(StopKind.LIMIT, f"The limit of {self._header.limits.max_pulses} pulses is reached.")
         self._journal.event("limit", decision.reason)
         last = len(self._journal.trials) - 1
         self._journal.log.append(self._freely(believed, self.strategy, last, decision, None))
@@ -154,11 +154,11 @@ class Steps:
         if trial.told and self.strategy.trouble is not None:
             self._journal.log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
         if (doubt := self.delivery.watch.doubts.new) is not None:
-            self._journal.event("doubt", doubt.text)
+            self._journal.event("doubt", f"{doubt}", finding=doubt.kind)
         estimate, decision, next_isi_ms = self.log_estimate(trial.index)
         self._journal.unconcluded = None
-        if not decision.stop and self.delivery.watch.reason is not None:
-            self._pausing.reason = self.delivery.watch.reason
+        if not decision.stop and self.delivery.watch.pause is not None:
+            self._pausing.because(self.delivery.watch.pause)
         if self.on_trial is not None:
             left = self._stimuli_left()
             update = SessionUpdate(trial, estimate, decision, next_isi_ms, left, self._pace.left_s(left))
@@ -175,8 +175,8 @@ class Steps:
 
     def _decision(self) -> StopDecision:
         """The strategy's decision; none is made on data that a person should look at first."""
-        reason = self.delivery.watch.reason
-        return self.strategy.decision() if reason is None or not self._stimuli_left() else paused(reason)
+        pause = self.delivery.watch.pause
+        return self.strategy.decision() if pause is None or not self._stimuli_left() else paused(f"{pause}")
 
     def _stimuli_left(self) -> int:
         budget = stimuli_left(self.strategy.stopping, self.strategy.spent)

@@ -1,6 +1,6 @@
 """The judgement of a trial: from its sweep to an amplitude at a realised ISI, or to the reason why there is none.
 
-What goes wrong in one trial is a mistrial, with a reason from the closed list of `MistrialReason`. What is wrong with
+What goes wrong in one trial is a mistrial, with a reason from the closed list of `MISTRIALS`. What is wrong with
 every trial, an unknown unit or a rate that measures nothing, is an error: repeating the trial would not help.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from isiw.checks import MOST_MEP_MV
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
-from isiw.signals.agreement import pulse_with_tap_alone, require_agreement, tap_with_tms_alone
+from isiw.findings import Kind
 from isiw.signals.amplifier import is_blanked, is_saturated
 from isiw.signals.events import tap_artefact_times
 from isiw.signals.impact import impact_time
@@ -26,10 +26,16 @@ from isiw.signals.mep import (
     background_rms,
     mep_amplitudes,
 )
-from isiw.signals.plausibility import before_impact, implausible_amplitude
 from isiw.signals.units import ACCELERATION_UNITS, EMG_UNITS_MV, require_unit
+from isiw.signals.values import (
+    before_impact,
+    implausible_amplitude,
+    pulse_with_tap_alone,
+    require_agreement,
+    tap_with_tms_alone,
+)
 from isiw.signals.waveforms import MIN_REST_MS, is_recording
-from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
+from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from isiw.types import FloatArray
 
 __all__ = [
@@ -59,22 +65,22 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
 def _judge_pulse(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Trial:
     """A pair of stimuli, or TMS alone."""
     timed = _judge_timing(sweep, stimulus, space, limits)
-    if timed.reason is not MistrialReason.OUTCOME_UNKNOWN:
+    if timed.reason is not Kind.OUTCOME_UNKNOWN:
         return timed
     emg = sweep.channels["emg"]
     emg_mv = emg.values * _unit_mv(emg)
     if not _holds_window(emg, timed, limits):
-        return _mistrial(timed, MistrialReason.MISSING_CHANNEL)
+        return _mistrial(timed, Kind.MISSING_CHANNEL)
     timed = replace(timed, background_rms_uv=_background_uv(emg_mv, emg, timed))
     pulse = _on_channel(timed.t_tms_ms, emg)
     span_ms = (pulse + limits.mep_window_ms[0], pulse + limits.mep_window_ms[1])
     if is_saturated(emg_mv, emg.rate_hz, limits.full_scale_mv, span_ms=span_ms):
-        return _mistrial(timed, MistrialReason.SATURATION)
+        return _mistrial(timed, Kind.SATURATION)
     if timed.background_rms_uv is None or is_blanked(emg_mv, emg.rate_hz, pulse, span_ms):
-        return _mistrial(timed, MistrialReason.MISSING_CHANNEL)
+        return _mistrial(timed, Kind.MISSING_CHANNEL)
     measured = _measured(timed, _mep_mv(emg_mv, emg, timed, limits))
     if timed.background_rms_uv > limits.background_uv:
-        return _mistrial(measured, MistrialReason.BACKGROUND_ACTIVITY)
+        return _mistrial(measured, Kind.BACKGROUND_ACTIVITY)
     return measured
 
 
@@ -84,14 +90,14 @@ def _judge_tap(sweep: Sweep, stimulus: Stimulus, limits: SignalLimits) -> Trial:
         raise pulse_with_tap_alone(sweep.t_tms_ms)
     judged = replace(Trial.unknown(stimulus), t_valve_ms=sweep.t_valve_ms)
     if not _usable(sweep, "emg") or not of_one_length(sweep):
-        return _mistrial(judged, MistrialReason.MISSING_CHANNEL)
+        return _mistrial(judged, Kind.MISSING_CHANNEL)
     emg = sweep.channels["emg"]
     hit_ms, wrong = _impact(sweep)
     judged = replace(judged, t_hit_ms=hit_ms)
     at_rest_until = replace(judged, t_tms_ms=sweep.t_valve_ms if hit_ms is None else hit_ms, t_hit_ms=None)
     judged = replace(judged, background_rms_uv=_background_uv(emg.values * _unit_mv(emg), emg, at_rest_until))
     if wrong is None and (judged.background_rms_uv or 0.0) > limits.background_uv:
-        wrong = MistrialReason.BACKGROUND_ACTIVITY
+        wrong = Kind.BACKGROUND_ACTIVITY
     return _mistrial(judged, wrong) if wrong else replace(judged, status=Status.ACCEPTED, reason=None)
 
 
@@ -101,7 +107,7 @@ def _measured(timed: Trial, mep_mv: float) -> Trial:
         return timed
     if mep_mv == 0 or implausible_amplitude(mep_mv) is not None:
         told_mv = mep_mv if mep_mv <= MOST_MEP_MV else None  # as where a sample is missing and the converter says so
-        return _mistrial(replace(timed, mep_mv=told_mv), MistrialReason.IMPLAUSIBLE)
+        return _mistrial(replace(timed, mep_mv=told_mv), Kind.IMPLAUSIBLE)
     return replace(timed, status=Status.ACCEPTED, reason=None, mep_mv=mep_mv)
 
 
@@ -135,13 +141,13 @@ def judge_measurement(
     if measurement.isi_ms is not None and stimulus.isi_ms is not None:
         wrong = wrong_isi(measurement.isi_ms, stimulus.isi_ms, space, limits)
     if wrong is None and (measurement.background_rms_uv or 0.0) > limits.background_uv:
-        wrong = MistrialReason.BACKGROUND_ACTIVITY
+        wrong = Kind.BACKGROUND_ACTIVITY
     if wrong is None and implausible_amplitude(measurement.mep_mv) is not None:
-        wrong = MistrialReason.IMPLAUSIBLE
+        wrong = Kind.IMPLAUSIBLE
     return judged if wrong is None else _mistrial(judged, wrong)
 
 
-def _mistrial(judged: Trial, reason: MistrialReason) -> Trial:
+def _mistrial(judged: Trial, reason: Kind) -> Trial:
     return replace(judged, status=Status.MISTRIAL, reason=reason)
 
 
@@ -149,10 +155,10 @@ def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: 
     """The realised ISI, or what is wrong with the timing; where nothing is, the outcome is still unknown."""
     judged = replace(Trial.unknown(stimulus), t_valve_ms=sweep.t_valve_ms, t_tms_ms=sweep.t_tms_ms)
     if not _usable(sweep, "emg") or not of_one_length(sweep):
-        return _mistrial(judged, MistrialReason.MISSING_CHANNEL)
+        return _mistrial(judged, Kind.MISSING_CHANNEL)
     _unit_mv(sweep.channels["emg"])
     if sweep.t_tms_ms is None:
-        return _mistrial(judged, MistrialReason.NO_PULSE)
+        return _mistrial(judged, Kind.NO_PULSE)
     if stimulus.isi_ms is None:
         _require_no_tap(sweep)
         return judged
@@ -160,7 +166,7 @@ def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: 
     judged = replace(judged, t_hit_ms=hit, isi_sd_ms=sweep.isi_sd_ms)
     start = hit if space.reference == "impact" else sweep.t_valve_ms
     if wrong is not None or start is None:
-        return _mistrial(judged, wrong or MistrialReason.MISSING_CHANNEL)
+        return _mistrial(judged, wrong or Kind.MISSING_CHANNEL)
     isi_ms = sweep.t_tms_ms - start
     judged = replace(judged, isi_ms=isi_ms)
     wrong = wrong_isi(isi_ms, stimulus.isi_ms, space, limits)
@@ -185,7 +191,7 @@ def _unwanted_impact(sweep: Sweep) -> float | None:
 
 def wrong_isi(
     isi_ms: float, commanded_isi_ms: float, space: DesignSpace, limits: SignalLimits | None = None
-) -> MistrialReason | None:
+) -> Kind | None:
     """What is wrong with a realised ISI; None where the trial may be told.
 
     Args:
@@ -196,11 +202,11 @@ def wrong_isi(
     """
     limits = limits or SignalLimits()
     if before_impact(isi_ms, commanded_isi_ms, space):
-        return MistrialReason.TMS_BEFORE_IMPACT
-    return MistrialReason.ISI_OFF if abs(isi_ms - commanded_isi_ms) > limits.tolerance_ms(space) else None
+        return Kind.TMS_BEFORE_IMPACT
+    return Kind.ISI_OFF if abs(isi_ms - commanded_isi_ms) > limits.tolerance_ms(space) else None
 
 
-def _impact(sweep: Sweep) -> tuple[float | None, MistrialReason | None]:
+def _impact(sweep: Sweep) -> tuple[float | None, Kind | None]:
     """The impact as told by the device or found in the acceleration, and what is wrong where it should be there."""
     if sweep.t_hit_ms is not None:
         return sweep.t_hit_ms, None
@@ -209,9 +215,9 @@ def _impact(sweep: Sweep) -> tuple[float | None, MistrialReason | None]:
     channel = sweep.channels["acceleration"]
     require_unit("acceleration", channel.unit, ACCELERATION_UNITS)
     if sweep.t_valve_ms is None or not _usable(sweep, "acceleration"):
-        return None, MistrialReason.MISSING_CHANNEL
+        return None, Kind.MISSING_CHANNEL
     hit = impact_time(channel.values, channel.rate_hz, sweep.t_valve_ms - channel.t0_ms)
-    return (None, MistrialReason.NO_IMPACT) if hit is None else (hit + channel.t0_ms, None)
+    return (None, Kind.NO_IMPACT) if hit is None else (hit + channel.t0_ms, None)
 
 
 def _usable(sweep: Sweep, name: str) -> bool:

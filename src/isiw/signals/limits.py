@@ -10,16 +10,13 @@ from typing import Final
 from isiw.checks import ascending, check_numbers
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.findings import BACKGROUND_LIMIT_UV, WINDOW_END_MS
 from isiw.signals.mep import MEP_WINDOW_MS
 
 __all__ = ["ARTEFACT_MS", "SignalLimits"]
 
 ARTEFACT_MS: Final = 3.0
 """How long after the pulse its own artefact lasts, at least [ms]."""
-
-LEAST_WINDOW_MS: Final = 1.0
-LEAST_BACKGROUND_UV: Final = 0.2
-"""No amplifier is so quiet, and no MEP so early: such limits are in mV, or in s."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +47,12 @@ class SignalLimits:
         check_numbers(self, "background_uv", "tap_artefact_ms", above=0)
         check_numbers(self, "full_scale_mv", "isi_tolerance_ms", above=0, optional=True)
         _check_window(self.mep_window_ms)
-        if self.background_uv < LEAST_BACKGROUND_UV:
+        if (slip := BACKGROUND_LIMIT_UV.slip(self.background_uv)) is not None:
             raise InvalidValueError(
                 "SignalLimits.background_uv is less than any amplifier's noise",
                 got=self.background_uv,
                 expected="µV RMS, such as 10",
-                remedy="Is it in mV? Multiply by 1000.",
+                remedy=slip,
             )
 
     def require_behind_artefact(self) -> None:
@@ -85,10 +82,10 @@ def _check_window(window_ms: tuple[float, float]) -> None:
     if not isinstance(window_ms, Sequence) or len(window_ms) != 2:
         raise InvalidValueError(f"{name} must be its first and its last ms", got=window_ms, expected=such_as)
     _, last_ms = ascending(name, window_ms, least=0)
-    if last_ms < LEAST_WINDOW_MS:
+    if (slip := WINDOW_END_MS.slip(last_ms)) is not None:
         raise InvalidValueError(
             f"{name} ends before any MEP begins",
             got=window_ms,
             expected=f"ms after the pulse, {such_as}",
-            remedy="Is it in seconds? Multiply by 1000.",
+            remedy=slip,
         )

@@ -15,8 +15,9 @@ import numpy as np
 
 from isiw.checks import number, whole
 from isiw.errors import InvalidValueError
+from isiw.findings import RATE_HZ
 from isiw.signals.impact import DETECTION_LATENCY_MS, FALL_MS, HYSTERESIS_SD, MOTION_MS, last_fall
-from isiw.signals.waveforms import MIN_RATE_HZ, REST_MS, rest_level
+from isiw.signals.waveforms import REST_MS, rest_level
 from isiw.types import ArrayLike, FloatArray
 
 __all__ = ["Impact", "ImpactDetector"]
@@ -117,7 +118,7 @@ class ImpactDetector:
     """
 
     def __init__(self, rate_hz: float) -> None:
-        self._rate_hz = number("rate_hz", rate_hz, least=MIN_RATE_HZ)
+        self._rate_hz = number("rate_hz", rate_hz, least=RATE_HZ.least)
         self._keep = round(REST_MS * rate_hz / 1000)
         self._kept: FloatArray = np.empty(0)
         self._next = 0

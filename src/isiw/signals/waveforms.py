@@ -11,10 +11,10 @@ from numbers import Real
 import numpy as np
 
 from isiw.errors import InvalidValueError
+from isiw.findings import RATE_HZ
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
-    "MIN_RATE_HZ",
     "REST_MS",
     "as_waveforms",
     "crossing_before",
@@ -26,8 +26,6 @@ __all__ = [
     "rest_level",
 ]
 
-MIN_RATE_HZ = 1000.0
-"""Below this a surface MEP and an impact are not resolved; recordings use 3–10 kHz."""
 
 MIN_REST_MS = 20.0
 REST_MS = 200.0
@@ -60,12 +58,12 @@ def as_waveforms(values: ArrayLike, rate_hz: float, name: str = "waveform") -> F
         raise InvalidValueError(
             f"the {name} is no array of numbers", remedy="Are the sweeps of one length? Cut them to the shortest."
         ) from error
-    if not (isinstance(rate_hz, Real) and math.isfinite(rate_hz) and rate_hz >= MIN_RATE_HZ):
+    if not (isinstance(rate_hz, Real) and math.isfinite(rate_hz) and rate_hz >= RATE_HZ.least):
         raise InvalidValueError(
             f"the {name}'s sampling rate is too low to measure anything",
             got=rate_hz,
-            expected=f"at least {MIN_RATE_HZ:g} Hz",
-            remedy="Rates are in Hz, not kHz.",
+            expected=f"at least {RATE_HZ.least:g} Hz",
+            remedy=RATE_HZ.slip(rate_hz) if isinstance(rate_hz, Real) else None,
         )
     if waves.ndim == 0 or waves.size == 0:
         raise InvalidValueError(f"the {name} is empty", got=waves.shape, expected="shape (..., w)")

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from enum import StrEnum
+from typing import Final, Protocol, Self, runtime_checkable
 
 from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.errors import InvalidValueError
-from isiw.text.found import SURE
 from isiw.text.numbers import counted
-from isiw.window import WindowEstimate
+from isiw.window import SURE, WindowEstimate
 
 __all__ = [
     "AnyOf",
@@ -26,18 +26,57 @@ __all__ = [
     "Progress",
     "SmallGain",
     "StopDecision",
+    "StopKind",
     "StoppingRule",
     "looks_back",
     "stimuli_left",
 ]
 
 
+class StopKind(StrEnum):
+    """What a decision rests on."""
+
+    BUDGET = "budget"
+    LIMIT = "limit"
+    KNOWN = "window known"
+    ABSENT = "no window"
+    SMALL_GAIN = "small gain"
+    SETTLED = "settled"
+    TOO_LITTLE = "too little measured"
+    PAUSED = "paused"
+    THRESHOLD = "threshold"
+    OWN = "a user's own rule"
+
+
+OF_THE_WINDOW: Final = frozenset(
+    {StopKind.KNOWN, StopKind.ABSENT, StopKind.SMALL_GAIN, StopKind.SETTLED, StopKind.TOO_LITTLE}
+)
+"""Decisions that say something about the window; they mean nothing where too little was measured."""
+
+
 @dataclass(frozen=True)
 class StopDecision:
-    """Whether to stop, and why. `reason` is a full sentence either way."""
+    """Whether to stop, and why.
+
+    Args:
+        stop: whether to stop.
+        reason: why, or why not, in full sentences.
+        kind: what it rests on.
+    """
 
     stop: bool
     reason: str
+    kind: StopKind = StopKind.OWN
+
+    @classmethod
+    def now(cls, kind: StopKind, reason: str) -> Self:
+        """The decision to stop."""
+        return cls(stop=True, reason=reason, kind=kind)
+
+    @classmethod
+    def not_yet(cls, kind: StopKind, reason: str) -> Self:
+        """The decision to continue."""
+        return cls(stop=False, reason=reason, kind=kind)
 
 
 @dataclass(frozen=True)
@@ -106,8 +145,8 @@ class Budget:
         """Decide whether to stop."""
         left = self.max_trials - progress.delivered
         if left <= 0:
-            return StopDecision(stop=True, reason=f"The budget of {self.max_trials} stimuli is used up.")
-        return StopDecision(stop=False, reason=f"{counted(left, 'stimulus is left', 'stimuli are left')}.")
+            return StopDecision.now(StopKind.BUDGET, f"The budget of {self.max_trials} stimuli is used up.")
+        return StopDecision.not_yet(StopKind.BUDGET, f"{counted(left, 'stimulus is left', 'stimuli are left')}.")
 
 
 @dataclass(frozen=True)
@@ -140,10 +179,10 @@ class CredibleWidth:
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
         if progress.estimate.too_little is not None:
-            return StopDecision(stop=False, reason=progress.estimate.too_little)
+            return StopDecision.not_yet(StopKind.TOO_LITTLE, progress.estimate.too_little)
         intervals = progress.estimate.robust_interval(self.level, self.min_share)
         if intervals is None:
-            return StopDecision(stop=False, reason="The edges have no credible intervals.")
+            return StopDecision.not_yet(StopKind.KNOWN, "The edges have no credible intervals.")
         # An edge that lies beyond the range for certain is an answer: its interval has no width.
         widths = [0.0 if low == high else high - low for low, high in intervals]
         known = (progress.estimate.probability or 0.0) >= self.min_probability and max(widths) <= self.width_ms
@@ -153,8 +192,8 @@ class CredibleWidth:
         if progress.estimate.hypotheses is not None:
             spans += " under every likely hypothesis"
         if known:
-            return StopDecision(stop=True, reason=f"The window is known: {spans}.")
-        return StopDecision(stop=False, reason=f"The window is not known well enough yet: {spans}.")
+            return StopDecision.now(StopKind.KNOWN, f"The window is known: {spans}.")
+        return StopDecision.not_yet(StopKind.KNOWN, f"The window is not known well enough yet: {spans}.")
 
 
 def _span(width_ms: float) -> str:
@@ -180,14 +219,14 @@ class NoWindow:
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
         if progress.estimate.probability is None:
-            return StopDecision(stop=False, reason="The probability of a window is not known.")
+            return StopDecision.not_yet(StopKind.ABSENT, "The probability of a window is not known.")
         if progress.estimate.too_little is not None:
-            return StopDecision(stop=False, reason=progress.estimate.too_little)
+            return StopDecision.not_yet(StopKind.TOO_LITTLE, progress.estimate.too_little)
         absent = 1.0 - progress.estimate.probability
         if absent >= self.probability:
             there_is = "There is no window" if absent >= SURE else "There is probably no window"
-            return StopDecision(stop=True, reason=f"{there_is}, with probability {absent:.2f}.")
-        return StopDecision(stop=False, reason=f"The probability that there is no window is {absent:.2f}.")
+            return StopDecision.now(StopKind.ABSENT, f"{there_is}, with probability {absent:.2f}.")
+        return StopDecision.not_yet(StopKind.ABSENT, f"The probability that there is no window is {absent:.2f}.")
 
 
 @dataclass(frozen=True)
@@ -212,13 +251,13 @@ class ExpectedF1:
         """Decide whether to stop."""
         estimate = progress.estimate
         if estimate.expected_f1 is None or estimate.probability is None:
-            return StopDecision(stop=False, reason="The F1 to be expected is not known.")
+            return StopDecision.not_yet(StopKind.KNOWN, "The F1 to be expected is not known.")
         if estimate.too_little is not None:
-            return StopDecision(stop=False, reason=estimate.too_little)
+            return StopDecision.not_yet(StopKind.TOO_LITTLE, estimate.too_little)
         expected = f"an expected F1 of {estimate.expected_f1:.2f}"
         if self.f1 < 1.0 and estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
-            return StopDecision(stop=True, reason=f"The window is known, with {expected}.")
-        return StopDecision(stop=False, reason=f"The window as it is known so far has {expected}.")
+            return StopDecision.now(StopKind.KNOWN, f"The window is known, with {expected}.")
+        return StopDecision.not_yet(StopKind.KNOWN, f"The window as it is known so far has {expected}.")
 
 
 @dataclass(frozen=True)
@@ -254,14 +293,16 @@ class SmallGain:
         now, earlier = progress.estimate, progress.past[-self.last - 1 :]
         before = earlier[0].expected_f1 if len(earlier) > self.last else None
         if now.expected_f1 is None or now.probability is None or before is None:
-            return StopDecision(stop=False, reason=f"It is too early to say what {self.last} more stimuli would add.")
+            return StopDecision.not_yet(
+                StopKind.SMALL_GAIN, f"It is too early to say what {self.last} more stimuli would add."
+            )
         added = f"the last {self.last} stimuli added {now.expected_f1 - before:.2f} to the expected F1"
         small = self.gain > 0 and now.expected_f1 - before < self.gain and now.probability >= self.min_probability
         if small and progress.told >= self.min_told:
             reason = f"Another {self.last} stimuli would add little: {added}, now {now.expected_f1:.2f}."
-            return StopDecision(stop=True, reason=reason)
+            return StopDecision.now(StopKind.SMALL_GAIN, reason)
         reason = f"Too early to stop: {added}, and a window has probability {now.probability:.2f}."
-        return StopDecision(stop=False, reason=reason)
+        return StopDecision.not_yet(StopKind.SMALL_GAIN, reason)
 
 
 @dataclass(frozen=True)
@@ -297,7 +338,9 @@ class AnyOf:
             if decision.stop:
                 return decision
         reasons = dict.fromkeys(decision.reason for decision in decisions)  # what several rules say is said once
-        return StopDecision(stop=False, reason=" ".join(reasons))
+        kinds = [decision.kind for decision in decisions]
+        kind = next((kind for kind in kinds if kind in OF_THE_WINDOW), kinds[0])
+        return StopDecision.not_yet(kind, " ".join(reasons))
 
 
 def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:

@@ -16,13 +16,16 @@ from isiw.acquisition.protocol import AcquisitionFunction, require_acquisition
 from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
+from isiw.findings import NO_MEP
 from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
-from isiw.signals.doubts import Doubts, doubt_of, doubt_of_isi, is_silent
-from isiw.signals.plausibility import off_by, require_isi_sd, require_plausible
+from isiw.signals.amplitudes import is_silent
+from isiw.signals.checklist import findings
+from isiw.signals.evidence import Evidence, Told
+from isiw.signals.values import isi_far, off_by, require_isi_sd, require_plausible
+from isiw.signals.watch import Doubts
 from isiw.strategy.choosing import Choice, Cost, evenly_spaced, instead_of_lost
 from isiw.strategy.course import Method
-from isiw.strategy.stopping import StopDecision, StoppingRule
-from isiw.text.found import NO_MEP
+from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule
 from isiw.types import FloatArray
 from isiw.window import WindowEstimate
 
@@ -106,8 +109,7 @@ class Strategy:
                 remedy="Choose another acquisition function, or a model whose posterior has the capability.",
             )
         self._mistrials = self._controls = self._lost = 0
-        self._meps_mv: list[float] = []
-        self._isis_ms: list[float | None] = []
+        self._told: list[Told] = []
         self._doubts = Doubts()
         self._choice: Choice | None = None
         self._batch_ms: list[float] = []  # what was not told yet of the last batch
@@ -262,12 +264,10 @@ class Strategy:
         require_plausible(plain_ms, plain_mv, asked_ms, self.space)
         require_isi_sd(isi_sd_ms)
         self.learn(isi_ms, mep_mv, response=response, isi_sd_ms=isi_sd_ms)
-        self._doubts = self._doubts.after(
-            doubt_of_isi(plain_ms, asked_ms, self.space),
-            doubt_of(self._meps_mv, self.detection_limit_mv, self._isis_ms),
-        )
+        evidence = Evidence(told=self._told, detection_limit_mv=self.detection_limit_mv)
+        self._doubts = self._doubts.after((isi_far(plain_ms, asked_ms, self.space), *findings(evidence)))
         if self._doubts.new is not None:
-            warn(self._doubts.new.text, ImplausibleDataWarning)
+            warn(f"{self._doubts.new}", ImplausibleDataWarning)
 
     def learn(
         self,
@@ -300,8 +300,7 @@ class Strategy:
         isi_ms = None if isi_ms is None else self.space.check_realised(isi_ms)
         self._course = self._course.after(Observation.of([isi_ms], [mep_mv], [isi_sd_ms], [response]))
         if mep_mv is not None:
-            self._meps_mv.append(mep_mv)
-            self._isis_ms.append(isi_ms)
+            self._told.append(Told(mep_mv, isi_ms))
         self._batch_ms = self._left_of_batch_ms(isi_ms)
         self._choice = self._fallback_reason = None
         self._lost = 0 if isi_ms is not None else self._lost
@@ -356,8 +355,12 @@ class Strategy:
     def decision(self) -> StopDecision:
         """Whether to stop now, and why."""
         decision = self._course.decision(mistrials=self._mistrials, silent=self._is_silent)
-        return StopDecision(stop=False, reason=NO_MEP) if self._is_silent and not decision.stop else decision
+        return (
+            StopDecision.not_yet(StopKind.TOO_LITTLE, f"{NO_MEP}")
+            if self._is_silent and not decision.stop
+            else decision
+        )
 
     @property
     def _is_silent(self) -> bool:
-        return is_silent(self._meps_mv, self.detection_limit_mv)
+        return is_silent([told.mep_mv for told in self._told], self.detection_limit_mv)

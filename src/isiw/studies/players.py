@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 from isiw.strategy.choosing import Choice
-from isiw.strategy.stopping import StopDecision, StoppingRule
+from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.subject import Response
 from isiw.window import Window, WindowEstimate
@@ -138,7 +138,7 @@ class _PlayerAlone:
 
     def decision(self, person: int) -> StopDecision:
         del person
-        return StopDecision(stop=False, reason="The player has no stopping rule.")
+        return StopDecision.not_yet(StopKind.OWN, "The player has no stopping rule.")
 
     def trouble(self) -> bool:
         return False

@@ -219,7 +219,7 @@ class _Person:
         self.mistrials = self.fallbacks = 0
         self.troubles = 0.0
         converged = math.nan if session.stopping == "ignored" else 0.0
-        self.stop: dict[str, Any] = {"stop_trial": math.nan, "stop_reason": "", "converged": converged}
+        self.stop: dict[str, Any] = {"stop_trial": math.nan, "stop_kind": "", "stop_reason": "", "converged": converged}
         self.stop |= {f"stop_{name}": math.nan for name in _OF_THE_STOP}
 
     @property
@@ -288,7 +288,8 @@ class _Person:
         rule = self.crowd.stopping
         if rule is not None and (decision := self.crowd.decision(self.number)).stop:
             left = stimuli_left(rule, delivered)
-            self.stop = {"stop_trial": float(delivered), "stop_reason": decision.reason, "converged": float(left != 0)}
+            why = {"stop_kind": str(decision.kind), "stop_reason": decision.reason}
+            self.stop = {"stop_trial": float(delivered), **why, "converged": float(left != 0)}
             judged = _judged(self.crowd.estimate(self.number), self.truth, self.session.space)
             self.stop |= {f"stop_{name}": judged[name] for name in _OF_THE_STOP}
 

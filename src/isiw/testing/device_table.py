@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from isiw.devices.protocol import Answer, DeviceInfo
-from isiw.signals.faults import steepest_edge, tap_span_ms
 from isiw.signals.limits import SignalLimits
+from isiw.signals.rig import steepest_edge, tap_span_ms
 from isiw.trials import Channel, Stimulus, Sweep, Trial
 
 __all__ = ["NEAR_PULSE_MS", "Delivery", "DeviceTable", "device_table", "edges_ms"]

@@ -13,11 +13,13 @@ from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
 from isiw.errors import IsiwError
+from isiw.findings import Kind
 from isiw.log.topics import waveform_topic
 from isiw.session.rig import own_reference
 from isiw.signals import SignalLimits, judge, judge_measurement
-from isiw.signals.doubts import DoubtKind, doubt_of
-from isiw.signals.faults import likely_fault, too_early_by_chance
+from isiw.signals.checklist import findings
+from isiw.signals.evidence import Evidence, Told
+from isiw.signals.rig import too_early_by_chance
 from isiw.testing.device_table import Delivery, DeviceTable, device_table
 from isiw.testing.guarded import Guarded, Pace
 from isiw.testing.phantom import artefact_in_window, late_artefact
@@ -204,15 +206,12 @@ def _require_usable(deliveries: Sequence[Delivery], rules: _Rules, *, real: bool
     """Raise where a session would reject what was delivered, or pause over it, or take an artefact for an MEP."""
     said = []
     for delivery in deliveries:
-        fault = likely_fault(delivery.answer, delivery.trial, rules.limits)
-        if fault is not None and not too_early_by_chance(delivery.trial, rules.space):
-            said.append(
-                f"{fault}" if delivery.trial.reason is None else f"a mistrial, {delivery.trial.reason}: {fault}"
-            )
-    meps_mv = [delivery.trial.mep_mv for delivery in deliveries if delivery.trial.mep_mv is not None]
-    doubt = doubt_of(meps_mv)
-    if doubt is not None and doubt.kind is not DoubtKind.EQUAL:
-        said.append(doubt.text)
+        trial = delivery.trial
+        found = next(findings(Evidence(trial, delivery.answer, rules.limits)), None)
+        if found is not None and not too_early_by_chance(trial, rules.space):
+            said.append(f"{found}" if trial.reason is None else f"a mistrial, {trial.reason}: {found}")
+    told = [Told(delivery.trial.mep_mv) for delivery in deliveries if delivery.trial.mep_mv is not None]
+    said += [f"{doubt}" for doubt in findings(Evidence(told=told)) if doubt.kind is not Kind.EQUAL][:1]
     artefact = (artefact_in_window(deliveries, rules.limits) or late_artefact(deliveries)) if real else None
     if artefact is not None:
         said.append(artefact)

@@ -54,6 +54,7 @@ class Fault(StrEnum):
     MISSING_CHANNEL = "leaves out a channel"
 
 
+_HANGS = (Fault.STAGE_HANGS, Fault.STOP_HANGS, Fault.UNSTAGE_HANGS, Fault.HANGS_BEFORE, Fault.HANGS_AFTER)
 _OF_STAGE = (Fault.STAGE_FAILS, Fault.STAGE_HANGS)
 _OF_STOP = (Fault.STOP_FAILS, Fault.STOP_HANGS)
 _OF_UNSTAGE = (Fault.UNSTAGE_FAILS, Fault.UNSTAGE_HANGS)
@@ -195,7 +196,7 @@ class FaultyDevice:
     def _fail(self, fault: Fault | None) -> None:
         if fault is None:
             return
-        if fault.endswith(("hangs", "hangs before firing", "hangs after firing")):
+        if fault in _HANGS:
             self._released.wait(_LONGEST_HANG_S)
         raise DeviceError(f"fault: {fault}")
 

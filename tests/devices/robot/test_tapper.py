@@ -15,11 +15,12 @@ from isiw.devices.robot.presets import preset
 from isiw.devices.robot.tapper import Evoked, HitDelay, Tapper, TapperSettings, Trigger
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import DeviceError, InvalidValueError
+from isiw.findings import Kind
 from isiw.signals import impact_time, judge
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import Response
 from isiw.testing import check_device
-from isiw.trials import MistrialReason, Stimulus, Sweep
+from isiw.trials import Stimulus, Sweep
 from isiw.types import Reference
 from known import instance, known
 
@@ -184,10 +185,10 @@ def test_a_hammer_that_sticks_gives_no_impact_open_loop_and_no_pulse_triggered()
     stuck = replace(preset("subject1"), faults=Faults(stuck_probability=1.0))
     person = Listener()
     open_loop = deliver(tapper(stuck, respond=person), 60.0)[0]
-    assert judge(open_loop, Stimulus(0, 60.0), IMPACT).reason is MistrialReason.NO_IMPACT
+    assert judge(open_loop, Stimulus(0, 60.0), IMPACT).reason is Kind.NO_IMPACT
     assert person.heard_ms == [None]
     triggered = deliver(tapper(stuck, trigger="impact"), 60.0)[0]
-    assert judge(triggered, Stimulus(0, 60.0), IMPACT).reason is MistrialReason.NO_PULSE
+    assert judge(triggered, Stimulus(0, 60.0), IMPACT).reason is Kind.NO_PULSE
 
 
 @pytest.mark.parametrize("reference", ["impact", "valve"])

@@ -19,9 +19,10 @@ import isiw
 from hostile import IN_THE_WAY, at_once
 from isiw.config import load_config, session_for
 from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
+from isiw.findings import Kind
 from isiw.session.updates import SessionResult
 from isiw.testing import check_device
-from isiw.trials import Measurement, MistrialReason, Stimulus, Sweep
+from isiw.trials import Measurement, Stimulus, Sweep
 from known import instance
 from scripted import scripted_strategy
 
@@ -181,7 +182,7 @@ def test_whatever_fails_a_session_goes_on_and_its_log_has_each_pair_that_was_fir
             session = isiw.resume(log, device(tmp_path), scripted_strategy(trials, space=SPACE))
     assert ended == len(faults)
     assert (tmp_path / "ledger").read_text().split() == [str(trial.index) for trial in result.trials]
-    unknown = {str(trial.index) for trial in result.trials if trial.reason is MistrialReason.OUTCOME_UNKNOWN}
+    unknown = {str(trial.index) for trial in result.trials if trial.reason is Kind.OUTCOME_UNKNOWN}
     assert unknown == set(faults)
 
 

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from isiw.checks import check_numbers, check_wholes
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief, log_likelihood
 from isiw.types import FloatArray
@@ -80,15 +80,14 @@ class BayesThreshold:
         posterior = self.posterior(pulses)
         sides = {space.beyond(_quantile(posterior, level)) for level in (0.05, 0.95)}
         if len(sides) == 1 and (side := sides.pop()):
-            return StopDecision(stop=True, reason=f"The whole 90 % interval of the threshold is {side}.")
+            return StopDecision.now(StopKind.THRESHOLD, f"The whole 90 % interval of the threshold is {side}.")
         sd = _sd(posterior)
         if sd <= self.stop_sd_pct_mso:
-            return StopDecision(stop=True, reason=f"The threshold is known to ± {sd:.1f} % MSO (SD).")
+            return StopDecision.now(StopKind.THRESHOLD, f"The threshold is known to ± {sd:.1f} % MSO (SD).")
         if len(pulses) >= self.max_pulses:
-            return StopDecision(stop=True, reason=f"The budget of {self.max_pulses} pulses is used up.")
-        return StopDecision(
-            stop=False, reason=f"The threshold is known to ± {sd:.1f} % MSO (SD); {self.stop_sd_pct_mso:g} is wanted."
-        )
+            return StopDecision.now(StopKind.BUDGET, f"The budget of {self.max_pulses} pulses is used up.")
+        known = f"The threshold is known to ± {sd:.1f} % MSO (SD)"
+        return StopDecision.not_yet(StopKind.THRESHOLD, f"{known}; {self.stop_sd_pct_mso:g} is wanted.")
 
 
 @lru_cache(maxsize=256)

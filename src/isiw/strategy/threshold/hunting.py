@@ -11,7 +11,7 @@ from scipy.special import log_ndtr
 from scipy.stats import chi2
 
 from isiw.checks import check_numbers, check_wholes
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 from isiw.types import FloatArray
 
@@ -62,7 +62,8 @@ class MaximumLikelihood:
     def decision(self, pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision:
         """Stop after a fixed number of pulses."""
         del space
-        return StopDecision(stop=len(pulses) >= self.pulses, reason=f"{len(pulses)} of {self.pulses} pulses are given.")
+        reason = f"{len(pulses)} of {self.pulses} pulses are given."
+        return StopDecision(len(pulses) >= self.pulses, reason, StopKind.BUDGET)
 
     def _log_likelihood(self, pulses: Sequence[Pulse]) -> tuple[FloatArray, FloatArray]:
         """Thresholds [% MSO], also some beyond any stimulator, and the logarithm of their likelihoods."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from isiw.checks import check_amplitude, check_numbers, number
 from isiw.errors import InvalidValueError, LimitExceededError
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
@@ -230,7 +230,7 @@ def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | 
     if len(kinds) == 2:
         return None
     if not kinds:
-        return StopDecision(stop=False, reason="Nothing was told yet.")
+        return StopDecision.not_yet(StopKind.THRESHOLD, "Nothing was told yet.")
     answered = kinds == {True}
     end = space.low_pct_mso if answered else space.high_pct_mso
     at_end = sum(abs(pulse.intensity_pct_mso - end) <= NEAR_THE_END_PCT_MSO for pulse in pulses)
@@ -246,7 +246,8 @@ def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | 
             "Is the coil on the hot spot, and the amplifier on? If so, and if it is safe for this person, begin a new "
             f"search with a higher maximum (this range ends at {end:g} % MSO)."
         )
-    return StopDecision(at_end >= ENOUGH_AT_THE_END, f"{seen} {advice}" if at_end >= ENOUGH_AT_THE_END else seen)
+    over = at_end >= ENOUGH_AT_THE_END
+    return StopDecision(over, f"{seen} {advice}" if over else seen, StopKind.THRESHOLD)
 
 
 def not_growing(pulses: Sequence[Pulse]) -> str | None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from isiw.checks import check_numbers, check_wholes
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 
 __all__ = ["FiveOfTen"]
@@ -70,10 +70,9 @@ class FiveOfTen:
         if enough is None:
             return self._upwards(short, space)
         if enough == space.low_pct_mso:
-            return enough, StopDecision(
-                stop=True,
-                reason=f"{enough:g} % MSO is high enough (at least {self.enough} of {self.of} pulses evoke an MEP), "
-                "and it is the lowest intensity of the range: begin a new search lower.",
+            return enough, _over(
+                f"{enough:g} % MSO is high enough (at least {self.enough} of {self.of} pulses evoke an MEP), "
+                "and it is the lowest intensity of the range: begin a new search lower."
             )
         if short is None:
             return space.snap(enough - max(self.large_step_pct_mso, space.step_pct_mso)), _on(
@@ -83,19 +82,21 @@ class FiveOfTen:
             return space.snap(enough - space.step_pct_mso), _on(
                 f"The threshold is between {short:g} and {enough:g} % MSO."
             )
-        return enough, StopDecision(stop=True, reason=f"{enough:g} % MSO is high enough, and {short:g} % MSO is not.")
+        return enough, _over(f"{enough:g} % MSO is high enough, and {short:g} % MSO is not.")
 
     def _upwards(self, short: float | None, space: IntensityRange) -> tuple[float, StopDecision]:
         if short is None:
             return space.snap(self.start_pct_mso), _on("No intensity tested so far is high enough.")
         if short == space.high_pct_mso:
-            return short, StopDecision(
-                stop=True, reason=f"{short:g} % MSO, the highest intensity of the range, is not high enough."
-            )
+            return short, _over(f"{short:g} % MSO, the highest intensity of the range, is not high enough.")
         return space.snap(short + max(self.large_step_pct_mso, space.step_pct_mso)), _on(
             f"{short:g} % MSO is not high enough."
         )
 
 
+def _over(reason: str) -> StopDecision:
+    return StopDecision.now(StopKind.THRESHOLD, reason)
+
+
 def _on(reason: str) -> StopDecision:
-    return StopDecision(stop=False, reason=reason)
+    return StopDecision.not_yet(StopKind.THRESHOLD, reason)

@@ -7,8 +7,8 @@ from dataclasses import asdict, is_dataclass
 from typing import Any, Final
 
 from isiw.checks import choice, number
-from isiw.signals.plausibility import implausible_scale, require_amplitude
-from isiw.strategy.stopping import StopDecision
+from isiw.signals.values import implausible_scale, require_amplitude
+from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.bayes import BayesThreshold
 from isiw.strategy.threshold.hunting import MaximumLikelihood
 from isiw.strategy.threshold.pulses import (
@@ -141,7 +141,7 @@ class ThresholdSearch:
         budget = self._budget
         if refused is None or refused.stop or budget is None or len(self.pulses) < budget:
             return refused
-        return StopDecision(stop=True, reason=f"{refused.reason} The budget of {budget} pulses is used up. {_LOOK}")
+        return StopDecision.now(StopKind.BUDGET, f"{refused.reason} The budget of {budget} pulses is used up. {_LOOK}")
 
     @property
     def _budget(self) -> int | None:
@@ -152,4 +152,4 @@ class ThresholdSearch:
         if seen is None or self.method.estimate(self.pulses, self.space).threshold_pct_mso is None:
             return None
         over = self._budget is None and self.method.decision(self.pulses, self.space).stop
-        return StopDecision(stop=over, reason=f"{seen} {_LOOK}" if over else seen)
+        return StopDecision(over, f"{seen} {_LOOK}" if over else seen, StopKind.THRESHOLD)

@@ -9,10 +9,11 @@ import pytest
 import isiw
 from devices.transports.line.parts import HASTY, PAIR, TIMEOUT_S, made, staged
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered
+from isiw.findings import Kind
 from isiw.session.safeguards import Safeguards
 from isiw.signals.judgement import judge_measurement
 from isiw.testing import Lie, PulsePeer, check_ledger
-from isiw.trials import Measurement, MistrialReason, Status, Stimulus
+from isiw.trials import Measurement, Status, Stimulus
 from scripted import SPACE, scripted_strategy
 
 FATAL = [Lie.SILENT_BEFORE, Lie.SILENT_AFTER, Lie.LATE, Lie.OTHER_NUMBER, Lie.CORRUPTS, Lie.ENDLESS, Lie.REFUSES]
@@ -85,7 +86,7 @@ def test_another_isi_than_the_one_read_back_is_a_mistrial(device: isiw.LineDevic
     answer = device.deliver(PAIR, TIMEOUT_S)
     assert isinstance(answer, Measurement)
     assert answer.isi_ms == pytest.approx(90.0)
-    assert judge_measurement(answer, PAIR, SPACE).reason is MistrialReason.ISI_OFF
+    assert judge_measurement(answer, PAIR, SPACE).reason is Kind.ISI_OFF
 
 
 def test_a_session_tries_again_what_was_refused_before_firing(peer: PulsePeer, tmp_path: Path) -> None:
@@ -113,7 +114,7 @@ def test_a_session_that_hears_nothing_after_firing_ends_disarmed_with_an_unknown
         ).run()
     record = isiw.read_session(tmp_path / "log.mcap")
     (trial,) = record.table
-    assert (trial.status, trial.reason) == (Status.MISTRIAL, MistrialReason.OUTCOME_UNKNOWN)
+    assert (trial.status, trial.reason) == (Status.MISTRIAL, Kind.OUTCOME_UNKNOWN)
     assert len(peer.ledger) == 1
     assert peer.heard[-1].endswith("DISARM")
     assert not peer.armed

@@ -9,29 +9,31 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from found import fault_of
 from isiw.design import DesignSpace
 from isiw.devices.simulated import SimulatedDevice
+from isiw.findings import MISTRIALS, Finding, Kind, Severity
 from isiw.signals import judge
-from isiw.signals.faults import Fault, likely_fault, remedy_for
-from isiw.trials import Channel, Measurement, MistrialReason, Status, Stimulus, Sweep, Trial
+from isiw.signals.rig import remedy_for
+from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from known import instance
-from wrong_rigs import NAMED, SPACE, WRONG, rig
+from wrong_rigs import KINDS, SPACE, WRONG, rig
 
 ISIS_MS = (40.0, 150.0, 300.0)
 
 
-def faults_of(device: SimulatedDevice, isis_ms: Sequence[float | None] = ISIS_MS) -> list[Fault | None]:
+def faults_of(device: SimulatedDevice, isis_ms: Sequence[float | None] = ISIS_MS) -> list[Finding | None]:
     device.stage()
     stimuli = [Stimulus(trial, isi_ms) for trial, isi_ms in enumerate(isis_ms)]
     sweeps = [instance(Sweep, device.deliver(stimulus, 1.0)) for stimulus in stimuli]
     space = replace(SPACE, reference=device.describe().reference)
-    return [likely_fault(sweep, judge(sweep, stimulus, space)) for sweep, stimulus in zip(sweeps, stimuli, strict=True)]
+    return [fault_of(sweep, judge(sweep, stimulus, space)) for sweep, stimulus in zip(sweeps, stimuli, strict=True)]
 
 
 @pytest.mark.parametrize("wrong", WRONG)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_wrong_rig_is_named_from_each_sweep(wrong: str, seed: int) -> None:
-    assert all(NAMED[wrong] in str(fault) for fault in faults_of(rig(wrong, seed)))
+    assert all(fault is not None and fault.kind in KINDS[wrong] for fault in faults_of(rig(wrong, seed)))
 
 
 @pytest.mark.parametrize("accelerometer", [True, False])
@@ -41,63 +43,72 @@ def test_a_right_rig_is_not_accused(*, accelerometer: bool) -> None:
 
 def test_a_wrong_rate_shows_where_no_impact_is_measured() -> None:
     device = rig("wrong rate", accelerometer=False)
-    assert all("sampling rate" in str(fault) for fault in faults_of(device, (None,)))
+    (fault,) = faults_of(device, (None,))
+    assert fault is not None
+    assert (fault.kind, fault.severity) == (Kind.STRAY_EDGE, Severity.NOTE)
 
 
 def test_samples_that_are_no_numbers_are_told_from_a_flat_line() -> None:
     stimulus = Stimulus(0, 100.0)
     answer = instance(Sweep, rig().simulation.answer(stimulus))
     answer.channels["emg"].values[7] = math.inf
-    fault = likely_fault(answer, judge(answer, stimulus, SPACE))
-    assert "no numbers" in str(fault)
+    fault = fault_of(answer, judge(answer, stimulus, SPACE))
+    assert fault is not None
+    assert (fault.kind, fault.severity) == (Kind.NOT_NUMBERS, Severity.MISTRIAL)
 
 
 def test_a_sweep_without_the_time_of_the_hit_is_told_from_one_without_emg() -> None:
     stimulus = Stimulus(0, 100.0)
     answer = replace(instance(Sweep, rig(accelerometer=False).simulation.answer(stimulus)), t_hit_ms=None)
     space = replace(SPACE, reference="impact")
-    fault = likely_fault(answer, judge(answer, stimulus, space))
-    assert "no time of the event that ISIs count from" in str(fault)
-    assert "t_hit_ms" in str(fault)
+    fault = fault_of(answer, judge(answer, stimulus, space))
+    assert fault is not None
+    assert fault.kind is Kind.NO_ORIGIN
 
 
 @pytest.mark.parametrize(
-    ("described", "factor", "asked"),
+    ("described", "factor", "kind", "likely"),
     [
-        ("V", 1.0, "has 1.5 mV RMS, more than any muscle's at rest. Is it in mV, and described as V? Give"),
-        ("V", 1e3, "has 1.5 V RMS, more than any muscle's at rest. Is it in µV, and described as V? Give"),
-        ("mV", 1e3, "Is it in µV, and described as mV?"),
-        ("mV", 1e-3, "Is it in V, and described as mV?"),
-        ("uV", 1.0, "has 0.001 µV RMS, less than any amplifier's noise. Is it in mV, and described as uV? Give"),
-        ("µV", 1e-3, "Is it in V, and described as µV?"),
-        ("uV", 1e6, "more than any muscle's at rest. Correct the gain."),
-        ("V", 1e-6, "less than any amplifier's noise. Correct the gain; is the amplifier on?"),
+        ("V", 1.0, Kind.LOUD, "mV"),
+        ("V", 1e3, Kind.LOUD, "µV"),
+        ("mV", 1e3, Kind.LOUD, "µV"),
+        ("mV", 1e-3, Kind.QUIET, "V"),
+        ("uV", 1.0, Kind.QUIET, "mV"),
+        ("µV", 1e-3, Kind.QUIET, "V"),
+        ("uV", 1e6, Kind.LOUD, None),
+        ("V", 1e-6, Kind.QUIET, None),
     ],
 )
 def test_a_wrong_unit_is_told_by_the_one_described_and_the_likely_one(
-    described: str, factor: float, asked: str
+    described: str, factor: float, kind: Kind, likely: str | None
 ) -> None:
     emg_mv = 0.0015 * np.random.default_rng(0).standard_normal(3500)
     sweep = Sweep({"emg": Channel(factor * emg_mv, 5000.0, described, t0_ms=-600.0)}, t_tms_ms=0.0)
-    fault = likely_fault(sweep, judge(sweep, Stimulus(0, None), SPACE))
-    assert asked in str(fault)
+    fault = fault_of(sweep, judge(sweep, Stimulus(0, None), SPACE))
+    assert fault is not None
+    assert fault.kind is kind
+    asked = f"Is it in {likely}, and described as {described}?"
+    assert fault.remedy.startswith("Correct the gain" if likely is None else asked)
 
 
 def test_of_a_device_that_measures_by_itself_no_channel_is_accused() -> None:
     loud = Trial(0, Status.ACCEPTED, 40.0, isi_ms=40.0, mep_mv=0.1, background_rms_uv=2900.0)
-    said = str(likely_fault(Measurement(0.1, 40.0, background_rms_uv=2900.0), loud))
-    assert said.endswith("Is background_rms_uv, as the device tells it, in µV? Convert it, or correct the gain.")
+    fault = fault_of(Measurement(0.1, 40.0, background_rms_uv=2900.0), loud)
+    assert fault is not None
+    assert fault.kind is Kind.LOUD
+    assert "channel" not in fault.remedy
 
 
 def test_every_reason_of_a_mistrial_has_a_remedy() -> None:
-    assert all(remedy_for(reason).endswith(".") for reason in MistrialReason)
+    assert all(remedy_for(reason).endswith(".") for reason in MISTRIALS)
 
 
 def test_a_mistrial_without_a_sign_is_told_by_its_reason_and_figure() -> None:
-    trial = Trial(0, Status.MISTRIAL, 40.0, MistrialReason.ISI_OFF, isi_ms=90.0)
-    fault = likely_fault(Measurement(0.1, 90.0), trial)
+    trial = Trial(0, Status.MISTRIAL, 40.0, Kind.ISI_OFF, isi_ms=90.0)
+    fault = fault_of(Measurement(0.1, 90.0), trial)
     assert fault is not None
-    assert fault.what == "the realised ISI was 90 ms, not the commanded 40 ms"
+    assert (fault.kind, fault.severity) == (Kind.ISI_OFF, Severity.MISTRIAL)
+    assert "90 ms" in fault.text
 
 
 def test_the_reflex_of_a_tap_whose_impact_nobody_measures_is_no_fault() -> None:
@@ -109,7 +120,7 @@ def test_the_reflex_of_a_tap_whose_impact_nobody_measures_is_no_fault() -> None:
     sweep = Sweep({"emg": Channel(emg_mv, 5000.0, "mV")}, t_tms_ms=pulse_ms, t_valve_ms=valve_ms)
     trial = judge(sweep, Stimulus(0, 200.0), DesignSpace(0, 500, reference="valve"))
     assert trial.reason is None
-    assert likely_fault(sweep, trial) is None
+    assert fault_of(sweep, trial) is None
 
 
 @pytest.mark.parametrize(("at_ms", "accused"), [(400.0, False), (412.0, False), (550.0, False), (300.0, True)])
@@ -121,5 +132,5 @@ def test_the_click_of_the_valve_is_not_taken_for_the_pulse(at_ms: float, *, accu
     sweep = Sweep({"emg": Channel(emg_mv, 5000.0, "mV")}, t_valve_ms=400.0, t_hit_ms=580.0, t_tms_ms=630.0)
     trial = judge(sweep, Stimulus(0, 50.0), DesignSpace(0, 200, reference="impact"))
     assert trial.reason is None
-    fault = likely_fault(sweep, trial)
-    assert (fault is not None and "the steepest edge of the EMG is at 300 ms" in fault.what) == accused
+    fault = fault_of(sweep, trial)
+    assert (fault is not None and fault.kind is Kind.STRAY_EDGE) == accused

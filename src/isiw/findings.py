@@ -1,0 +1,219 @@
+"""What is wrong with data or a rig: a `Finding` says what, how badly, and what to do; and the slips of unit behind it.
+
+A finding's kind and severity are what code goes by; its text and remedy are for people, and nothing reads them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final, TypeVar, overload
+
+from isiw.errors import InvalidValueError, IsiwError
+
+__all__ = ["ENOUGH_PAIRS", "MISTRIALS", "Finding", "Kind", "Scale", "Severity", "lacking", "refused"]
+
+_ErrorT = TypeVar("_ErrorT", bound=IsiwError)
+
+ENOUGH_PAIRS: Final = 3
+"""With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
+
+
+class Severity(StrEnum):
+    """What follows from a finding."""
+
+    REFUSED = "refused"
+    """It cannot be true: an error, and nothing is recorded."""
+
+    MISTRIAL = "mistrial"
+    """The trial is lost."""
+
+    PAUSE = "pause"
+    """The session pauses."""
+
+    DOUBT = "doubt"
+    """It is logged, and a session pauses once; the trial counts."""
+
+    NOTE = "note"
+    """The trial counts; only several in a row matter."""
+
+
+class Kind(StrEnum):
+    """What is found. Those in `MISTRIALS` are the reasons of trials that are lost; the log has them by their values."""
+
+    NO_IMPACT = "no impact"
+    NO_PULSE = "no pulse"
+    TMS_BEFORE_IMPACT = "TMS before impact"
+    BACKGROUND_ACTIVITY = "background activity"
+    SATURATION = "saturation"
+    MISSING_CHANNEL = "missing channel"
+    ISI_OFF = "ISI off by more than the tolerance"
+    IMPLAUSIBLE = "implausible amplitude"
+    REJECTED = "rejected"
+    OUTCOME_UNKNOWN = "outcome unknown"
+
+    NO_EMG = "no EMG"
+    NOT_NUMBERS = "samples that are no numbers"
+    FLAT_LINE = "a flat line"
+    DURATIONS = "channels of different duration"
+    SWAPPED = "swapped channels"
+    INVERTED = "an inverted accelerometer"
+    NO_ORIGIN = "no time of the event that ISIs count from"
+    STRAY_EDGE = "an edge of the EMG away from the pulse"
+    LOUD = "too much EMG at rest"
+    QUIET = "too little EMG at rest"
+    EARLY_AT_ONE_ISI = "pulses too early at one ISI"
+
+    ISI_FAR = "an ISI far from the one asked"
+    EQUAL = "equal amplitudes"
+    SILENT = "no MEP at all"
+    STOPPED = "no more MEPs"
+    SMALL = "small amplitudes"
+    LARGE = "large amplitudes"
+    JUMP = "a jump of the scale"
+    MISPLACED = "a response outside the MEP window"
+    ARTEFACT = "an artefact in the MEP window"
+    REPEATED = "the same sweep again"
+
+    IN_SECONDS = "an ISI in seconds"
+    ORDER = "ISI and amplitude swapped"
+    VAGUE_ISI = "an ISI that is too uncertain"
+    TIMES = "times that contradict the ISI"
+    TAP_UNWANTED = "a tap with TMS alone"
+    PULSE_UNWANTED = "a pulse with a tap alone"
+
+    FEW_PAIRS = "too few pairs"
+
+    @classmethod
+    def of_mistrial(cls, text: str) -> Kind:
+        """The reason of a mistrial of these words; `REJECTED` where the list has none."""
+        return next((kind for kind in MISTRIALS if kind == text), cls.REJECTED)
+
+
+MISTRIALS: Final = tuple(Kind)[: tuple(Kind).index(Kind.OUTCOME_UNKNOWN) + 1]
+"""Why a delivered trial is not told. The list is closed."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is wrong with a sweep, an amplitude, an ISI or a rig.
+
+    Args:
+        kind: what it is.
+        severity: what follows from it.
+        text: what was seen, as a sentence without a full stop.
+        remedy: the likely cause and what to do, in full sentences.
+    """
+
+    kind: Kind
+    severity: Severity
+    text: str
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.text}. {self.remedy}".rstrip()
+
+
+@overload
+def refused(finding: Finding, got: object, expected: str | None = None) -> InvalidValueError: ...
+@overload
+def refused(finding: Finding, got: object, expected: str | None, error: type[_ErrorT]) -> _ErrorT: ...
+def refused(
+    finding: Finding, got: object, expected: str | None = None, error: type[IsiwError] = InvalidValueError
+) -> IsiwError:
+    """The error that refuses a value for what was found.
+
+    Args:
+        finding: what was found.
+        got: the value.
+        expected: what would have been accepted.
+        error: its type.
+    """
+    refusal = error(finding.text, got=got, expected=expected, remedy=finding.remedy or None)
+    refusal.kind = finding.kind
+    return refusal
+
+
+NO_MEP: Final = Finding(
+    Kind.SILENT, Severity.NOTE, "No MEP was seen in any trial that counts, so nothing is known about a window"
+)
+TOO_FEW: Final = Finding(
+    Kind.FEW_PAIRS, Severity.NOTE, "Fewer than three pairs of stimuli count so far, too few to speak of a window"
+)
+
+
+def lacking(pairs: int | None, *, silent: bool) -> Finding | None:
+    """What is missing to speak of a window; None where enough was measured.
+
+    Args:
+        pairs: how many pairs of stimuli count; None where that is not known.
+        silent: whether no trial that counts showed an MEP.
+    """
+    if silent:
+        return NO_MEP
+    return None if pairs is None or pairs >= ENOUGH_PAIRS else TOO_FEW
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The values that a quantity can have, and the units in which a value beyond them was probably told.
+
+    Args:
+        least: the smallest.
+        most: the largest.
+        too_small: the unit that a smaller value is in, and by what to multiply it.
+        too_large: the unit that a larger value is in, and by what to divide it.
+        usual: what it is in the median.
+    """
+
+    least: float = 0.0
+    most: float = math.inf
+    too_small: tuple[str, float] | None = None
+    too_large: tuple[str, float] | None = None
+    usual: float = 1.0
+
+    def slip(self, value: float) -> str | None:
+        """Which unit a value is probably in, as a question, and what to do; None where it is within the bounds."""
+        if value < self.least and self.too_small is not None:
+            return f"Is it in {self.too_small[0]}? Multiply by {self.too_small[1]:g}."
+        if value > self.most and self.too_large is not None:
+            return f"Is it in {self.too_large[0]}? Divide by {self.too_large[1]:g}."
+        return None
+
+    def likely_unit(self, values: Mapping[str, float]) -> str | None:
+        """The unit in which a value would be nearest to the usual one; None where none makes it possible.
+
+        Args:
+            values: what the value would be, were it in each of some units.
+        """
+        possible = {unit: value for unit, value in values.items() if self.least <= value <= self.most}
+        return min(possible, key=lambda unit: abs(math.log(possible[unit] / self.usual)), default=None)
+
+
+AMPLITUDE_MV: Final = Scale(2e-4, 30.0, ("V", 1000), ("µV", 1000))
+"""Of an MEP: the noise of the electrodes alone has more than the least, and no muscle gives more than the most."""
+
+REST_UV: Final = Scale(0.05, 400.0, usual=2.0)
+"""RMS of EMG before the pulse: no amplifier is so quiet, and no muscle so loud, at rest or at work."""
+
+BACKGROUND_LIMIT_UV: Final = Scale(0.2, too_small=("mV", 1000))
+"""The most EMG at rest that somebody allows; no amplifier is so quiet as the least."""
+
+WINDOW_END_MS: Final = Scale(1.0, too_small=("seconds", 1000))
+DELAY_MS: Final = Scale(1.0, too_small=("seconds", 1000))
+"""No MEP has ended so soon after the pulse; and no hammer hits, nor does a shock travel so fast."""
+
+RATE_HZ: Final = Scale(1000.0, too_small=("kHz", 1000))
+"""Below this a surface MEP and an impact are not resolved; recordings use 3–10 kHz."""
+
+INTERVAL_S: Final = Scale(most=1000.0, too_large=("ms", 1000))
+"""More than anybody waits between two stimuli."""
+
+SHARE: Final = Scale(most=1.0, too_large=("%", 100))
+INTENSITY_PCT: Final = Scale(3.0, too_small=("parts of 1", 100))
+"""Nobody stimulates with so low an intensity; 1.2 is meant as 120 %."""
+
+STOP_WIDTH_MS: Final = Scale(1.0, too_small=("s", 1000))
+"""No interval of an edge is as narrow as the least; a width of 0.005 and less is meant to stop nothing."""

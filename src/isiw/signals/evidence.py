@@ -1,0 +1,104 @@
+"""What a check for findings looks at: the last trial and its sweep, or the trials that count so far."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, TypeAlias
+
+from isiw.findings import Finding
+from isiw.signals.limits import SignalLimits
+from isiw.trials import Measurement, Sweep, Trial, TrialTable
+
+__all__ = ["Check", "Evidence", "OfSweep", "OfTold", "OfTrial", "Response", "Told", "told_of"]
+
+
+class Response(NamedTuple):
+    """A response outside the MEP window: its centre [ms after the pulse], and its peak-to-peak amplitude [mV]."""
+
+    at_ms: float
+    size_mv: float
+
+
+@dataclass(frozen=True)
+class Told:
+    """A trial that counts, as the checks of several trials look at it.
+
+    Args:
+        mep_mv: its amplitude [mV]; 0 is below the detection limit.
+        isi_ms: its ISI [ms]; None for TMS alone.
+        rest_uv: EMG before the pulse [µV RMS]; None where not known.
+        outside: the largest clear response outside the MEP window; None where there is none, or no sweep.
+        is_tail: whether what is in the window is the end of a larger artefact before it.
+        repeats: whether its EMG is that of the trial before, sample by sample.
+    """
+
+    mep_mv: float
+    isi_ms: float | None = None
+    rest_uv: float | None = None
+    outside: Response | None = None
+    is_tail: bool = False
+    repeats: bool = False
+
+
+def told_of(trials: TrialTable) -> tuple[Told, ...]:
+    """The trials of a table that count and have an amplitude.
+
+    Args:
+        trials: the table.
+    """
+    return tuple(Told(t.mep_mv, t.isi_ms, t.background_rms_uv) for t in trials.told if t.mep_mv is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What is known after a trial; what is not known is None or empty.
+
+    Args:
+        trial: the last trial, as it was judged.
+        answer: what the device answered.
+        limits: what it was judged by.
+        told: the trials that count so far, in order.
+        detection_limit_mv: what an amplitude of 0 is known to be below [mV]; None where nobody has said.
+    """
+
+    trial: Trial | None = None
+    answer: Sweep | Measurement | None = None
+    limits: SignalLimits = field(default_factory=SignalLimits)
+    told: Sequence[Told] = ()
+    detection_limit_mv: float | None = None
+
+
+class OfSweep(NamedTuple):
+    """A check that needs the last trial and its sweep."""
+
+    find: Callable[[Sweep, Trial], Finding | None]
+
+    def __call__(self, evidence: Evidence) -> Finding | None:
+        """What it finds; None where it finds nothing, or lacks what it needs."""
+        sweep, trial = evidence.answer, evidence.trial
+        return self.find(sweep, trial) if trial is not None and isinstance(sweep, Sweep) else None
+
+
+class OfTrial(NamedTuple):
+    """A check that needs the last trial, be there a sweep or not."""
+
+    find: Callable[[Trial, Evidence], Finding | None]
+
+    def __call__(self, evidence: Evidence) -> Finding | None:
+        """What it finds; None where it finds nothing, or lacks what it needs."""
+        return None if evidence.trial is None else self.find(evidence.trial, evidence)
+
+
+class OfTold(NamedTuple):
+    """A check that needs the trials that count so far."""
+
+    find: Callable[[Evidence], Finding | None]
+
+    def __call__(self, evidence: Evidence) -> Finding | None:
+        """What it finds; None where it finds nothing, or lacks what it needs."""
+        return self.find(evidence) if evidence.told else None
+
+
+Check: TypeAlias = OfSweep | OfTrial | OfTold
+"""One kind of finding: the function that looks for it, by what that needs."""

@@ -1,0 +1,186 @@
+"""Responses of the EMG outside the MEP window: the time of the pulse is wrong, or the window does not fit the muscle.
+
+A response is what stands clearly out of the EMG at rest where neither pulse nor tap leave their artefacts. One alone
+says little. Where several in a row come equally long after the pulse, at ISIs that differ, and none within the window,
+they are taken for the MEP.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import takewhile
+
+import numpy as np
+
+from isiw.findings import Finding, Kind, Severity
+from isiw.signals.evidence import Evidence, Response, Told
+from isiw.signals.limits import ARTEFACT_MS, SignalLimits
+from isiw.signals.rig import tap_span_ms
+from isiw.signals.units import EMG_UNITS_MV
+from isiw.trials import Sweep, Trial
+from isiw.types import BoolArray, FloatArray
+
+__all__ = ["artefact", "misplaced", "repeated", "told_by"]
+
+SOUGHT_MS = (ARTEFACT_MS, 80.0)
+"""Where a response is looked for [ms after the pulse]: behind the pulse's artefact, and before the person moves."""
+
+QUIET = 8.0
+CLEAR = 12.0
+"""Peak-to-peak amplitude over the RMS at rest: up to the one there is no MEP in the window, from the other on there is
+a response outside. In 330 recorded and simulated sweeps without an MEP it was 7.3 outside at most."""
+
+LEAST_MV = 0.02
+SPAN_MS = 10.0
+"""How far from its largest deflection a response reaches."""
+
+TAIL = 1.5
+"""Before the window nothing counts where the pulse's own artefact is larger by this factor: it may be its end."""
+
+NEAR_MS = 5.0
+"""So near the window an artefact that is larger than what is within it has not ended yet."""
+
+IN_A_ROW = 4
+ALIKE_MS = 4.0
+DIFFERING_MS = 15.0
+"""So many come equally long after the pulse, while the tap, and with it its reflexes, comes at times that differ."""
+
+VARIES = 1.5
+"""From the smallest to the largest of several MEPs it is more than this; the end of an artefact is always the same."""
+
+
+def told_by(sweep: Sweep, trial: Trial, limits: SignalLimits, before_emg: FloatArray | None = None) -> Told:
+    """A trial as the checks of several trials look at it, with what its sweep shows.
+
+    Args:
+        sweep: the trial's sweep.
+        trial: as it was judged; it counts, and has an amplitude.
+        limits: say where the MEP window is.
+        before_emg: samples of the sweep before; None where there is none.
+    """
+    rest_uv, emg = trial.background_rms_uv, sweep.channels["emg"].values
+    repeats = before_emg is not None and np.array_equal(emg, before_emg)
+    told = Told(trial.mep_mv or 0.0, trial.isi_ms, rest_uv, repeats=repeats)
+    if trial.t_tms_ms is None or not rest_uv:
+        return told
+    if not _is_quiet(told):
+        return replace(told, is_tail=_is_artefact(sweep, trial, limits.mep_window_ms))
+    found = _outside(sweep, trial, limits.mep_window_ms)
+    clear = found is not None and found.size_mv >= max(CLEAR * rest_uv / 1000, LEAST_MV)
+    return replace(told, outside=found if clear else None)
+
+
+def _is_quiet(told: Told) -> bool:
+    """Whether there is no MEP in the window."""
+    return told.mep_mv <= QUIET * (told.rest_uv or 0.0) / 1000
+
+
+def repeated(evidence: Evidence) -> Finding | None:
+    """A sweep that is the one before."""
+    if not evidence.told[-1].repeats:
+        return None
+    text = "The EMG of the last trial is that of the one before, sample by sample"
+    return Finding(Kind.REPEATED, Severity.DOUBT, text, "Does the rig wait for the new recording?")
+
+
+def misplaced(evidence: Evidence) -> Finding | None:
+    """Responses outside the window; not where there are few, or another cause is likely."""
+    alike = _last_alike(evidence.told)
+    if len(alike) < IN_A_ROW or not _follow_the_pulse([isi_ms for isi_ms, _ in alike]):
+        return None
+    at_ms = statistics.median(response.at_ms for _, response in alike)
+    first_ms, last_ms = evidence.limits.mep_window_ms
+    sizes_mv = [response.size_mv for _, response in alike]
+    if at_ms < first_ms and max(sizes_mv) < VARIES * min(sizes_mv):
+        return None
+    text = (
+        f"In {len(alike)} trials the EMG has a response at about {at_ms:.0f} ms after the pulse, outside the MEP "
+        f"window of {first_ms:g}–{last_ms:g} ms, and none within it"
+    )
+    remedy = "Is the time of the pulse right? Does the window fit the muscle? Or is it the stimulator's artefact?"
+    return Finding(Kind.MISPLACED, Severity.DOUBT, text, remedy)
+
+
+def artefact(evidence: Evidence) -> Finding | None:
+    """Artefacts in the MEP window; not where there are few."""
+    in_a_row = len(list(takewhile(lambda told: told.is_tail, reversed(evidence.told))))
+    if in_a_row < IN_A_ROW:
+        return None
+    text = (
+        f"In {in_a_row} trials in a row the EMG is much larger just before the MEP window, which begins "
+        f"{evidence.limits.mep_window_ms[0]:g} ms after the pulse, than within it"
+    )
+    remedy = "Does the stimulator's artefact reach into the window? Or do MEPs begin earlier?"
+    return Finding(Kind.ARTEFACT, Severity.DOUBT, text, remedy)
+
+
+def _is_artefact(sweep: Sweep, trial: Trial, window_ms: tuple[float, float]) -> bool:
+    """Whether what is in the MEP window comes out of something larger before it: the end of the pulse's artefact."""
+    emg_mv, since_ms, tap = _since_pulse(sweep, trial)
+    before = (since_ms >= max(SOUGHT_MS[0], window_ms[0] - NEAR_MS)) & (since_ms < window_ms[0]) & ~tap
+    within = (since_ms >= window_ms[0]) & (since_ms <= window_ms[1])
+    return _is_tail(emg_mv, within, before)
+
+
+def _since_the_last_mep(told: Sequence[Told]) -> Iterator[Told]:
+    """The trials since the last one with an MEP in the window, the latest first; of others nobody knows."""
+    return takewhile(lambda one: not one.rest_uv or _is_quiet(one), reversed(told))
+
+
+def _last_alike(told: Sequence[Told]) -> list[tuple[float | None, Response]]:
+    """The last responses and their ISIs, back to the first that comes at another time after the pulse."""
+    found = [(one.isi_ms, one.outside) for one in _since_the_last_mep(told) if one.outside is not None]
+    return list(takewhile(lambda one: abs(one[1].at_ms - found[0][1].at_ms) <= ALIKE_MS, found))
+
+
+def _follow_the_pulse(isis_ms: Sequence[float | None]) -> bool:
+    """Whether they follow the pulse, and not the tap."""
+    pairs_ms = [isi_ms for isi_ms in isis_ms if isi_ms is not None]
+    return len(pairs_ms) < len(isis_ms) or max(pairs_ms) - min(pairs_ms) >= DIFFERING_MS
+
+
+def _outside(sweep: Sweep, trial: Trial, window_ms: tuple[float, float]) -> Response | None:
+    """The largest response outside the window; None where nothing can be told from pulse and tap."""
+    emg_mv, since_ms, tap = _since_pulse(sweep, trial)
+    before = (since_ms >= SOUGHT_MS[0]) & (since_ms < window_ms[0]) & ~tap
+    behind = (since_ms > window_ms[1]) & (since_ms <= SOUGHT_MS[1]) & ~tap
+    artefact = (since_ms >= -1.0) & (since_ms < SOUGHT_MS[0])
+    found = [] if _is_tail(emg_mv, before, artefact) else [_largest(emg_mv, since_ms, before)]
+    found.append(_largest(emg_mv, since_ms, behind))
+    return max((one for one in found if one is not None), key=lambda one: one.size_mv, default=None)
+
+
+def _since_pulse(sweep: Sweep, trial: Trial) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """The EMG about its level at rest [mV], its times [ms after the pulse], and which samples may show the tap."""
+    emg = sweep.channels["emg"]
+    times_ms = emg.t0_ms + np.arange(emg.values.size) * 1000 / emg.rate_hz
+    since_ms, tap = times_ms - (trial.t_tms_ms or 0.0), _of_tap(times_ms, trial)
+    at_rest = (since_ms < -1.0) & ~tap
+    level = np.median(emg.values[at_rest] if at_rest.any() else emg.values)
+    return EMG_UNITS_MV[emg.unit] * (emg.values - level), since_ms, tap
+
+
+def _of_tap(times_ms: FloatArray, trial: Trial) -> BoolArray:
+    """Which samples may show the tap."""
+    span_ms = tap_span_ms(trial)
+    if span_ms is None:
+        return np.zeros(times_ms.shape, dtype=bool)
+    return (times_ms >= span_ms[0]) & (times_ms <= span_ms[1])
+
+
+def _is_tail(emg_mv: FloatArray, before: BoolArray, artefact: BoolArray) -> bool:
+    if not before.any() or not artefact.any():
+        return False
+    return bool(np.abs(emg_mv[artefact]).max() > TAIL * np.abs(emg_mv[before]).max())
+
+
+def _largest(emg_mv: FloatArray, since_ms: FloatArray, sought: BoolArray) -> Response | None:
+    if not emg_mv[sought].any():
+        return None
+    top_ms = since_ms[sought][np.abs(emg_mv[sought]).argmax()]
+    near = sought & (np.abs(since_ms - top_ms) <= SPAN_MS)
+    power = emg_mv[near] ** 2
+    at_ms = float((since_ms[near] * power).sum() / power.sum())  # wherever noise puts the larger of its turns
+    return Response(at_ms, float(np.ptp(emg_mv[near])))

@@ -1,0 +1,275 @@
+"""What is likely wrong with a rig, found in one trial and its sweep.
+
+A judgement says why a trial does not count; these findings say why that is likely so. Nobody is accused without a sign:
+where a sweep shows none, the reason of the mistrial stands for itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from isiw.design import DesignSpace
+from isiw.findings import REST_UV, Finding, Kind, Severity
+from isiw.signals.evidence import Evidence
+from isiw.signals.impact import impact_time
+from isiw.signals.judgement import of_one_length
+from isiw.signals.limits import SignalLimits
+from isiw.signals.units import EMG_UNITS_MV
+from isiw.signals.values import implausible_amplitude, off_by
+from isiw.signals.waveforms import is_recording
+from isiw.trials import Channel, Sweep, Trial
+
+__all__ = [
+    "EVOKED_SPAN_MS",
+    "lost_amplitude",
+    "lost_trial",
+    "no_origin",
+    "remedy_for",
+    "steepest_edge",
+    "stray_edge",
+    "tap_span_ms",
+    "too_early_by_chance",
+    "unusable_emg",
+    "wrong_acceleration",
+    "wrong_level",
+]
+
+DRIVEN_MS = 25.0
+"""How long a hammer is driven before its impact, at least."""
+
+EVOKED_SPAN_MS = (-2.0, 50.0)
+"""When the pulse and what it evokes are in the EMG [ms after the pulse]."""
+
+JOLT_MS = 60.0
+"""How long after an impact its jolt may be the steepest edge."""
+
+LATEST_HIT_MS = 300.0
+"""From the valve command to the impact, in any rig that is plausible."""
+
+BLANKED_MS = 12.0
+"""How long amplifiers are blanked after a pulse, at most; the end of that is an edge, too."""
+
+SHARP_MS = 1.0
+LEAST_RATE_HZ = 2000.0
+"""An edge that is steep for no longer than this is an artefact, since an MEP rises for some milliseconds. From this
+rate on there are samples enough to say so."""
+
+CLEAR = 20.0
+
+_REMEDIES: Mapping[Kind, str] = MappingProxyType(
+    {
+        Kind.NO_IMPACT: "Check the air supply, the valve, and the accelerometer on the hammer.",
+        Kind.NO_PULSE: "Check that the stimulator is charged and armed, and that its trigger is recorded.",
+        Kind.TMS_BEFORE_IMPACT: "Check the hit delay that the rig assumes, and the sampling rate.",
+        Kind.BACKGROUND_ACTIVITY: (
+            "Ask the person to relax the muscle; check the electrodes and the ground, and look for mains hum. Where "
+            "the tap alone evokes a reflex before the pulse, begin the space at larger ISIs."
+        ),
+        Kind.SATURATION: "Lower the amplifier's gain, or keep cables away from the coil.",
+        Kind.MISSING_CHANNEL: (
+            "Check that the EMG is recorded, and not blanked, from 50 ms before to 50 ms after the pulse."
+        ),
+        Kind.ISI_OFF: "Check how the rig times the pulse, the reference of its ISIs, and the sampling rate.",
+        Kind.IMPLAUSIBLE: "Check the unit and the gain of the EMG.",
+        Kind.REJECTED: "See the notes in the log.",
+        Kind.OUTCOME_UNKNOWN: "Check whether the device is connected and answers.",
+    }
+)
+
+
+def remedy_for(reason: Kind) -> str:
+    """What to do about a mistrial of this reason."""
+    return _REMEDIES[reason]
+
+
+def too_early_by_chance(trial: Trial, space: DesignSpace) -> bool:
+    """Whether the pulse came before the impact by no more than the tolerance: no rig is to blame for that.
+
+    Args:
+        trial: a trial.
+        space: the design space.
+    """
+    if trial.reason is not Kind.TMS_BEFORE_IMPACT or trial.isi_ms is None or trial.commanded_isi_ms is None:
+        return False
+    return not off_by(trial.isi_ms, trial.commanded_isi_ms, space)
+
+
+def _finding(kind: Kind, trial: Trial, text: str, remedy: str) -> Finding:
+    severity = Severity.NOTE if trial.reason is None else Severity.MISTRIAL
+    return Finding(kind, severity, text, remedy)
+
+
+def unusable_emg(sweep: Sweep, trial: Trial) -> Finding | None:
+    """EMG that is missing, no recording, or not of the acceleration's duration."""
+    emg = sweep.channels.get("emg")
+    if emg is None or not emg.values.size:
+        return _finding(
+            Kind.NO_EMG, trial, "the sweep has no EMG", "Name the channel emg, and record it in every trial."
+        )
+    if not of_one_length(sweep) and is_recording(emg.values):
+        text = "EMG and acceleration differ in duration"
+        return _finding(Kind.DURATIONS, trial, text, "Check the sampling rates that the channels are given.")
+    return _recording(emg, trial, "the EMG", "Is the amplifier on, and its cable plugged in?")
+
+
+def _recording(channel: Channel, trial: Trial, what: str, look: str) -> Finding | None:
+    """That a channel is no recording; None where it is one."""
+    if not np.isfinite(channel.values).all():
+        text = f"{what} has samples that are no numbers"
+        return _finding(Kind.NOT_NUMBERS, trial, text, "Look at how the rig converts what it records.")
+    return None if is_recording(channel.values) else _finding(Kind.FLAT_LINE, trial, f"{what} is a flat line", look)
+
+
+def wrong_acceleration(sweep: Sweep, trial: Trial) -> Finding | None:
+    """What is wrong with the acceleration of a trial that was lost, where the hit is sought in it."""
+    acceleration, valve_ms = sweep.channels.get("acceleration"), sweep.t_valve_ms
+    if trial.reason is None or acceleration is None or valve_ms is None or sweep.t_hit_ms is not None:
+        return None
+    if _driven_impact(sweep.channels["emg"], valve_ms) is not None:
+        remedy = "The impact is in the channel emg: swap the two inputs."
+        return _finding(Kind.SWAPPED, trial, "EMG and acceleration are swapped", remedy)
+    broken = _recording(
+        acceleration, trial, "the acceleration", "Is the accelerometer powered, and its cable plugged in?"
+    )
+    upright, inverted = (_driven_impact(acceleration, valve_ms, sign) for sign in (1.0, -1.0))
+    if broken is None and inverted is not None and upright is None:
+        remedy = "Turn it, or negate its values: towards the tendon is positive."
+        return _finding(Kind.INVERTED, trial, "the accelerometer is inverted", remedy)
+    return broken
+
+
+def no_origin(sweep: Sweep, trial: Trial) -> Finding | None:
+    """A pulse whose ISI cannot be counted, with nothing that the hit could be found in."""
+    is_missing = trial.reason is Kind.MISSING_CHANNEL and sweep.t_tms_ms is not None
+    has_impact = "acceleration" in sweep.channels and sweep.t_valve_ms is not None
+    if not is_missing or has_impact or trial.isi_ms is not None or trial.commanded_isi_ms is None:
+        return None
+    remedy = (
+        "Where it is the impact, give t_hit_ms, or the acceleration with t_valve_ms; where it is the valve command, "
+        "t_valve_ms."
+    )
+    return _finding(Kind.NO_ORIGIN, trial, "the sweep has no time of the event that ISIs count from", remedy)
+
+
+def _driven_impact(channel: Channel, valve_ms: float, sign: float = 1.0) -> float | None:
+    """The impact of a hammer that was driven towards it for a while [ms]; artefacts in the EMG are not."""
+    rate, valve = channel.rate_hz, valve_ms - channel.t0_ms
+    values = sign * channel.values
+    if not is_recording(values) or valve < DRIVEN_MS:
+        return None
+    hit = impact_time(values, rate, valve)
+    if hit is None:
+        return None
+    rest = values[: math.floor(valve * rate / 1000)]
+    way = values[math.floor((hit - DRIVEN_MS) * rate / 1000) : math.floor((hit - 3.0) * rate / 1000)] - np.median(rest)
+    driven = bool((way > 0).mean() > 0.9) and float(np.median(way)) > float(rest.std())
+    return hit + channel.t0_ms if driven else None
+
+
+def stray_edge(sweep: Sweep, trial: Trial) -> Finding | None:
+    """The steepest edge of an EMG is the pulse's artefact, or belongs to what it evokes, or to the tap."""
+    if trial.t_tms_ms is None:
+        return None
+    emg = sweep.channels["emg"]
+    steepest_ms = steepest_edge(emg)
+    evoked_ms = (trial.t_tms_ms + EVOKED_SPAN_MS[0], trial.t_tms_ms + EVOKED_SPAN_MS[1])
+    tap_ms = tap_span_ms(trial)
+    if steepest_ms is None or (tap_ms is not None and tap_ms[0] <= steepest_ms <= tap_ms[1]):
+        return None
+    may_be_evoked = steepest_ms <= trial.t_tms_ms + BLANKED_MS or not _is_sharp(emg)
+    if evoked_ms[0] <= steepest_ms <= evoked_ms[1] and may_be_evoked:
+        return None
+    text = (
+        f"the steepest edge of the EMG is at {steepest_ms:.0f} ms, but the device reports the pulse at "
+        f"{trial.t_tms_ms:.0f} ms"
+    )
+    remedy = "Is that edge the pulse's? Then check the sampling rate, and that all times are on the sweep's own clock."
+    return _finding(Kind.STRAY_EDGE, trial, text, remedy)
+
+
+def tap_span_ms(trial: Trial) -> tuple[float, float] | None:
+    """When the tap may be in the EMG [ms on the sweep's clock]: the valve switches on and off before the hit.
+
+    Args:
+        trial: a trial; None is answered where it has no time of a tap.
+    """
+    begins = [ms for ms in (trial.t_valve_ms, trial.t_hit_ms) if ms is not None]
+    if not begins:
+        return None
+    hit_ms = begins[0] + LATEST_HIT_MS if trial.t_hit_ms is None else trial.t_hit_ms
+    return begins[0] - 2.0, hit_ms + JOLT_MS
+
+
+def steepest_edge(emg: Channel) -> float | None:
+    """When the EMG rises or falls most steeply [ms on the sweep's clock]; None where no edge stands out.
+
+    Args:
+        emg: the channel; an edge lasts a few samples, and spikes all over are none.
+    """
+    steps = np.abs(np.diff(emg.values))
+    usual = float(np.median(steps)) if steps.size else 0.0
+    if usual == 0 or steps.max() <= CLEAR * usual or (steps > 0.5 * steps.max()).mean() >= 0.01:
+        return None
+    return emg.t0_ms + 1000 * float(steps.argmax()) / emg.rate_hz
+
+
+def _is_sharp(emg: Channel) -> bool:
+    """Whether the EMG is steep within a millisecond only, as an artefact is and no MEP; few samples cannot say."""
+    steps = np.abs(np.diff(emg.values))
+    steep = np.flatnonzero(steps > 0.3 * steps.max())  # all flanks of an MEP, if it is one
+    return emg.rate_hz >= LEAST_RATE_HZ and bool(1000 * (steep[-1] - steep[0] + 1) / emg.rate_hz <= SHARP_MS)
+
+
+def wrong_level(trial: Trial, evidence: Evidence) -> Finding | None:
+    """EMG before the pulse that is no muscle's, or no amplifier's."""
+    rest_uv = trial.background_rms_uv
+    if rest_uv is None or REST_UV.least <= rest_uv <= REST_UV.most:
+        return None
+    if rest_uv > REST_UV.most:
+        scale, unit = (1e6, "V") if rest_uv >= 1e6 else (1e3, "mV")
+        level = f"{float(f'{rest_uv / scale:.2g}'):g} {unit}"
+        kind, text, look = Kind.LOUD, f"{level} RMS, more than any muscle's at rest", "."
+    else:
+        text = f"{rest_uv:.1g} µV RMS, less than any amplifier's noise"
+        kind, look = Kind.QUIET, "; is the amplifier on?"
+    question = _unit_question(rest_uv, evidence)
+    correct = f"{question}, or correct the gain" if question else "Correct the gain"
+    return _finding(kind, trial, f"the EMG before the pulse has {text}", f"{correct}{look}")
+
+
+def _unit_question(rest_uv: float, evidence: Evidence) -> str | None:
+    """Which unit the EMG is likely in, and what to do about it; None where no unit makes its level plausible."""
+    emg = evidence.answer.channels.get("emg") if isinstance(evidence.answer, Sweep) else None
+    if emg is None:  # the device itself measures
+        return "Is background_rms_uv, as the device tells it, in µV? Convert it"
+    levels_uv = {unit: rest_uv * EMG_UNITS_MV[unit] / EMG_UNITS_MV[emg.unit] for unit in ("V", "mV", "µV")}
+    likely = REST_UV.likely_unit(levels_uv)
+    return likely and f"Is it in {likely}, and described as {emg.unit}? Give the channel its unit"
+
+
+def lost_amplitude(trial: Trial, _: Evidence) -> Finding | None:
+    """An amplitude that no muscle gives, of a trial that was lost for it."""
+    wrong = None if trial.mep_mv is None else implausible_amplitude(trial.mep_mv)
+    if trial.reason is not Kind.IMPLAUSIBLE or wrong is None:
+        return None
+    return replace(wrong, severity=Severity.MISTRIAL)
+
+
+def lost_trial(trial: Trial, evidence: Evidence) -> Finding | None:
+    """The reason of a mistrial, with the figure behind it."""
+    if trial.reason is None:
+        return None
+    return _finding(trial.reason, trial, _explained(trial, evidence.limits), remedy_for(trial.reason))
+
+
+def _explained(trial: Trial, limits: SignalLimits) -> str:
+    if trial.reason is Kind.BACKGROUND_ACTIVITY and trial.background_rms_uv is not None:
+        return f"the muscle is tense: {trial.background_rms_uv:.0f} µV RMS, at most {limits.background_uv:g} at rest"
+    if trial.reason is Kind.ISI_OFF and trial.isi_ms is not None:
+        return f"the realised ISI was {trial.isi_ms:.0f} ms, not the commanded {trial.commanded_isi_ms:g} ms"
+    return f"{trial.reason}"

@@ -1,0 +1,260 @@
+"""Whether the amplitude, the ISI and the times that are told of one trial can be true, and which slip they look like.
+
+The bounds leave room for every muscle: the EMG at rest has 2 to 30 µV peak-to-peak, the largest compound action
+potentials some 25 mV. What is only odd is a doubt (`isiw.signals.amplitudes`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from isiw.checks import number
+from isiw.design import DesignSpace
+from isiw.errors import DeviceError
+from isiw.findings import AMPLITUDE_MV, Finding, Kind, Severity, refused
+from isiw.trials import MOST_ISI_SD_MS, Measurement, Stimulus, Trial
+
+__all__ = [
+    "before_impact",
+    "contradicts_its_times",
+    "implausible_amplitude",
+    "implausible_scale",
+    "isi_far",
+    "off_by",
+    "pulse_with_tap_alone",
+    "require_agreement",
+    "require_amplitude",
+    "require_isi_sd",
+    "require_plausible",
+    "tap_with_tms_alone",
+    "timed_isi_ms",
+]
+
+AT_REST_MV = 2e-3
+"""EMG at rest has hardly ever less, since the noise of electrodes and amplifier alone has a few µV peak-to-peak; an MEP
+of up to 2 mV that is told in V has less."""
+
+CUT_OFF_MS: Final = 2.0
+"""Pulse, event and ISI, each cut off to whole ms, disagree by less; a rig that is wrong about one of them, by more."""
+
+_NO_MEP: Final = "the amplitude cannot be an MEP's"
+
+
+def implausible_amplitude(mep_mv: float) -> Finding | None:
+    """Why an amplitude cannot be an MEP's in mV, and the likely slip; None where it can, as 0 always can.
+
+    Args:
+        mep_mv: peak-to-peak amplitude [mV].
+    """
+    slip = AMPLITUDE_MV.slip(mep_mv) if mep_mv else None
+    if slip is None:
+        return None
+    if mep_mv > AMPLITUDE_MV.most:
+        return _implausible(f"{mep_mv:.4g} mV is more than any muscle gives", slip)
+    return _implausible(f"{mep_mv:.2g} mV is less than any amplifier's noise", f"{slip} {_OR_NONE}")
+
+
+_OR_NONE: Final = "An amplitude below the detection limit is 0."
+
+
+def _implausible(why: str, remedy: str) -> Finding:
+    return Finding(Kind.IMPLAUSIBLE, Severity.REFUSED, f"{_NO_MEP}: {why}", remedy)
+
+
+def implausible_scale(meps_mv: Sequence[float]) -> Finding | None:
+    """Why amplitudes of single pulses to a muscle at rest cannot be in mV, and the likely slip; None where they can.
+
+    Once one of them is as large as EMG at rest the scale is right, and smaller ones may be a quiet sweep.
+
+    Args:
+        meps_mv: all amplitudes so far [mV], in order; 0, below the detection limit, says nothing about the scale.
+    """
+    largest_mv = max(meps_mv, default=0.0)
+    if not 0 < largest_mv < AT_REST_MV:
+        return None
+    return _implausible(f"{largest_mv:.2g} mV is less than EMG at rest has", f"{AMPLITUDE_MV.slip(0.0)} {_OR_NONE}")
+
+
+def require_amplitude(mep_mv: float, besides: Finding | None = None) -> None:
+    """Refuse an amplitude that no muscle gives.
+
+    Args:
+        mep_mv: peak-to-peak amplitude [mV].
+        besides: what else is known to be wrong with it.
+
+    Raises:
+        InvalidValueError: it cannot be an MEP's in mV.
+    """
+    found = implausible_amplitude(mep_mv) or besides
+    if found is not None:
+        raise refused(found, mep_mv)
+
+
+def off_by(isi_ms: float, asked_ms: float, space: DesignSpace) -> bool:
+    """Whether an ISI [ms] is farther than the space's tolerance from the one that was asked [ms].
+
+    Args:
+        isi_ms: the realised ISI.
+        asked_ms: the one that was asked.
+        space: the design space.
+    """
+    return abs(isi_ms - asked_ms) > space.tolerance_ms
+
+
+def isi_far(isi_ms: float | None, asked_ms: float | None, space: DesignSpace) -> Finding | None:
+    """That a realised ISI is far from the one asked, which may be right; None where it is not.
+
+    Args:
+        isi_ms: the realised ISI [ms]; None for TMS alone.
+        asked_ms: the ISI that was asked [ms]; None where none was.
+        space: the design space.
+    """
+    if isi_ms is None or asked_ms is None or not off_by(isi_ms, asked_ms, space):
+        return None
+    text = f"The realised ISI of {isi_ms:g} ms is far from the {asked_ms:g} ms that were asked"
+    return Finding(Kind.ISI_FAR, Severity.DOUBT, text, f"Is it counted from the {space.reference}, and in ms?")
+
+
+def require_plausible(isi_ms: float | None, mep_mv: float | None, asked_ms: float | None, space: DesignSpace) -> None:
+    """Refuse what cannot be true of one trial, or is a mistrial.
+
+    Args:
+        isi_ms: the realised ISI [ms]; None for TMS alone.
+        mep_mv: peak-to-peak amplitude [mV]; None where a response was seen or not.
+        asked_ms: the ISI that was asked [ms]; None where none was.
+        space: the design space.
+
+    Raises:
+        InvalidValueError: swapped arguments, seconds for milliseconds, an amplitude that no muscle gives, or a pulse
+            that came before the impact.
+    """
+    if isi_ms is not None and asked_ms is not None and off_by(isi_ms, asked_ms, space):
+        found = _misplaced_value(isi_ms, mep_mv, asked_ms, space)
+        if found is not None:
+            raise refused(found, (isi_ms, mep_mv), f"an ISI near the {asked_ms:g} ms that were asked")
+    if mep_mv is not None:
+        require_amplitude(mep_mv)
+    if isi_ms is not None and before_impact(isi_ms, space.low_ms if asked_ms is None else asked_ms, space):
+        raise refused(_EARLY, f"{isi_ms:g} ms")
+
+
+_EARLY: Final = Finding(
+    Kind.TMS_BEFORE_IMPACT,
+    Severity.REFUSED,
+    "the magnetic pulse came before the impact, so the trial is a mistrial",
+    'Count it as one: session.mistrial("TMS before impact"), or strategy.count_mistrial(). If this happens often, '
+    "begin the design space at a larger ISI.",
+)
+
+
+def before_impact(isi_ms: float, commanded_isi_ms: float, space: DesignSpace) -> bool:
+    """Whether a pulse came before the impact that it should have followed; such a trial is a mistrial.
+
+    Args:
+        isi_ms: the realised ISI [ms].
+        commanded_isi_ms: the one that was asked [ms].
+        space: says which event ISIs count from.
+    """
+    return space.reference == "impact" and isi_ms < 0 <= commanded_isi_ms
+
+
+def require_isi_sd(isi_sd_ms: float) -> None:
+    """Refuse an ISI that is known too vaguely to learn from: the models' three nodes do not stand for so wide a spread.
+
+    Args:
+        isi_sd_ms: SD of the realised ISI [ms].
+
+    Raises:
+        InvalidValueError: it is larger than `MOST_ISI_SD_MS`, negative or not finite.
+    """
+    if number("isi_sd_ms", isi_sd_ms, least=0) > MOST_ISI_SD_MS:
+        remedy = "Measure the impact; or count the trial as a mistrial."
+        found = Finding(Kind.VAGUE_ISI, Severity.REFUSED, "the realised ISI is too uncertain to learn from", remedy)
+        raise refused(found, f"an SD of {isi_sd_ms:g} ms", f"at most {MOST_ISI_SD_MS:g} ms")
+
+
+def _misplaced_value(isi_ms: float, mep_mv: float | None, asked_ms: float, space: DesignSpace) -> Finding | None:
+    """That the ISI that was asked is in the amplitude's place, or in seconds; None where it is not."""
+    if mep_mv is not None and mep_mv > abs(isi_ms) and not off_by(mep_mv, asked_ms, space):
+        remedy = "Tell the ISI first: tell(isi_ms, mep_mv)."
+        return Finding(Kind.ORDER, Severity.REFUSED, "the ISI and the amplitude seem to be swapped", remedy)
+    if not off_by(1000 * isi_ms, asked_ms, space):
+        remedy = "Tell it in ms: multiply by 1000."
+        return Finding(Kind.IN_SECONDS, Severity.REFUSED, "the realised ISI seems to be in seconds", remedy)
+    return None
+
+
+def timed_isi_ms(told: Measurement | Trial, space: DesignSpace) -> float | None:
+    """The ISI by the times of the pulse and of the event that it counts from [ms]; None where one is not told.
+
+    Args:
+        told: what is told of a trial.
+        space: says which event the ISI counts from.
+    """
+    start_ms = told.t_hit_ms if space.reference == "impact" else told.t_valve_ms
+    return None if start_ms is None or told.t_tms_ms is None else told.t_tms_ms - start_ms
+
+
+def contradicts_its_times(told: Measurement | Trial, space: DesignSpace) -> bool:
+    """Whether the realised ISI is another one than the times say.
+
+    Args:
+        told: what is told of a trial.
+        space: says which event the ISI counts from.
+    """
+    timed_ms = timed_isi_ms(told, space)
+    return timed_ms is not None and told.isi_ms is not None and abs(timed_ms - told.isi_ms) >= CUT_OFF_MS
+
+
+def require_agreement(measurement: Measurement, stimulus: Stimulus, space: DesignSpace) -> None:
+    """Refuse a measurement whose times are not those of the trial that was commanded, or of the ISI that it tells.
+
+    Args:
+        measurement: what the device reports.
+        stimulus: what was commanded.
+        space: says which event the ISI counts from.
+
+    Raises:
+        DeviceError: an impact with TMS alone, a pulse with a tap alone, or times that contradict the realised ISI.
+    """
+    alone = stimulus.isi_ms is None
+    if alone and not stimulus.tap_alone and measurement.t_hit_ms is not None:
+        raise tap_with_tms_alone(measurement.t_hit_ms)
+    if stimulus.tap_alone and measurement.t_tms_ms is not None:
+        raise pulse_with_tap_alone(measurement.t_tms_ms)
+    if contradicts_its_times(measurement, space):
+        event = "impact" if space.reference == "impact" else "valve command"
+        raise _of_device(
+            Kind.TIMES,
+            "the times that the device reports contradict the ISI that it reports",
+            f"a pulse {timed_isi_ms(measurement, space):g} ms after the {event}, and a realised ISI of "
+            f"{measurement.isi_ms:g} ms",
+            "Report the realised ISI, never the wanted one. Are its times in ms, on one clock, of this trial?",
+            f"the same to within {CUT_OFF_MS:g} ms",
+        )
+
+
+def tap_with_tms_alone(hit_ms: float) -> DeviceError:
+    """That a tap came with TMS alone: a response to both would be taken for one to the pulse.
+
+    Args:
+        hit_ms: when it hit [ms].
+    """
+    text, got = "the device reports a tap where TMS alone was commanded", f"an impact at {hit_ms:g} ms"
+    remedy = "Does the valve stay open? Leave t_hit_ms and t_valve_ms out where nothing hits."
+    return _of_device(Kind.TAP_UNWANTED, text, got, remedy)
+
+
+def pulse_with_tap_alone(pulse_ms: float) -> DeviceError:
+    """That a pulse came with a tap alone.
+
+    Args:
+        pulse_ms: when it came [ms].
+    """
+    text = "the device reports a magnetic pulse where a tap alone was commanded"
+    return _of_device(Kind.PULSE_UNWANTED, text, f"one at {pulse_ms:g} ms")
+
+
+def _of_device(kind: Kind, text: str, got: str, remedy: str = "", expected: str | None = None) -> DeviceError:
+    return refused(Finding(kind, Severity.REFUSED, text, remedy), got, expected, DeviceError)

@@ -1,0 +1,24 @@
+"""What is found in a trial, or in amplitudes, as a session would find it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from isiw.findings import Finding
+from isiw.signals.checklist import findings
+from isiw.signals.evidence import Evidence, Told
+from isiw.trials import Measurement, Sweep, Trial
+
+
+def fault_of(answer: Sweep | Measurement, trial: Trial) -> Finding | None:
+    """The first finding in a trial."""
+    return next(findings(Evidence(trial, answer)), None)
+
+
+def doubt_of(
+    meps_mv: Sequence[float], detection_limit_mv: float | None = None, isis_ms: Sequence[float | None] | None = None
+) -> Finding | None:
+    """The first finding in the amplitudes of several trials."""
+    isis_ms = isis_ms or [None] * len(meps_mv)
+    told = [Told(mep_mv, isi_ms) for mep_mv, isi_ms in zip(meps_mv, isis_ms, strict=True)]
+    return next(findings(Evidence(told=told, detection_limit_mv=detection_limit_mv)), None)
