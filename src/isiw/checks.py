@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, TypedDict, TypeVar, Unpack
 
@@ -111,9 +111,7 @@ def check_amplitude(owner: object, name: str, *, optional: bool = False) -> None
     Raises:
         InvalidValueError: a field that is not such an amplitude.
     """
-    value = getattr(owner, name)
-    if not (optional and value is None):
-        _put(owner, name, amplitude(f"{type(owner).__name__}.{name}", value))
+    _check(owner, (name,), amplitude, optional=optional)
 
 
 def deadline(what: str, value: object) -> float | None:
@@ -273,10 +271,7 @@ def check_numbers(owner: object, *names: str, optional: bool = False, **bounds: 
     Raises:
         InvalidValueError: a field that is not such a number.
     """
-    for name in names:
-        value = getattr(owner, name)
-        if not (optional and value is None):
-            _put(owner, name, number(f"{type(owner).__name__}.{name}", value, **bounds))
+    _check(owner, names, lambda what, value: number(what, value, **bounds), optional=optional)
 
 
 def check_probabilities(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
@@ -292,11 +287,12 @@ def check_probabilities(owner: object, *names: str, optional: bool = False, **bo
         InvalidValueError: a field that is not a probability.
     """
     bounds = bounds or {"least": 0.0, "most": 1.0}
-    for name in names:
-        value = getattr(owner, name)
-        if not (optional and value is None):
-            remedy = SHARE.slip(value) if isinstance(value, int | float) and value <= 100 else None
-            _put(owner, name, number(f"{type(owner).__name__}.{name}", value, remedy=remedy, **bounds))
+
+    def share(what: str, value: object) -> float:
+        remedy = SHARE.slip(value) if isinstance(value, int | float) and value <= 100 else None
+        return number(what, value, remedy=remedy, **bounds)
+
+    _check(owner, names, share, optional=optional)
 
 
 def check_wholes(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
@@ -311,10 +307,7 @@ def check_wholes(owner: object, *names: str, optional: bool = False, **bounds: U
     Raises:
         InvalidValueError: a field that is not such a number.
     """
-    for name in names:
-        value = getattr(owner, name)
-        if not (optional and value is None):
-            _put(owner, name, whole(f"{type(owner).__name__}.{name}", value, **bounds))
+    _check(owner, names, lambda what, value: whole(what, value, **bounds), optional=optional)
 
 
 def check_texts(owner: object, *names: str) -> None:
@@ -327,8 +320,7 @@ def check_texts(owner: object, *names: str) -> None:
     Raises:
         InvalidValueError: a field that is none.
     """
-    for name in names:
-        _put(owner, name, text(f"{type(owner).__name__}.{name}", getattr(owner, name)))
+    _check(owner, names, text)
 
 
 def check_flags(owner: object, *names: str) -> None:
@@ -341,15 +333,7 @@ def check_flags(owner: object, *names: str) -> None:
     Raises:
         InvalidValueError: a field that is neither.
     """
-    for name in names:
-        value = getattr(owner, name)
-        if not isinstance(value, bool | np.bool_):
-            raise InvalidValueError(
-                f"{type(owner).__name__}.{name} must be True or False",
-                got=value,
-                remedy="Write it without quotes: in a configuration true or false.",
-            )
-        _put(owner, name, bool(value))
+    _check(owner, names, _flag)
 
 
 def check_choice(owner: object, name: str, known: Iterable[Any]) -> None:
@@ -373,8 +357,21 @@ def _as_float(value: Real) -> float:
         return math.inf
 
 
-def _put(owner: object, name: str, value: object) -> None:
-    object.__setattr__(owner, name, value)
+def _flag(what: str, value: object) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        remedy = "Write it without quotes: in a configuration true or false."
+        raise InvalidValueError(f"{what} must be True or False", got=value, remedy=remedy)
+    return bool(value)
+
+
+def _check(
+    owner: object, names: Iterable[str], plain: Callable[[str, object], object], *, optional: bool = False
+) -> None:
+    """Put the plain value of some fields in their place."""
+    for name in names:
+        value = getattr(owner, name)
+        if not (optional and value is None):
+            object.__setattr__(owner, name, plain(f"{type(owner).__name__}.{name}", value))
 
 
 def _within(plain: float, bounds: Bounds) -> bool:

@@ -61,12 +61,9 @@ class IsiwError(Exception):
         got: the offending value, if there is one.
         expected: what would have been accepted.
         remedy: the way out.
-
-    Attributes:
-        kind: what was found, as one of `isiw.findings.Kind`, where a finding refused a value; None otherwise.
     """
 
-    kind: str | None = None
+    kind: str | None = None  # of the finding that refused a value, as one of `isiw.findings.Kind`
 
     def __init__(
         self, what: str, *, got: object = None, expected: str | None = None, remedy: str | None = None

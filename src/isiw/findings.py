@@ -9,35 +9,24 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final, TypeVar, overload
+from typing import Final
 
 from isiw.errors import InvalidValueError, IsiwError
 
 __all__ = ["ENOUGH_PAIRS", "MISTRIALS", "Finding", "Kind", "Scale", "Severity", "lacking", "refused"]
-
-_ErrorT = TypeVar("_ErrorT", bound=IsiwError)
 
 ENOUGH_PAIRS: Final = 3
 """With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
 
 
 class Severity(StrEnum):
-    """What follows from a finding."""
+    """What follows: an error; a lost trial; a pause; a pause once, and a line in the log; nothing, but for several."""
 
     REFUSED = "refused"
-    """It cannot be true: an error, and nothing is recorded."""
-
     MISTRIAL = "mistrial"
-    """The trial is lost."""
-
     PAUSE = "pause"
-    """The session pauses."""
-
     DOUBT = "doubt"
-    """It is logged, and a session pauses once; the trial counts."""
-
     NOTE = "note"
-    """The trial counts; only several in a row matter."""
 
 
 class Kind(StrEnum):
@@ -116,10 +105,6 @@ class Finding:
         return f"{self.text}. {self.remedy}".rstrip()
 
 
-@overload
-def refused(finding: Finding, got: object, expected: str | None = None) -> InvalidValueError: ...
-@overload
-def refused(finding: Finding, got: object, expected: str | None, error: type[_ErrorT]) -> _ErrorT: ...
 def refused(
     finding: Finding, got: object, expected: str | None = None, error: type[IsiwError] = InvalidValueError
 ) -> IsiwError:

@@ -351,12 +351,6 @@ class TrialTable:
         """The trials that a strategy learns from."""
         return tuple(trial for trial in self.trials if trial.told)
 
-    @property
-    def amplitudes(self) -> tuple[tuple[float, ...], tuple[float | None, ...]]:
-        """The amplitudes told [mV], and the ISIs of the same trials [ms]; None for TMS alone."""
-        measured = [(trial.mep_mv, trial.isi_ms) for trial in self.told if trial.mep_mv is not None]
-        return tuple(mep_mv for mep_mv, _ in measured), tuple(isi_ms for _, isi_ms in measured)
-
     def to_frame(self) -> pd.DataFrame:
         """The trials as a DataFrame, a row a trial, columns as in `Trial`, indexed by `index`."""
         columns = [f.name for f in dataclasses.fields(Trial)]

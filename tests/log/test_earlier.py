@@ -21,7 +21,7 @@ def earlier(topic: str, record: Record, lacking: str) -> Record:
 @pytest.mark.parametrize(
     ("reason", "kind"),
     [
-        ("12 stimuli are left. The window is not known well enough yet: the 90 % intervals span 90 ms.", StopKind.KNOWN),
+        ("12 stimuli are left. The window is not known well enough yet: the 90 % intervals span 9 ms.", StopKind.KNOWN),
         ("There is probably no window, with probability 0.91.", StopKind.ABSENT),
         ("Another 10 stimuli would add little: the last 10 stimuli added 0.01 to the expected F1, now 0.80.",
          StopKind.SMALL_GAIN),
@@ -41,8 +41,8 @@ def test_a_decision_that_was_logged_as_a_sentence_has_the_kind_that_it_said(reas
 @pytest.mark.parametrize(
     ("event", "text", "finding"),
     [
-        ("pause", "In 4 trials the EMG has a response at about 47 ms after the pulse, outside the MEP window of "
-                  "15–35 ms, and none within it. Is the time of the pulse right?", Kind.MISPLACED),
+        ("pause", "In 4 trials the EMG has a response at about 47 ms after the pulse, outside the MEP window of 15 ms",
+         Kind.MISPLACED),
         ("doubt", "The last 4 amplitudes are exactly equal (0.12 mV). Is the EMG still recorded?", Kind.EQUAL),
         ("pause", "Paused by the operator.", None),
         ("note", "The last 4 amplitudes are exactly equal (0.12 mV).", None),

@@ -6,7 +6,6 @@ Nothing else reads meaning out of a text. The words are those of these versions,
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Final, TypeVar
 
 from isiw.findings import Kind
@@ -17,58 +16,37 @@ __all__ = ["with_kinds"]
 
 _KindT = TypeVar("_KindT", Kind, StopKind)
 
-_DECISIONS: Final[Mapping[str, StopKind]] = MappingProxyType(
-    {
-        "The session is paused": StopKind.PAUSED,
-        "There is no window": StopKind.ABSENT,
-        "There is probably no window": StopKind.ABSENT,
-        "The probability that there is no window is": StopKind.ABSENT,
-        "The probability of a window is not known": StopKind.ABSENT,
-        "The window is known": StopKind.KNOWN,
-        "The window is not known well enough yet": StopKind.KNOWN,
-        "The window as it is known so far": StopKind.KNOWN,
-        "The F1 to be expected is not known": StopKind.KNOWN,
-        "to the expected F1": StopKind.SMALL_GAIN,
-        "windows in a row yet": StopKind.SETTLED,
-        "The window has": StopKind.SETTLED,
-        "The particles have": StopKind.SETTLED,
-        "No generation of particles": StopKind.SETTLED,
-        "The scan of ISIs has": StopKind.SETTLED,
-        "too few to speak of a window": StopKind.TOO_LITTLE,
-        "so nothing is known about a window": StopKind.TOO_LITTLE,
-        "stimuli is used up": StopKind.BUDGET,
-        "stimuli are left": StopKind.BUDGET,
-        "stimulus is left": StopKind.BUDGET,
-        "pulses is reached": StopKind.LIMIT,
-    }
-)
+_DECISIONS: Final[Mapping[StopKind, tuple[str, ...]]] = {
+    StopKind.PAUSED: ("The session is paused",),
+    StopKind.ABSENT: ("There is no window", "There is probably no window", "The probability "),
+    StopKind.KNOWN: ("The window is ", "The window as it is known so far", "The F1 to be expected is not known"),
+    StopKind.SMALL_GAIN: ("to the expected F1",),
+    StopKind.SETTLED: ("windows in a row yet", "The window has", "The particles have", "No generation of particles",
+                       "The scan of ISIs has"),
+    StopKind.TOO_LITTLE: ("too few to speak of a window", "so nothing is known about a window"),
+    StopKind.BUDGET: ("stimuli is used up", "stimuli are left", "stimulus is left"),
+    StopKind.LIMIT: ("pulses is reached",),
+}  # fmt: skip
 
-_FINDINGS: Final[Mapping[str, Kind]] = MappingProxyType(
-    {
-        "the steepest edge of the EMG is at": Kind.STRAY_EDGE,
-        "RMS, more than any muscle's at rest": Kind.LOUD,
-        "RMS, less than any amplifier's noise": Kind.QUIET,
-        "is that of the one before, sample by sample": Kind.REPEATED,
-        "after the pulse, outside the MEP window of": Kind.MISPLACED,
-        "the EMG is much larger just before the MEP window": Kind.ARTEFACT,
-        "amplitudes are exactly equal": Kind.EQUAL,
-        "amplitudes are almost equal": Kind.EQUAL,
-        "pulses evoked an MEP: every amplitude is 0": Kind.SILENT,
-        "pulses evoked an MEP, though earlier ones did": Kind.STOPPED,
-        "µV, less than EMG at rest has": Kind.SMALL,
-        "more than most muscles give": Kind.LARGE,
-        "times as large as those before": Kind.JUMP,
-        "ms is far from the": Kind.ISI_FAR,
-    }
-)
+_FINDINGS: Final[Mapping[Kind, tuple[str, ...]]] = {
+    Kind.STRAY_EDGE: ("the steepest edge of the EMG is at",),
+    Kind.LOUD: ("RMS, more than any muscle's at rest",),
+    Kind.QUIET: ("RMS, less than any amplifier's noise",),
+    Kind.REPEATED: ("is that of the one before, sample by sample",),
+    Kind.MISPLACED: ("after the pulse, outside the MEP window of",),
+    Kind.ARTEFACT: ("the EMG is much larger just before the MEP window",),
+    Kind.EQUAL: ("amplitudes are exactly equal", "amplitudes are almost equal"),
+    Kind.SILENT: ("pulses evoked an MEP: every amplitude is 0",),
+    Kind.STOPPED: ("pulses evoked an MEP, though earlier ones did",),
+    Kind.SMALL: ("µV, less than EMG at rest has",),
+    Kind.LARGE: ("more than most muscles give",),
+    Kind.JUMP: ("times as large as those before",),
+    Kind.ISI_FAR: ("ms is far from the",),
+}
 
 
 def with_kinds(record: Record) -> Record:
-    """A record of a log with the kinds that an earlier version left to its sentences.
-
-    Args:
-        record: as it was logged.
-    """
+    """A record of a log with the kinds that an earlier version left to its sentences."""
     if isinstance(record, Estimate) and "stop_kind" not in record.model_fields_set:
         return record.model_copy(update={"stop_kind": _kind(record.reason, _DECISIONS) or StopKind.OWN})
     if isinstance(record, Event) and record.kind in {"doubt", "pause"} and "finding" not in record.model_fields_set:
@@ -76,5 +54,5 @@ def with_kinds(record: Record) -> Record:
     return record
 
 
-def _kind(text: str, table: Mapping[str, _KindT]) -> _KindT | None:
-    return next((kind for words, kind in table.items() if words in text), None)
+def _kind(text: str, table: Mapping[_KindT, tuple[str, ...]]) -> _KindT | None:
+    return next((kind for kind, said in table.items() if any(words in text for words in said)), None)

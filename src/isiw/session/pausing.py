@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from isiw.findings import Finding, Kind
+from isiw.findings import Kind
 from isiw.session.asking import Asking
 from isiw.session.journal import Journal
 from isiw.session.operator import goes_on
@@ -36,7 +36,7 @@ class Pausing:
         self._rig, self._journal = rig, journal
         self.decide = safeguards.on_pause or goes_on
         self.reason: str | None = None
-        self._finding: Kind | None = None
+        self.kind: Kind | None = None
         self.waiting: Pause | None = None
         self.asking = Asking()
 
@@ -51,16 +51,8 @@ class Pausing:
         Args:
             reason: why, for the operator and the log.
         """
-        self.reason, self._finding = reason, None
+        self.reason, self.kind = reason, None
         self._rig.disarm()
-
-    def because(self, finding: Finding) -> None:
-        """Pause before the next stimulus for something that was found.
-
-        Args:
-            finding: what was found.
-        """
-        self.reason, self._finding = f"{finding}", finding.kind
 
     def end(self, reason: str) -> None:
         """Disarm, and end before the next stimulus, whatever is answered to a pause; from any thread.
@@ -83,9 +75,8 @@ class Pausing:
         interrupts.acknowledge()
         if interrupts.ending:
             raise KeyboardInterrupt
-        reason, self.reason = self.reason or _INTERRUPTED, None
-        self._journal.event("pause", reason, finding=self._finding)
-        self._finding = None
+        reason, kind, self.reason, self.kind = self.reason or _INTERRUPTED, self.kind, None, None
+        self._journal.event("pause", reason, finding=kind)
         self._journal.log.sync()
         if not self._goes_on(reason):
             if interrupts.heard:

@@ -23,7 +23,7 @@ from isiw.session.judging import Judging
 from isiw.signals.checklist import findings
 from isiw.signals.evidence import Evidence, told_of
 from isiw.signals.rig import remedy_for
-from isiw.signals.values import isi_far, require_isi_sd, require_plausible
+from isiw.signals.values import isi_far, require_plausible
 from isiw.signals.watch import Doubts
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
@@ -164,8 +164,7 @@ class Recorder(Judging):
         mep_mv = number("mep_mv", mep_mv, least=0)
         isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         asked = self._require_asked()
-        require_plausible(isi_ms, mep_mv, asked.isi_ms, self.strategy.space)
-        require_isi_sd(isi_sd_ms)
+        require_plausible(isi_ms, mep_mv, asked.isi_ms, self.strategy.space, isi_sd_ms)
         isi_ms = None if isi_ms is None else self.strategy.space.check_realised(isi_ms)
         if (isi_ms is None) != (asked.isi_ms is None):
             raise InvalidValueError(

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Never
 
+from isiw.checks import choice
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.deadlines import PunctualDevice
 from isiw.devices.limited import LimitedDevice
@@ -20,7 +21,7 @@ from isiw.log.writer import LogWriter
 from isiw.session.interrupts import Interrupts
 from isiw.session.lastresort import INTERRUPTED, STILL_ARMED, end_process
 from isiw.session.safeguards import Safeguards
-from isiw.signals.units import EMG_UNITS_MV, require_unit
+from isiw.signals.units import EMG_UNITS_MV
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus
 from isiw.types import Reference
@@ -219,7 +220,7 @@ def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtoc
     for name in info.channels:
         waveform_topic(name)
     if "emg" in info.channels:  # an acceleration is not read where the device itself knows the time of the hit
-        require_unit("emg", info.channels["emg"], EMG_UNITS_MV)
+        choice("the unit of the channel emg", info.channels["emg"], EMG_UNITS_MV)
     limit_mv, assumed_mv = info.detection_limit_mv, strategy.detection_limit_mv
     if limit_mv is not None and assumed_mv is not None and not math.isclose(limit_mv, assumed_mv):
         raise DeviceError(

@@ -157,8 +157,8 @@ class Steps:
             self._journal.event("doubt", f"{doubt}", finding=doubt.kind)
         estimate, decision, next_isi_ms = self.log_estimate(trial.index)
         self._journal.unconcluded = None
-        if not decision.stop and self.delivery.watch.pause is not None:
-            self._pausing.because(self.delivery.watch.pause)
+        if not decision.stop and (pause := self.delivery.watch.pause) is not None:
+            self._pausing.reason, self._pausing.kind = f"{pause}", pause.kind
         if self.on_trial is not None:
             left = self._stimuli_left()
             update = SessionUpdate(trial, estimate, decision, next_isi_ms, left, self._pace.left_s(left))

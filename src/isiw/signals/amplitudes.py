@@ -15,7 +15,7 @@ from isiw.findings import ENOUGH_PAIRS, Finding, Kind, Severity
 from isiw.signals.evidence import Evidence, Told
 from isiw.trials import RESPONSE_MV
 
-__all__ = ["equal", "is_silent", "large", "silent", "small", "stopped", "stopped_after"]
+__all__ = ["is_silent", "stopped_after"]
 
 SMALL_MV, LARGE_MV = 8e-4, 4.0
 """Of several in a row, the largest is never smaller, and their geometric mean is hardly ever larger from the start."""

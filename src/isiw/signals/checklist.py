@@ -7,35 +7,30 @@ from typing import Final
 
 from isiw.findings import Finding
 from isiw.signals import amplitudes, places, rig
-from isiw.signals.evidence import Check, Evidence, OfSweep, OfTold, OfTrial
+from isiw.signals.evidence import Check, Evidence, of_sweep, of_told, of_trial
 
 __all__ = ["CHECKS", "findings"]
 
 CHECKS: Final[tuple[Check, ...]] = (
-    OfSweep(rig.unusable_emg),
-    OfSweep(rig.wrong_acceleration),
-    OfSweep(rig.no_origin),
-    OfSweep(rig.stray_edge),
-    OfTrial(rig.wrong_level),
-    OfTrial(rig.lost_amplitude),
-    OfTrial(rig.lost_trial),
-    OfTold(places.repeated),
-    OfTold(amplitudes.equal),
-    OfTold(amplitudes.silent),
-    OfTold(amplitudes.stopped),
-    OfTold(amplitudes.small),
-    OfTold(amplitudes.large),
-    OfTold(places.misplaced),
-    OfTold(places.artefact),
+    of_sweep(rig.unusable_emg),
+    of_sweep(rig.wrong_acceleration),
+    of_sweep(rig.no_origin),
+    of_sweep(rig.stray_edge),
+    of_trial(rig.wrong_level),
+    of_trial(rig.lost_trial),
+    of_told(places.repeated),
+    of_told(amplitudes.equal),
+    of_told(amplitudes.silent),
+    of_told(amplitudes.stopped),
+    of_told(amplitudes.small),
+    of_told(amplitudes.large),
+    of_told(places.misplaced),
+    of_told(places.artefact),
 )
 """The surest first: of one trial, the first finding explains the others."""
 
 
 def findings(evidence: Evidence) -> Iterator[Finding]:
-    """What is found in some evidence, in the order of the list; what a check needs and has not got, it passes over.
-
-    Args:
-        evidence: what is known.
-    """
+    """What is found in some evidence, in the order of the list."""
     found = (check(evidence) for check in CHECKS)
     return (finding for finding in found if finding is not None)

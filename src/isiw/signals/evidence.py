@@ -10,7 +10,7 @@ from isiw.findings import Finding
 from isiw.signals.limits import SignalLimits
 from isiw.trials import Measurement, Sweep, Trial, TrialTable
 
-__all__ = ["Check", "Evidence", "OfSweep", "OfTold", "OfTrial", "Response", "Told", "told_of"]
+__all__ = ["Check", "Evidence", "Response", "Told", "of_sweep", "of_told", "of_trial", "told_of"]
 
 
 class Response(NamedTuple):
@@ -42,11 +42,7 @@ class Told:
 
 
 def told_of(trials: TrialTable) -> tuple[Told, ...]:
-    """The trials of a table that count and have an amplitude.
-
-    Args:
-        trials: the table.
-    """
+    """The trials of a table that count and have an amplitude."""
     return tuple(Told(t.mep_mv, t.isi_ms, t.background_rms_uv) for t in trials.told if t.mep_mv is not None)
 
 
@@ -69,36 +65,20 @@ class Evidence:
     detection_limit_mv: float | None = None
 
 
-class OfSweep(NamedTuple):
+Check: TypeAlias = Callable[[Evidence], Finding | None]
+"""Looks for one kind of finding; None where it finds nothing, or lacks what it needs."""
+
+
+def of_sweep(find: Callable[[Sweep, Trial], Finding | None]) -> Check:
     """A check that needs the last trial and its sweep."""
-
-    find: Callable[[Sweep, Trial], Finding | None]
-
-    def __call__(self, evidence: Evidence) -> Finding | None:
-        """What it finds; None where it finds nothing, or lacks what it needs."""
-        sweep, trial = evidence.answer, evidence.trial
-        return self.find(sweep, trial) if trial is not None and isinstance(sweep, Sweep) else None
+    return lambda e: find(e.answer, e.trial) if e.trial is not None and isinstance(e.answer, Sweep) else None
 
 
-class OfTrial(NamedTuple):
+def of_trial(find: Callable[[Trial, Evidence], Finding | None]) -> Check:
     """A check that needs the last trial, be there a sweep or not."""
-
-    find: Callable[[Trial, Evidence], Finding | None]
-
-    def __call__(self, evidence: Evidence) -> Finding | None:
-        """What it finds; None where it finds nothing, or lacks what it needs."""
-        return None if evidence.trial is None else self.find(evidence.trial, evidence)
+    return lambda e: None if e.trial is None else find(e.trial, e)
 
 
-class OfTold(NamedTuple):
+def of_told(find: Check) -> Check:
     """A check that needs the trials that count so far."""
-
-    find: Callable[[Evidence], Finding | None]
-
-    def __call__(self, evidence: Evidence) -> Finding | None:
-        """What it finds; None where it finds nothing, or lacks what it needs."""
-        return self.find(evidence) if evidence.told else None
-
-
-Check: TypeAlias = OfSweep | OfTrial | OfTold
-"""One kind of finding: the function that looks for it, by what that needs."""
+    return lambda e: find(e) if e.told else None

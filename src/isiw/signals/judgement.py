@@ -11,7 +11,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from isiw.checks import MOST_MEP_MV
+from isiw.checks import MOST_MEP_MV, choice
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import Kind
@@ -26,7 +26,7 @@ from isiw.signals.mep import (
     background_rms,
     mep_amplitudes,
 )
-from isiw.signals.units import ACCELERATION_UNITS, EMG_UNITS_MV, require_unit
+from isiw.signals.units import ACCELERATION_UNITS, EMG_UNITS_MV
 from isiw.signals.values import (
     before_impact,
     implausible_amplitude,
@@ -213,7 +213,7 @@ def _impact(sweep: Sweep) -> tuple[float | None, Kind | None]:
     if "acceleration" not in sweep.channels:
         return None, None
     channel = sweep.channels["acceleration"]
-    require_unit("acceleration", channel.unit, ACCELERATION_UNITS)
+    choice("the unit of the channel acceleration", channel.unit, sorted(ACCELERATION_UNITS))
     if sweep.t_valve_ms is None or not _usable(sweep, "acceleration"):
         return None, Kind.MISSING_CHANNEL
     hit = impact_time(channel.values, channel.rate_hz, sweep.t_valve_ms - channel.t0_ms)
@@ -236,8 +236,7 @@ def of_one_length(sweep: Sweep) -> bool:
 
 
 def _unit_mv(emg: Channel) -> float:
-    require_unit("emg", emg.unit, EMG_UNITS_MV)
-    return EMG_UNITS_MV[emg.unit]
+    return EMG_UNITS_MV[choice("the unit of the channel emg", emg.unit, EMG_UNITS_MV)]
 
 
 def _holds_window(emg: Channel, timed: Trial, limits: SignalLimits) -> bool:

@@ -22,7 +22,7 @@ from isiw.signals.units import EMG_UNITS_MV
 from isiw.trials import Sweep, Trial
 from isiw.types import BoolArray, FloatArray
 
-__all__ = ["artefact", "misplaced", "repeated", "told_by"]
+__all__ = ["told_by"]
 
 SOUGHT_MS = (ARTEFACT_MS, 80.0)
 """Where a response is looked for [ms after the pulse]: behind the pulse's artefact, and before the person moves."""

@@ -24,20 +24,7 @@ from isiw.signals.values import implausible_amplitude, off_by
 from isiw.signals.waveforms import is_recording
 from isiw.trials import Channel, Sweep, Trial
 
-__all__ = [
-    "EVOKED_SPAN_MS",
-    "lost_amplitude",
-    "lost_trial",
-    "no_origin",
-    "remedy_for",
-    "steepest_edge",
-    "stray_edge",
-    "tap_span_ms",
-    "too_early_by_chance",
-    "unusable_emg",
-    "wrong_acceleration",
-    "wrong_level",
-]
+__all__ = ["EVOKED_SPAN_MS", "remedy_for", "steepest_edge", "tap_span_ms", "too_early_by_chance"]
 
 DRIVEN_MS = 25.0
 """How long a hammer is driven before its impact, at least."""
@@ -193,11 +180,7 @@ def stray_edge(sweep: Sweep, trial: Trial) -> Finding | None:
 
 
 def tap_span_ms(trial: Trial) -> tuple[float, float] | None:
-    """When the tap may be in the EMG [ms on the sweep's clock]: the valve switches on and off before the hit.
-
-    Args:
-        trial: a trial; None is answered where it has no time of a tap.
-    """
+    """When a trial's tap may be in the EMG [ms on the sweep's clock], valve and all; None without a time of it."""
     begins = [ms for ms in (trial.t_valve_ms, trial.t_hit_ms) if ms is not None]
     if not begins:
         return None
@@ -206,11 +189,7 @@ def tap_span_ms(trial: Trial) -> tuple[float, float] | None:
 
 
 def steepest_edge(emg: Channel) -> float | None:
-    """When the EMG rises or falls most steeply [ms on the sweep's clock]; None where no edge stands out.
-
-    Args:
-        emg: the channel; an edge lasts a few samples, and spikes all over are none.
-    """
+    """When the EMG rises or falls most steeply [ms on the sweep's clock]; None where no edge, or many, stand out."""
     steps = np.abs(np.diff(emg.values))
     usual = float(np.median(steps)) if steps.size else 0.0
     if usual == 0 or steps.max() <= CLEAR * usual or (steps > 0.5 * steps.max()).mean() >= 0.01:
@@ -252,18 +231,13 @@ def _unit_question(rest_uv: float, evidence: Evidence) -> str | None:
     return likely and f"Is it in {likely}, and described as {emg.unit}? Give the channel its unit"
 
 
-def lost_amplitude(trial: Trial, _: Evidence) -> Finding | None:
-    """An amplitude that no muscle gives, of a trial that was lost for it."""
-    wrong = None if trial.mep_mv is None else implausible_amplitude(trial.mep_mv)
-    if trial.reason is not Kind.IMPLAUSIBLE or wrong is None:
-        return None
-    return replace(wrong, severity=Severity.MISTRIAL)
-
-
 def lost_trial(trial: Trial, evidence: Evidence) -> Finding | None:
     """The reason of a mistrial, with the figure behind it."""
     if trial.reason is None:
         return None
+    amplitude = implausible_amplitude(trial.mep_mv or 0.0)
+    if trial.reason is Kind.IMPLAUSIBLE and amplitude is not None:
+        return replace(amplitude, severity=Severity.MISTRIAL)
     return _finding(trial.reason, trial, _explained(trial, evidence.limits), remedy_for(trial.reason))
 
 

@@ -11,7 +11,7 @@ from typing import Final
 
 from isiw.checks import number
 from isiw.design import DesignSpace
-from isiw.errors import DeviceError
+from isiw.errors import DeviceError, IsiwError
 from isiw.findings import AMPLITUDE_MV, Finding, Kind, Severity, refused
 from isiw.trials import MOST_ISI_SD_MS, Measurement, Stimulus, Trial
 
@@ -25,7 +25,6 @@ __all__ = [
     "pulse_with_tap_alone",
     "require_agreement",
     "require_amplitude",
-    "require_isi_sd",
     "require_plausible",
     "tap_with_tms_alone",
     "timed_isi_ms",
@@ -38,15 +37,11 @@ of up to 2 mV that is told in V has less."""
 CUT_OFF_MS: Final = 2.0
 """Pulse, event and ISI, each cut off to whole ms, disagree by less; a rig that is wrong about one of them, by more."""
 
-_NO_MEP: Final = "the amplitude cannot be an MEP's"
+_OR_NONE: Final = "An amplitude below the detection limit is 0."
 
 
 def implausible_amplitude(mep_mv: float) -> Finding | None:
-    """Why an amplitude cannot be an MEP's in mV, and the likely slip; None where it can, as 0 always can.
-
-    Args:
-        mep_mv: peak-to-peak amplitude [mV].
-    """
+    """Why an amplitude [mV] cannot be an MEP's, and the likely slip; None where it can, as 0 always can."""
     slip = AMPLITUDE_MV.slip(mep_mv) if mep_mv else None
     if slip is None:
         return None
@@ -55,20 +50,14 @@ def implausible_amplitude(mep_mv: float) -> Finding | None:
     return _implausible(f"{mep_mv:.2g} mV is less than any amplifier's noise", f"{slip} {_OR_NONE}")
 
 
-_OR_NONE: Final = "An amplitude below the detection limit is 0."
-
-
 def _implausible(why: str, remedy: str) -> Finding:
-    return Finding(Kind.IMPLAUSIBLE, Severity.REFUSED, f"{_NO_MEP}: {why}", remedy)
+    return Finding(Kind.IMPLAUSIBLE, Severity.REFUSED, f"the amplitude cannot be an MEP's: {why}", remedy)
 
 
 def implausible_scale(meps_mv: Sequence[float]) -> Finding | None:
     """Why amplitudes of single pulses to a muscle at rest cannot be in mV, and the likely slip; None where they can.
 
-    Once one of them is as large as EMG at rest the scale is right, and smaller ones may be a quiet sweep.
-
-    Args:
-        meps_mv: all amplitudes so far [mV], in order; 0, below the detection limit, says nothing about the scale.
+    Once one of them is as large as EMG at rest the scale is right; 0, below the detection limit, says nothing about it.
     """
     largest_mv = max(meps_mv, default=0.0)
     if not 0 < largest_mv < AT_REST_MV:
@@ -116,7 +105,13 @@ def isi_far(isi_ms: float | None, asked_ms: float | None, space: DesignSpace) ->
     return Finding(Kind.ISI_FAR, Severity.DOUBT, text, f"Is it counted from the {space.reference}, and in ms?")
 
 
-def require_plausible(isi_ms: float | None, mep_mv: float | None, asked_ms: float | None, space: DesignSpace) -> None:
+def require_plausible(
+    isi_ms: float | None,
+    mep_mv: float | None,
+    asked_ms: float | None,
+    space: DesignSpace,
+    isi_sd_ms: float = 0.0,
+) -> None:
     """Refuse what cannot be true of one trial, or is a mistrial.
 
     Args:
@@ -124,10 +119,11 @@ def require_plausible(isi_ms: float | None, mep_mv: float | None, asked_ms: floa
         mep_mv: peak-to-peak amplitude [mV]; None where a response was seen or not.
         asked_ms: the ISI that was asked [ms]; None where none was.
         space: the design space.
+        isi_sd_ms: SD of the realised ISI [ms]; the models' three nodes do not stand for a wide spread.
 
     Raises:
-        InvalidValueError: swapped arguments, seconds for milliseconds, an amplitude that no muscle gives, or a pulse
-            that came before the impact.
+        InvalidValueError: swapped arguments, seconds for milliseconds, an amplitude that no muscle gives, a pulse that
+            came before the impact, or an ISI that is known too vaguely.
     """
     if isi_ms is not None and asked_ms is not None and off_by(isi_ms, asked_ms, space):
         found = _misplaced_value(isi_ms, mep_mv, asked_ms, space)
@@ -137,6 +133,8 @@ def require_plausible(isi_ms: float | None, mep_mv: float | None, asked_ms: floa
         require_amplitude(mep_mv)
     if isi_ms is not None and before_impact(isi_ms, space.low_ms if asked_ms is None else asked_ms, space):
         raise refused(_EARLY, f"{isi_ms:g} ms")
+    if number("isi_sd_ms", isi_sd_ms, least=0) > MOST_ISI_SD_MS:
+        raise refused(_VAGUE, f"an SD of {isi_sd_ms:g} ms", f"at most {MOST_ISI_SD_MS:g} ms")
 
 
 _EARLY: Final = Finding(
@@ -145,6 +143,13 @@ _EARLY: Final = Finding(
     "the magnetic pulse came before the impact, so the trial is a mistrial",
     'Count it as one: session.mistrial("TMS before impact"), or strategy.count_mistrial(). If this happens often, '
     "begin the design space at a larger ISI.",
+)
+
+_VAGUE: Final = Finding(
+    Kind.VAGUE_ISI,
+    Severity.REFUSED,
+    "the realised ISI is too uncertain to learn from",
+    "Measure the impact; or count the trial as a mistrial.",
 )
 
 
@@ -157,21 +162,6 @@ def before_impact(isi_ms: float, commanded_isi_ms: float, space: DesignSpace) ->
         space: says which event ISIs count from.
     """
     return space.reference == "impact" and isi_ms < 0 <= commanded_isi_ms
-
-
-def require_isi_sd(isi_sd_ms: float) -> None:
-    """Refuse an ISI that is known too vaguely to learn from: the models' three nodes do not stand for so wide a spread.
-
-    Args:
-        isi_sd_ms: SD of the realised ISI [ms].
-
-    Raises:
-        InvalidValueError: it is larger than `MOST_ISI_SD_MS`, negative or not finite.
-    """
-    if number("isi_sd_ms", isi_sd_ms, least=0) > MOST_ISI_SD_MS:
-        remedy = "Measure the impact; or count the trial as a mistrial."
-        found = Finding(Kind.VAGUE_ISI, Severity.REFUSED, "the realised ISI is too uncertain to learn from", remedy)
-        raise refused(found, f"an SD of {isi_sd_ms:g} ms", f"at most {MOST_ISI_SD_MS:g} ms")
 
 
 def _misplaced_value(isi_ms: float, mep_mv: float | None, asked_ms: float, space: DesignSpace) -> Finding | None:
@@ -235,26 +225,18 @@ def require_agreement(measurement: Measurement, stimulus: Stimulus, space: Desig
         )
 
 
-def tap_with_tms_alone(hit_ms: float) -> DeviceError:
-    """That a tap came with TMS alone: a response to both would be taken for one to the pulse.
-
-    Args:
-        hit_ms: when it hit [ms].
-    """
+def tap_with_tms_alone(hit_ms: float) -> IsiwError:
+    """That a tap hit at this time with TMS alone: a response to both would be taken for one to the pulse."""
     text, got = "the device reports a tap where TMS alone was commanded", f"an impact at {hit_ms:g} ms"
     remedy = "Does the valve stay open? Leave t_hit_ms and t_valve_ms out where nothing hits."
     return _of_device(Kind.TAP_UNWANTED, text, got, remedy)
 
 
-def pulse_with_tap_alone(pulse_ms: float) -> DeviceError:
-    """That a pulse came with a tap alone.
-
-    Args:
-        pulse_ms: when it came [ms].
-    """
+def pulse_with_tap_alone(pulse_ms: float) -> IsiwError:
+    """That a pulse came at this time with a tap alone."""
     text = "the device reports a magnetic pulse where a tap alone was commanded"
     return _of_device(Kind.PULSE_UNWANTED, text, f"one at {pulse_ms:g} ms")
 
 
-def _of_device(kind: Kind, text: str, got: str, remedy: str = "", expected: str | None = None) -> DeviceError:
+def _of_device(kind: Kind, text: str, got: str, remedy: str = "", expected: str | None = None) -> IsiwError:
     return refused(Finding(kind, Severity.REFUSED, text, remedy), got, expected, DeviceError)

@@ -27,12 +27,7 @@ EARLY_IN_A_ROW: Final = 9
 
 @dataclass(frozen=True)
 class Doubts:
-    """Which kinds of doubt were raised so far: each once, so that nobody is told the same for ever.
-
-    Args:
-        raised: their kinds.
-        new: what the last trial raised; None where it raised nothing new.
-    """
+    """Which kinds of doubt were `raised` so far, each once, and which the last trial raised, or None."""
 
     raised: frozenset[Kind] = frozenset()
     new: Finding | None = None
@@ -49,11 +44,7 @@ class Doubts:
         return cls(frozenset(finding.kind for way in ways for finding in findings(way)))
 
     def after(self, odd: Iterable[Finding | None]) -> Doubts:
-        """The same after one more trial.
-
-        Args:
-            odd: what is odd since then, of which the first that is new is raised.
-        """
+        """The same after one more trial: of what is odd since then, the first that is new is raised."""
         new = next((doubt for doubt in odd if doubt is not None and doubt.kind not in self.raised), None)
         return Doubts(self.raised if new is None else self.raised | {new.kind}, new)
 
@@ -62,28 +53,17 @@ class Doubts:
 class Watch:
     """What was found in the trials so far, and what speaks for a pause.
 
-    Args:
-        space: the session's design space.
-        signals: what its sweeps are judged by.
-        max_in_a_row: how many trials in a row may be rejected, or show a faulty rig.
-        detection_limit_mv: what an amplitude of 0 is known to be below [mV]; None where nobody has said.
-        in_a_row: how many there have been.
-        early_ms: the ISI at which pulses came before the impact by chance [ms].
-        early: how many in a row there.
-        told: the trials that count, and what their sweeps show.
-        emg: samples of the last sweep; None where there are none.
-        doubts: which doubts were raised, and which the last trial raised.
-        paused_for: the kinds that a person has seen in a pause; of trials that count, the same is said once.
-        pause: why to pause now, and what to do; None where there is no reason.
+    `paused_for` are the kinds that a person has seen in a pause: of trials that count, the same is said once. `pause`
+    is why to pause now, if at all; trials that `told` something are kept with what their sweeps show.
     """
 
     space: DesignSpace
     signals: SignalLimits
     max_in_a_row: int
     detection_limit_mv: float | None = None
-    in_a_row: int = 0
+    in_a_row: int = 0  # trials that were rejected, or show a faulty rig
     early_ms: float | None = None
-    early: int = 0
+    early: int = 0  # pulses in a row, at this ISI, that came before the impact by chance
     told: tuple[Told, ...] = ()
     emg: FloatArray | None = field(default=None, compare=False, repr=False)
     doubts: Doubts = field(default_factory=Doubts)

@@ -21,7 +21,7 @@ from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTr
 from isiw.signals.amplitudes import is_silent
 from isiw.signals.checklist import findings
 from isiw.signals.evidence import Evidence, Told
-from isiw.signals.values import isi_far, off_by, require_isi_sd, require_plausible
+from isiw.signals.values import isi_far, off_by, require_plausible
 from isiw.signals.watch import Doubts
 from isiw.strategy.choosing import Choice, Cost, evenly_spaced, instead_of_lost
 from isiw.strategy.course import Method
@@ -261,8 +261,7 @@ class Strategy:
         plain_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
         asked_ms = None if plain_ms is None else self._meant_ms(plain_ms, plain_mv)
-        require_plausible(plain_ms, plain_mv, asked_ms, self.space)
-        require_isi_sd(isi_sd_ms)
+        require_plausible(plain_ms, plain_mv, asked_ms, self.space, isi_sd_ms)
         self.learn(isi_ms, mep_mv, response=response, isi_sd_ms=isi_sd_ms)
         evidence = Evidence(told=self._told, detection_limit_mv=self.detection_limit_mv)
         self._doubts = self._doubts.after((isi_far(plain_ms, asked_ms, self.space), *findings(evidence)))
