@@ -39,6 +39,7 @@ class Kind(StrEnum):
     SATURATION = "saturation"
     MISSING_CHANNEL = "missing channel"
     ISI_OFF = "ISI off by more than the tolerance"
+    TOO_LITTLE_REST = "too little rest before the pulse"
     IMPLAUSIBLE = "implausible amplitude"
     REJECTED = "rejected"
     OUTCOME_UNKNOWN = "outcome unknown"
@@ -190,8 +191,8 @@ WINDOW_END_MS: Final = Scale(1.0, too_small=("seconds", 1000))
 DELAY_MS: Final = Scale(1.0, too_small=("seconds", 1000))
 """No MEP has ended so soon after the pulse; and no hammer hits, nor does a shock travel so fast."""
 
-RATE_HZ: Final = Scale(1000.0, too_small=("kHz", 1000))
-"""Below this a surface MEP and an impact are not resolved; recordings use 3–10 kHz."""
+RATE_HZ: Final = Scale(500.0, too_small=("kHz", 1000))
+"""Below this nothing of a surface MEP or an impact is seen; recordings use 3–10 kHz."""
 
 INTERVAL_S: Final = Scale(most=1000.0, too_large=("ms", 1000))
 """More than anybody waits between two stimuli."""

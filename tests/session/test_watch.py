@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -213,3 +214,51 @@ def test_a_fault_of_trials_that_count_is_shown_once() -> None:
         watch = watch.after(lost, Measurement(0.1, 90.0))
     assert watch.pause is not None
     assert watch.pause.kind is Kind.ISI_OFF
+
+
+def moving(stimulus: Stimulus) -> Sweep:
+    """EMG of a person who moves half a second after the pulse, long after a small MEP."""
+    rng, since_ms = np.random.default_rng(stimulus.trial), np.arange(-400.0, 900.0, 0.2)
+    emg_mv = 0.002 * rng.standard_normal(since_ms.size)
+    size_mv = 0.05 * np.exp(0.6 * rng.standard_normal())
+    emg_mv += size_mv * np.sin(np.pi * (since_ms - 21) / 6) * ((since_ms > 21) & (since_ms < 33))
+    for at_ms in 400 + 300 * rng.random(3):
+        emg_mv += np.sin(2 * np.pi * (since_ms - at_ms) / 5) * ((since_ms > at_ms) & (since_ms < at_ms + 5))
+    hit_ms = None if stimulus.isi_ms is None else -stimulus.isi_ms
+    return Sweep({"emg": Channel(emg_mv, 5000.0, "mV", t0_ms=-400.0)}, t_tms_ms=0.0, t_hit_ms=hit_ms)
+
+
+def firing_six_times(stimulus: Stimulus) -> Sweep:
+    """EMG of a stimulator that fires six times only, whatever it reports."""
+    rng, since_ms = np.random.default_rng(stimulus.trial), np.arange(-400.0, 100.0, 0.5)
+    size_mv = 0.05 * np.exp(0.5 * rng.standard_normal()) if stimulus.trial < 6 else 0.0
+    mep_mv = size_mv * np.sin(np.pi * (since_ms - 21) / 6) * ((since_ms > 21) & (since_ms < 33))
+    emg = Channel(mep_mv + 0.002 * rng.standard_normal(since_ms.size), 2000.0, "mV", t0_ms=-400.0)
+    return Sweep({"emg": emg}, t_tms_ms=0.0, t_hit_ms=None if stimulus.isi_ms is None else -stimulus.isi_ms)
+
+
+def short_before_the_pulse(stimulus: Stimulus) -> Sweep:
+    """EMG that begins 5 ms before the pulse."""
+    sweep = moving(stimulus)
+    emg = Channel(sweep.channels["emg"].values[1975:2475], 5000.0, "mV", t0_ms=-5.0)
+    return replace(sweep, channels={"emg": emg})
+
+
+@pytest.mark.parametrize(
+    ("answer", "trials", "found"),
+    [
+        (moving, 8, []),
+        (firing_six_times, 24, [Kind.STOPPED]),
+        (short_before_the_pulse, 3, [Kind.TOO_LITTLE_REST]),
+    ],
+)
+def test_what_is_wrong_with_a_rig_that_returns_sweeps_pauses_it_once_and_a_movement_does_not(
+    answer: Callable[[Stimulus], Sweep], trials: int, found: list[Kind], log: Path
+) -> None:
+    info = DeviceInfo("own", "impact", simulated=True, channels={"emg": "mV"})
+    device = CallbackDevice(lambda stimulus, _: answer(stimulus), info)
+    going_on = Safeguards(on_pause=lambda _reason: True)
+    strategy = make_strategy("even", DesignSpace(40, 280, reference="impact"), max_trials=trials)
+    Session(device, strategy, log=log, safeguards=going_on).run()
+    pauses = [event.finding for event in read_session(log).events if event.kind == "pause"]
+    assert [kind for kind in pauses if kind is not None] == found

@@ -312,9 +312,9 @@ def sweep(emg: Channel, **times: Any) -> Sweep:
     return Sweep({"emg": emg}, t_tms_ms=0.0, **times)
 
 
-def test_a_sweep_with_too_little_rest_is_a_missing_channel() -> None:
+def test_a_sweep_with_too_little_rest_says_so_and_not_that_a_channel_is_missing() -> None:
     emg = Channel(np.random.default_rng(3).standard_normal(450), 3000.0, "uV", t0_ms=-20.0)
-    assert mistrial_of(sweep(emg), Stimulus(0, None)) is Kind.MISSING_CHANNEL
+    assert mistrial_of(sweep(emg), Stimulus(0, None)) is Kind.TOO_LITTLE_REST
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from scipy.stats import combine_pvalues, kendalltau, mannwhitneyu
 from isiw.findings import NO_MEP
 from isiw.log.reader import SessionRecord
 from isiw.signals.amplitudes import stopped_after
+from isiw.signals.evidence import told_of
 from isiw.text.numbers import counted
 from isiw.trials import Trial
 from isiw.window import Window
@@ -32,9 +33,6 @@ BY_CHANCE, IN_EACH = 0.00135, 0.05
 """A change with time is said below this p-value, three standard errors, and below the other one on each side."""
 
 CHANGES: Final[Mapping[str, Literal["greater", "less"]]] = MappingProxyType({"grew": "greater", "shrank": "less"})
-
-OF_REST = 8.0
-"""Peak-to-peak amplitude of EMG at rest over its RMS, at most: some 6 within the window of an MEP."""
 
 ENOUGH_TO_STAND_OUT = 10
 
@@ -157,16 +155,16 @@ def nothing_stood_out(trials: Sequence[Trial], window_ms: tuple[float, float] | 
         trials: the trials that count.
         window_ms: where the MEP was sought [ms after the pulse]; None where the device itself measured it.
     """
-    known = [(t, t.mep_mv, t.background_rms_uv) for t in trials if t.mep_mv is not None and t.background_rms_uv]
-    stood_out = [1e3 * mep_mv > OF_REST * rest_uv for _, mep_mv, rest_uv in known]
+    known = [trial for trial in trials if trial.mep_mv is not None and trial.background_rms_uv]
+    stood_out = [one.stands_out for one in told_of(known)]
     sought = "after the pulse" if window_ms is None else _sought(window_ms)
     look = _LOOK if window_ms is None else f"{_LOOK} {_WHERE}"
     if len(known) >= ENOUGH_TO_STAND_OUT and not any(stood_out):
         return f"In no trial was the EMG {sought} larger than at rest. {look}"
-    first = stopped_after([trial.isi_ms for trial, *_ in known], stood_out)
+    first = stopped_after([trial.isi_ms for trial in known], stood_out)
     if first is None:
         return None
-    return f"From trial {known[first][0].index} on, the EMG {sought} was never larger than at rest. {look}"
+    return f"From trial {known[first].index} on, the EMG {sought} was never larger than at rest. {look}"
 
 
 def _sought(window_ms: tuple[float, float]) -> str:

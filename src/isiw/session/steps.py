@@ -27,7 +27,7 @@ _NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
 
 def paused(reason: str) -> StopDecision:
     """The decision that does not stop, of a session that waits for a person."""
-    return StopDecision.not_yet(StopKind.PAUSED, f"The session is paused: {reason}")
+    return StopKind.PAUSED.go_on(f"The session is paused: {reason}")
 
 
 def ended(reason: str) -> StopDecision:
@@ -93,7 +93,7 @@ class Steps:
             self.log_estimate(len(self._journal.trials) - 1)
 
     def _stop_at_limit(self) -> StopDecision:
-        decision = StopDecision.now(StopKind.LIMIT, f"The limit of {self._header.limits.max_pulses} pulses is reached.")
+        decision = StopKind.LIMIT.stop(f"The limit of {self._header.limits.max_pulses} pulses is reached.")
         self._journal.event("limit", decision.reason)
         last = len(self._journal.trials) - 1
         self._journal.log.append(self._freely(believed, self.strategy, last, decision, None))

@@ -73,7 +73,7 @@ def stopped(evidence: Evidence) -> Finding | None:
     """No MEP any more, though there were some."""
     told = evidence.told
     usual = _zeros_are_usual(evidence.detection_limit_mv)
-    first = None if usual else stopped_after([one.isi_ms for one in told], [one.mep_mv > 0 for one in told])
+    first = None if usual else stopped_after([one.isi_ms for one in told], [one.stands_out for one in told])
     if first is None:
         return None
     text = f"None of the last {len(told) - first} pulses evoked an MEP, though earlier ones did"

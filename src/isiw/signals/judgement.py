@@ -14,18 +14,12 @@ import numpy as np
 from isiw.checks import MOST_MEP_MV, choice
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
-from isiw.findings import Kind
+from isiw.findings import MISTRIALS, Kind
 from isiw.signals.amplifier import is_blanked, is_saturated
 from isiw.signals.events import tap_artefact_times
 from isiw.signals.impact import impact_time
 from isiw.signals.limits import SignalLimits
-from isiw.signals.mep import (
-    MIN_BACKGROUND_MS,
-    PULSE_GUARD_MS,
-    TAP_SPAN_MS,
-    background_rms,
-    mep_amplitudes,
-)
+from isiw.signals.mep import background_rms, mep_amplitudes
 from isiw.signals.units import ACCELERATION_UNITS, EMG_UNITS_MV
 from isiw.signals.values import (
     before_impact,
@@ -38,12 +32,7 @@ from isiw.signals.waveforms import MIN_REST_MS, is_recording
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from isiw.types import FloatArray
 
-__all__ = [
-    "judge",
-    "judge_measurement",
-    "of_one_length",
-    "wrong_isi",
-]
+__all__ = ["judge", "judge_measurement", "of_one_length", "wrong_isi"]
 
 
 def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Trial:
@@ -67,21 +56,38 @@ def _judge_pulse(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: S
     timed = _judge_timing(sweep, stimulus, space, limits)
     if timed.reason is not Kind.OUTCOME_UNKNOWN:
         return timed
-    emg = sweep.channels["emg"]
+    try:
+        return _judge_emg(sweep.channels["emg"], timed, limits)
+    except InvalidValueError as error:
+        return _mistrial(timed, _reason(error))
+
+
+def _judge_emg(emg: Channel, timed: Trial, limits: SignalLimits) -> Trial:
+    """The MEP and the EMG before it, of a trial whose timing is right."""
     emg_mv = emg.values * _unit_mv(emg)
-    if not _holds_window(emg, timed, limits):
-        return _mistrial(timed, Kind.MISSING_CHANNEL)
+    mep_mv = _mep_mv(emg_mv, emg, timed, limits)
     timed = replace(timed, background_rms_uv=_background_uv(emg_mv, emg, timed))
     pulse = _on_channel(timed.t_tms_ms, emg)
     span_ms = (pulse + limits.mep_window_ms[0], pulse + limits.mep_window_ms[1])
     if is_saturated(emg_mv, emg.rate_hz, limits.full_scale_mv, span_ms=span_ms):
         return _mistrial(timed, Kind.SATURATION)
-    if timed.background_rms_uv is None or is_blanked(emg_mv, emg.rate_hz, pulse, span_ms):
+    if timed.background_rms_uv is None:
+        return _mistrial(timed, Kind.TOO_LITTLE_REST)
+    if is_blanked(emg_mv, emg.rate_hz, pulse, span_ms):
         return _mistrial(timed, Kind.MISSING_CHANNEL)
-    measured = _measured(timed, _mep_mv(emg_mv, emg, timed, limits))
-    if timed.background_rms_uv > limits.background_uv:
-        return _mistrial(measured, Kind.BACKGROUND_ACTIVITY)
-    return measured
+    measured = _measured(timed, mep_mv)
+    return _mistrial(measured, Kind.BACKGROUND_ACTIVITY) if _is_tense(measured, limits) else measured
+
+
+def _reason(error: InvalidValueError) -> Kind:
+    """Which mistrial an error of a detector is; what is wrong with every trial is raised again."""
+    if error.kind not in MISTRIALS:
+        raise error
+    return Kind(error.kind)
+
+
+def _is_tense(judged: Trial | Measurement, limits: SignalLimits) -> bool:
+    return (judged.background_rms_uv or 0.0) > limits.background_uv
 
 
 def _judge_tap(sweep: Sweep, stimulus: Stimulus, limits: SignalLimits) -> Trial:
@@ -96,7 +102,7 @@ def _judge_tap(sweep: Sweep, stimulus: Stimulus, limits: SignalLimits) -> Trial:
     judged = replace(judged, t_hit_ms=hit_ms)
     at_rest_until = replace(judged, t_tms_ms=sweep.t_valve_ms if hit_ms is None else hit_ms, t_hit_ms=None)
     judged = replace(judged, background_rms_uv=_background_uv(emg.values * _unit_mv(emg), emg, at_rest_until))
-    if wrong is None and (judged.background_rms_uv or 0.0) > limits.background_uv:
+    if wrong is None and _is_tense(judged, limits):
         wrong = Kind.BACKGROUND_ACTIVITY
     return _mistrial(judged, wrong) if wrong else replace(judged, status=Status.ACCEPTED, reason=None)
 
@@ -140,7 +146,7 @@ def judge_measurement(
     wrong = None
     if measurement.isi_ms is not None and stimulus.isi_ms is not None:
         wrong = wrong_isi(measurement.isi_ms, stimulus.isi_ms, space, limits)
-    if wrong is None and (measurement.background_rms_uv or 0.0) > limits.background_uv:
+    if wrong is None and _is_tense(measurement, limits):
         wrong = Kind.BACKGROUND_ACTIVITY
     if wrong is None and implausible_amplitude(measurement.mep_mv) is not None:
         wrong = Kind.IMPLAUSIBLE
@@ -175,18 +181,12 @@ def _judge_timing(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: 
 
 def _require_no_tap(sweep: Sweep) -> None:
     """Raise where a tap came with TMS alone."""
-    hit_ms = _unwanted_impact(sweep) if sweep.t_hit_ms is None else sweep.t_hit_ms
-    if hit_ms is not None:
-        raise tap_with_tms_alone(hit_ms)
-
-
-def _unwanted_impact(sweep: Sweep) -> float | None:
-    """An impact before the pulse, as far as a sweep that needs none shows it; a twitch may move the hammer later."""
     try:
         hit_ms, _ = _impact(sweep)
     except InvalidValueError:  # nothing that an impact could be found in
-        return None
-    return hit_ms if hit_ms is not None and hit_ms < (sweep.t_tms_ms or 0.0) else None
+        return
+    if hit_ms is not None and (sweep.t_hit_ms is not None or hit_ms < (sweep.t_tms_ms or 0.0)):
+        raise tap_with_tms_alone(hit_ms)  # a twitch may move the hammer after the pulse
 
 
 def wrong_isi(
@@ -216,7 +216,10 @@ def _impact(sweep: Sweep) -> tuple[float | None, Kind | None]:
     choice("the unit of the channel acceleration", channel.unit, sorted(ACCELERATION_UNITS))
     if sweep.t_valve_ms is None or not _usable(sweep, "acceleration"):
         return None, Kind.MISSING_CHANNEL
-    hit = impact_time(channel.values, channel.rate_hz, sweep.t_valve_ms - channel.t0_ms)
+    try:
+        hit = impact_time(channel.values, channel.rate_hz, sweep.t_valve_ms - channel.t0_ms)
+    except InvalidValueError as error:
+        return None, _reason(error)
     return (None, Kind.NO_IMPACT) if hit is None else (hit + channel.t0_ms, None)
 
 
@@ -239,12 +242,6 @@ def _unit_mv(emg: Channel) -> float:
     return EMG_UNITS_MV[choice("the unit of the channel emg", emg.unit, EMG_UNITS_MV)]
 
 
-def _holds_window(emg: Channel, timed: Trial, limits: SignalLimits) -> bool:
-    pulse = _on_channel(timed.t_tms_ms, emg)
-    end = 1000 * (emg.values.size - 1) / emg.rate_hz
-    return pulse + limits.mep_window_ms[0] >= 0 and pulse + limits.mep_window_ms[1] <= end
-
-
 def _on_channel(time_ms: float | None, channel: Channel) -> float:
     """A time of the sweep's clock, counted from the channel's first sample [ms]; NaN where unknown."""
     return math.nan if time_ms is None else time_ms - channel.t0_ms
@@ -259,9 +256,10 @@ def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Trial) -> float | No
     pulse, hit = _on_channel(timed.t_tms_ms, emg), _on_channel(timed.t_hit_ms, emg)
     untouched = np.fmin(pulse, _on_channel(timed.t_valve_ms, emg)) if math.isnan(hit) else pulse
     for end, tap in ((float(untouched), hit), (pulse, math.nan)):
-        touched = 0.0 if math.isnan(tap) else max(0.0, min(end, tap + TAP_SPAN_MS) - max(tap, 0.0))
-        if end - touched >= MIN_BACKGROUND_MS + 2 * PULSE_GUARD_MS:
+        try:
             return float(1000 * background_rms(emg_mv, emg.rate_hz, end, tap)[0])
+        except InvalidValueError as error:
+            _reason(error)
     return None
 
 

@@ -14,7 +14,17 @@ from types import MappingProxyType
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.signals.waveforms import as_waveforms, crossing_before, cut, first_true, level_and_noise, per_waveform
+from isiw.findings import Finding, Kind, Severity, refused
+from isiw.signals.waveforms import (
+    RESTLESS,
+    as_waveforms,
+    crossing_before,
+    cut,
+    first_true,
+    level_and_noise,
+    per_waveform,
+    samples,
+)
 from isiw.types import ArrayLike, BoolArray, FloatArray
 
 __all__ = [
@@ -49,6 +59,13 @@ TAP_SPAN_MS = 50.0
 
 PULSE_GUARD_MS = 1.0
 """How long before the nominal pulse its artefact may begin."""
+
+_OUTSIDE = Finding(
+    Kind.MISSING_CHANNEL,
+    Severity.REFUSED,
+    "the sweep does not hold the MEP window",
+    "Pulse times count from the sweep's first sample.",
+)
 
 SURE_SHARE = 0.2
 SURE_SD = 6.0
@@ -194,7 +211,14 @@ def background_rms(
         InvalidValueError: a waveform that is not a recording, a pulse after its end, or less than 40 ms of rest.
     """
     waves = as_waveforms(emg_mv, rate_hz, "EMG")
-    rest = _quiet(waves, rate_hz, per_waveform(t_tms_ms, waves), per_waveform(t_hit_ms, waves))
+    pulse = per_waveform(t_tms_ms, waves)
+    if (pulse > 1000 * waves.shape[-1] / rate_hz + PULSE_GUARD_MS).any():
+        raise InvalidValueError(
+            "the sweep ends before the pulse",
+            got=f"pulse at {pulse.max():g} ms in a sweep of {waves.shape[-1] * 1000 / rate_hz:g} ms",
+            remedy="Pulse times count from the sweep's first sample.",
+        )
+    rest = _quiet(waves, rate_hz, pulse, per_waveform(t_hit_ms, waves))
     return np.asarray(np.nanstd(rest, axis=-1), dtype=np.float64)
 
 
@@ -215,11 +239,10 @@ def _window(
     start = np.ceil((pulse_ms + window_ms[0]) * rate_hz / 1000 - 1e-6)
     stop = (pulse_ms + window_ms[1]) * rate_hz / 1000 + 1e-6
     if not (np.isfinite(pulse_ms).all() and (start >= 0).all() and (stop < waves.shape[-1]).all()):
-        raise InvalidValueError(
-            "the sweep does not hold the MEP window",
-            got=f"pulse at {pulse_ms.min():g} ms in a sweep of {waves.shape[-1] * 1000 / rate_hz:g} ms",
-            expected=f"samples {window_ms[0]:g} to {window_ms[1]:g} ms after the pulse",
-            remedy="Pulse times count from the sweep's first sample.",
+        raise refused(
+            _OUTSIDE,
+            f"pulse at {pulse_ms.min():g} ms in a sweep of {waves.shape[-1] * 1000 / rate_hz:g} ms",
+            f"samples {window_ms[0]:g} to {window_ms[1]:g} ms after the pulse",
         )
     first = start.astype(np.int64)
     count = math.floor((window_ms[1] - window_ms[0]) * rate_hz / 1000 + 1e-6) + 1
@@ -232,21 +255,12 @@ def _quiet(waves: FloatArray, rate_hz: float, pulse_ms: FloatArray, hit_ms: Floa
     reach = round((BACKGROUND_MS + TAP_SPAN_MS) * rate_hz / 1000)
     if not np.isfinite(pulse_ms).all():
         raise InvalidValueError("the time of the pulse must be finite", got=pulse_ms)
-    stop = np.floor((pulse_ms - PULSE_GUARD_MS) * rate_hz / 1000).astype(np.int64)
-    if (stop > waves.shape[-1]).any():
-        raise InvalidValueError(
-            "the sweep ends before the pulse",
-            got=f"pulse at {pulse_ms.max():g} ms in a sweep of {waves.shape[-1] * 1000 / rate_hz:g} ms",
-            remedy="Pulse times count from the sweep's first sample.",
-        )
+    stop = np.minimum(np.floor((pulse_ms - PULSE_GUARD_MS) * rate_hz / 1000).astype(np.int64), waves.shape[-1])
     columns = (stop - reach)[:, None] + np.arange(reach)
     since_hit = columns * 1000 / rate_hz - hit_ms[:, None]
     resting = (columns >= 0) & ~((since_hit >= 0) & (since_hit <= TAP_SPAN_MS))
     later = np.cumsum(resting[:, ::-1], axis=-1)[:, ::-1]  # resting samples from here to the pulse
     resting &= later <= round(BACKGROUND_MS * rate_hz / 1000)
-    if (resting.sum(axis=-1) < MIN_BACKGROUND_MS * rate_hz / 1000).any():
-        raise InvalidValueError(
-            "too little EMG before the pulse to know its background",
-            expected=f"at least {MIN_BACKGROUND_MS:g} ms of rest",
-        )
+    if (resting.sum(axis=-1) < samples(MIN_BACKGROUND_MS, rate_hz)).any():
+        raise refused(RESTLESS, None, f"at least {MIN_BACKGROUND_MS:g} ms of rest")
     return np.where(resting, cut(waves, stop - reach, reach), math.nan)

@@ -27,10 +27,8 @@ __all__ = ["told_by"]
 SOUGHT_MS = (ARTEFACT_MS, 80.0)
 """Where a response is looked for [ms after the pulse]: behind the pulse's artefact, and before the person moves."""
 
-QUIET = 8.0
 CLEAR = 12.0
-"""Peak-to-peak amplitude over the RMS at rest: up to the one there is no MEP in the window, from the other on there is
-a response outside. In 330 recorded and simulated sweeps without an MEP it was 7.3 outside at most."""
+"""Peak-to-peak amplitude over the RMS at rest from which on there is a response outside the window."""
 
 LEAST_MV = 0.02
 SPAN_MS = 10.0
@@ -65,16 +63,11 @@ def told_by(sweep: Sweep, trial: Trial, limits: SignalLimits, before_emg: FloatA
     told = Told(trial.mep_mv or 0.0, trial.isi_ms, rest_uv, repeats=repeats)
     if trial.t_tms_ms is None or not rest_uv:
         return told
-    if not _is_quiet(told):
+    if told.stands_out:
         return replace(told, is_tail=_is_artefact(sweep, trial, limits.mep_window_ms))
     found = _outside(sweep, trial, limits.mep_window_ms)
     clear = found is not None and found.size_mv >= max(CLEAR * rest_uv / 1000, LEAST_MV)
     return replace(told, outside=found if clear else None)
-
-
-def _is_quiet(told: Told) -> bool:
-    """Whether there is no MEP in the window."""
-    return told.mep_mv <= QUIET * (told.rest_uv or 0.0) / 1000
 
 
 def repeated(evidence: Evidence) -> Finding | None:
@@ -126,7 +119,7 @@ def _is_artefact(sweep: Sweep, trial: Trial, window_ms: tuple[float, float]) -> 
 
 def _since_the_last_mep(told: Sequence[Told]) -> Iterator[Told]:
     """The trials since the last one with an MEP in the window, the latest first; of others nobody knows."""
-    return takewhile(lambda one: not one.rest_uv or _is_quiet(one), reversed(told))
+    return takewhile(lambda one: not (one.rest_uv and one.stands_out), reversed(told))
 
 
 def _last_alike(told: Sequence[Told]) -> list[tuple[float | None, Response]]:

@@ -18,10 +18,10 @@ from isiw.findings import REST_UV, Finding, Kind, Severity
 from isiw.signals.evidence import Evidence
 from isiw.signals.impact import impact_time
 from isiw.signals.judgement import of_one_length
-from isiw.signals.limits import SignalLimits
+from isiw.signals.mep import MIN_BACKGROUND_MS, PULSE_GUARD_MS
 from isiw.signals.units import EMG_UNITS_MV
 from isiw.signals.values import implausible_amplitude, off_by
-from isiw.signals.waveforms import is_recording
+from isiw.signals.waveforms import is_recording, samples
 from isiw.trials import Channel, Sweep, Trial
 
 __all__ = ["EVOKED_SPAN_MS", "remedy_for", "steepest_edge", "tap_span_ms", "too_early_by_chance"]
@@ -46,6 +46,9 @@ LEAST_RATE_HZ = 2000.0
 """An edge that is steep for no longer than this is an artefact, since an MEP rises for some milliseconds. From this
 rate on there are samples enough to say so."""
 
+QUICK_MS, QUICK_SAMPLES = 3.0, 4
+"""What is steep for longer than this, and than so many samples, may be a movement, however long after the pulse."""
+
 CLEAR = 20.0
 
 _REMEDIES: Mapping[Kind, str] = MappingProxyType(
@@ -61,6 +64,7 @@ _REMEDIES: Mapping[Kind, str] = MappingProxyType(
         Kind.MISSING_CHANNEL: (
             "Check that the EMG is recorded, and not blanked, from 50 ms before to 50 ms after the pulse."
         ),
+        Kind.TOO_LITTLE_REST: "Let the sweep begin earlier: the EMG at rest says whether the muscle is relaxed.",
         Kind.ISI_OFF: "Check how the rig times the pulse, the reference of its ISIs, and the sampling rate.",
         Kind.IMPLAUSIBLE: "Check the unit and the gain of the EMG.",
         Kind.REJECTED: "See the notes in the log.",
@@ -168,9 +172,12 @@ def stray_edge(sweep: Sweep, trial: Trial) -> Finding | None:
     tap_ms = tap_span_ms(trial)
     if steepest_ms is None or (tap_ms is not None and tap_ms[0] <= steepest_ms <= tap_ms[1]):
         return None
-    may_be_evoked = steepest_ms <= trial.t_tms_ms + BLANKED_MS or not _is_sharp(emg)
+    steep, is_fast = _steep_samples(emg), emg.rate_hz >= LEAST_RATE_HZ
+    may_be_evoked = steepest_ms <= trial.t_tms_ms + BLANKED_MS or not is_fast or steep > samples(SHARP_MS, emg.rate_hz)
     if evoked_ms[0] <= steepest_ms <= evoked_ms[1] and may_be_evoked:
         return None
+    if steep > max(samples(QUICK_MS, emg.rate_hz), QUICK_SAMPLES):
+        return None  # a movement
     text = (
         f"the steepest edge of the EMG is at {steepest_ms:.0f} ms, but the device reports the pulse at "
         f"{trial.t_tms_ms:.0f} ms"
@@ -197,11 +204,11 @@ def steepest_edge(emg: Channel) -> float | None:
     return emg.t0_ms + 1000 * float(steps.argmax()) / emg.rate_hz
 
 
-def _is_sharp(emg: Channel) -> bool:
-    """Whether the EMG is steep within a millisecond only, as an artefact is and no MEP; few samples cannot say."""
+def _steep_samples(emg: Channel) -> int:
+    """For how many samples the EMG is steep: all flanks of an MEP, if it is one."""
     steps = np.abs(np.diff(emg.values))
-    steep = np.flatnonzero(steps > 0.3 * steps.max())  # all flanks of an MEP, if it is one
-    return emg.rate_hz >= LEAST_RATE_HZ and bool(1000 * (steep[-1] - steep[0] + 1) / emg.rate_hz <= SHARP_MS)
+    steep = np.flatnonzero(steps > 0.3 * steps.max())
+    return int(steep[-1] - steep[0] + 1)
 
 
 def wrong_level(trial: Trial, evidence: Evidence) -> Finding | None:
@@ -238,12 +245,19 @@ def lost_trial(trial: Trial, evidence: Evidence) -> Finding | None:
     amplitude = implausible_amplitude(trial.mep_mv or 0.0)
     if trial.reason is Kind.IMPLAUSIBLE and amplitude is not None:
         return replace(amplitude, severity=Severity.MISTRIAL)
-    return _finding(trial.reason, trial, _explained(trial, evidence.limits), remedy_for(trial.reason))
+    return _finding(trial.reason, trial, _explained(trial, evidence), remedy_for(trial.reason))
 
 
-def _explained(trial: Trial, limits: SignalLimits) -> str:
+def _explained(trial: Trial, evidence: Evidence) -> str:
+    emg = evidence.answer.channels.get("emg") if isinstance(evidence.answer, Sweep) else None
+    if trial.reason is Kind.TOO_LITTLE_REST and emg is not None and trial.t_tms_ms is not None:
+        before_ms, least_ms = trial.t_tms_ms - emg.t0_ms, MIN_BACKGROUND_MS + PULSE_GUARD_MS
+        if before_ms <= least_ms + 1:
+            return f"the sweep has {before_ms:.0f} ms of EMG before the pulse, at least {least_ms:.0f} ms are needed"
+        return "the acceleration has too little rest before the valve command"
     if trial.reason is Kind.BACKGROUND_ACTIVITY and trial.background_rms_uv is not None:
-        return f"the muscle is tense: {trial.background_rms_uv:.0f} µV RMS, at most {limits.background_uv:g} at rest"
+        most_uv = evidence.limits.background_uv
+        return f"the muscle is tense: {trial.background_rms_uv:.0f} µV RMS, at most {most_uv:g} at rest"
     if trial.reason is Kind.ISI_OFF and trial.isi_ms is not None:
         return f"the realised ISI was {trial.isi_ms:.0f} ms, not the commanded {trial.commanded_isi_ms:g} ms"
     return f"{trial.reason}"

@@ -11,7 +11,7 @@ from numbers import Real
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.findings import RATE_HZ
+from isiw.findings import RATE_HZ, Finding, Kind, Severity, refused
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
@@ -24,12 +24,15 @@ __all__ = [
     "level_and_noise",
     "per_waveform",
     "rest_level",
+    "samples",
 ]
 
 
 MIN_REST_MS = 20.0
 REST_MS = 200.0
 """The last part of the rest, where a baseline that drifts is nearest to what it will be."""
+
+RESTLESS = Finding(Kind.TOO_LITTLE_REST, Severity.REFUSED, "too little of the sweep is at rest to know its noise")
 
 MAD_TO_SD = 1.4826  # of a normal distribution
 
@@ -100,6 +103,16 @@ def per_waveform(value: ArrayLike | None, waves: FloatArray) -> FloatArray:
     return np.broadcast_to(number.reshape(-1) if number.ndim else number, waves.shape[:1]).astype(np.float64)
 
 
+def samples(duration_ms: float, rate_hz: float) -> int:
+    """How many whole samples a duration holds, whatever its rounding: the one rule for what a sweep must hold.
+
+    Args:
+        duration_ms: the duration [ms].
+        rate_hz: sampling rate [Hz].
+    """
+    return math.floor(duration_ms * rate_hz / 1000 + 1e-6)
+
+
 def rest_level(waves: FloatArray, stop: int, rate_hz: float) -> tuple[FloatArray, FloatArray]:
     """Level and noise SD of each waveform while nothing happens: the reading at rest, robust against outliers.
 
@@ -115,12 +128,8 @@ def rest_level(waves: FloatArray, stop: int, rate_hz: float) -> tuple[FloatArray
         InvalidValueError: less than 20 ms of rest.
     """
     stop = min(stop, waves.shape[-1])
-    if stop < MIN_REST_MS * rate_hz / 1000:
-        raise InvalidValueError(
-            "too little of the sweep is at rest to know its noise",
-            got=f"{1000 * stop / rate_hz:.1f} ms",
-            expected=f"at least {MIN_REST_MS:g} ms before the first stimulus",
-        )
+    if stop < samples(MIN_REST_MS, rate_hz):
+        raise refused(RESTLESS, f"{1000 * stop / rate_hz:.1f} ms", f"at least {MIN_REST_MS:g} ms before any stimulus")
     return level_and_noise(waves[:, max(0, stop - round(REST_MS * rate_hz / 1000)) : stop])
 
 

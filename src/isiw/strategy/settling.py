@@ -44,13 +44,13 @@ class EdgeVariance:
         windows = [estimate.window for estimate in progress.past[-self.last :]]
         edges = [(window.start_ms, window.end_ms) for window in windows if window is not None]
         if len(edges) < self.last:
-            return StopDecision.not_yet(StopKind.SETTLED, f"There are not {self.last} windows in a row yet.")
+            return StopKind.SETTLED.go_on(f"There are not {self.last} windows in a row yet.")
         start, end = (statistics.variance(values) for values in zip(*edges, strict=True))
         settled = (max if self.edges == "both" else min)(start, end) < self.variance_ms2
         spread = f"the last {self.last} values of start and end have variances of {start:.0f} and {end:.0f} ms²"
         if settled:
-            return StopDecision.now(StopKind.SETTLED, f"The window has settled: {spread}.")
-        return StopDecision.not_yet(StopKind.SETTLED, f"The window has not settled: {spread}.")
+            return StopKind.SETTLED.stop(f"The window has settled: {spread}.")
+        return StopKind.SETTLED.go_on(f"The window has not settled: {spread}.")
 
 
 @dataclass(frozen=True)
@@ -73,11 +73,11 @@ class ParticleSpread:
         """Decide whether to stop."""
         spread_ms = progress.estimate.spread_ms
         if spread_ms is None or progress.estimate.window is None:
-            return StopDecision.not_yet(StopKind.SETTLED, "No generation of particles has been measured yet.")
+            return StopKind.SETTLED.go_on("No generation of particles has been measured yet.")
         spread = f"they have an SD of {spread_ms:.0f} ms"
         if spread_ms <= self.sd_ms:
-            return StopDecision.now(StopKind.SETTLED, f"The particles have converged: {spread}.")
-        return StopDecision.not_yet(StopKind.SETTLED, f"The particles have not converged: {spread}.")
+            return StopKind.SETTLED.stop(f"The particles have converged: {spread}.")
+        return StopKind.SETTLED.go_on(f"The particles have not converged: {spread}.")
 
 
 @dataclass(frozen=True)
@@ -102,8 +102,8 @@ class SweptPast:
         """Decide whether to stop."""
         window, swept_ms = progress.estimate.window, progress.estimate.grid_ms
         if window is None or swept_ms is None:
-            return StopDecision.not_yet(StopKind.SETTLED, "The scan of ISIs has found no window yet.")
+            return StopKind.SETTLED.go_on("The scan of ISIs has found no window yet.")
         behind = f"it is {swept_ms[-1] - window.end_ms:.0f} ms past the window's end"
         if swept_ms[-1] - window.end_ms >= self.quiet_ms:
-            return StopDecision.now(StopKind.SETTLED, f"The scan of ISIs has passed the window: {behind}.")
-        return StopDecision.not_yet(StopKind.SETTLED, f"The scan of ISIs has not passed the window: {behind}.")
+            return StopKind.SETTLED.stop(f"The scan of ISIs has passed the window: {behind}.")
+        return StopKind.SETTLED.go_on(f"The scan of ISIs has not passed the window: {behind}.")

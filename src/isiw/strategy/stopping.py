@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final, Protocol, Self, runtime_checkable
+from typing import Final, Protocol, runtime_checkable
 
 from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.errors import InvalidValueError
@@ -47,6 +47,14 @@ class StopKind(StrEnum):
     THRESHOLD = "threshold"
     OWN = "a user's own rule"
 
+    def stop(self, reason: str) -> StopDecision:
+        """The decision to stop, for this reason."""
+        return StopDecision(stop=True, reason=reason, kind=self)
+
+    def go_on(self, reason: str) -> StopDecision:
+        """The decision to continue, for this reason."""
+        return StopDecision(stop=False, reason=reason, kind=self)
+
 
 OF_THE_WINDOW: Final = frozenset(
     {StopKind.KNOWN, StopKind.ABSENT, StopKind.SMALL_GAIN, StopKind.SETTLED, StopKind.TOO_LITTLE}
@@ -67,16 +75,6 @@ class StopDecision:
     stop: bool
     reason: str
     kind: StopKind = StopKind.OWN
-
-    @classmethod
-    def now(cls, kind: StopKind, reason: str) -> Self:
-        """The decision to stop."""
-        return cls(stop=True, reason=reason, kind=kind)
-
-    @classmethod
-    def not_yet(cls, kind: StopKind, reason: str) -> Self:
-        """The decision to continue."""
-        return cls(stop=False, reason=reason, kind=kind)
 
 
 @dataclass(frozen=True)
@@ -145,8 +143,8 @@ class Budget:
         """Decide whether to stop."""
         left = self.max_trials - progress.delivered
         if left <= 0:
-            return StopDecision.now(StopKind.BUDGET, f"The budget of {self.max_trials} stimuli is used up.")
-        return StopDecision.not_yet(StopKind.BUDGET, f"{counted(left, 'stimulus is left', 'stimuli are left')}.")
+            return StopKind.BUDGET.stop(f"The budget of {self.max_trials} stimuli is used up.")
+        return StopKind.BUDGET.go_on(f"{counted(left, 'stimulus is left', 'stimuli are left')}.")
 
 
 @dataclass(frozen=True)
@@ -179,10 +177,10 @@ class CredibleWidth:
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
         if progress.estimate.too_little is not None:
-            return StopDecision.not_yet(StopKind.TOO_LITTLE, progress.estimate.too_little)
+            return StopKind.TOO_LITTLE.go_on(progress.estimate.too_little)
         intervals = progress.estimate.robust_interval(self.level, self.min_share)
         if intervals is None:
-            return StopDecision.not_yet(StopKind.KNOWN, "The edges have no credible intervals.")
+            return StopKind.KNOWN.go_on("The edges have no credible intervals.")
         # An edge that lies beyond the range for certain is an answer: its interval has no width.
         widths = [0.0 if low == high else high - low for low, high in intervals]
         known = (progress.estimate.probability or 0.0) >= self.min_probability and max(widths) <= self.width_ms
@@ -192,8 +190,8 @@ class CredibleWidth:
         if progress.estimate.hypotheses is not None:
             spans += " under every likely hypothesis"
         if known:
-            return StopDecision.now(StopKind.KNOWN, f"The window is known: {spans}.")
-        return StopDecision.not_yet(StopKind.KNOWN, f"The window is not known well enough yet: {spans}.")
+            return StopKind.KNOWN.stop(f"The window is known: {spans}.")
+        return StopKind.KNOWN.go_on(f"The window is not known well enough yet: {spans}.")
 
 
 def _span(width_ms: float) -> str:
@@ -219,14 +217,14 @@ class NoWindow:
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
         if progress.estimate.probability is None:
-            return StopDecision.not_yet(StopKind.ABSENT, "The probability of a window is not known.")
+            return StopKind.ABSENT.go_on("The probability of a window is not known.")
         if progress.estimate.too_little is not None:
-            return StopDecision.not_yet(StopKind.TOO_LITTLE, progress.estimate.too_little)
+            return StopKind.TOO_LITTLE.go_on(progress.estimate.too_little)
         absent = 1.0 - progress.estimate.probability
         if absent >= self.probability:
             there_is = "There is no window" if absent >= SURE else "There is probably no window"
-            return StopDecision.now(StopKind.ABSENT, f"{there_is}, with probability {absent:.2f}.")
-        return StopDecision.not_yet(StopKind.ABSENT, f"The probability that there is no window is {absent:.2f}.")
+            return StopKind.ABSENT.stop(f"{there_is}, with probability {absent:.2f}.")
+        return StopKind.ABSENT.go_on(f"The probability that there is no window is {absent:.2f}.")
 
 
 @dataclass(frozen=True)
@@ -251,13 +249,13 @@ class ExpectedF1:
         """Decide whether to stop."""
         estimate = progress.estimate
         if estimate.expected_f1 is None or estimate.probability is None:
-            return StopDecision.not_yet(StopKind.KNOWN, "The F1 to be expected is not known.")
+            return StopKind.KNOWN.go_on("The F1 to be expected is not known.")
         if estimate.too_little is not None:
-            return StopDecision.not_yet(StopKind.TOO_LITTLE, estimate.too_little)
+            return StopKind.TOO_LITTLE.go_on(estimate.too_little)
         expected = f"an expected F1 of {estimate.expected_f1:.2f}"
         if self.f1 < 1.0 and estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
-            return StopDecision.now(StopKind.KNOWN, f"The window is known, with {expected}.")
-        return StopDecision.not_yet(StopKind.KNOWN, f"The window as it is known so far has {expected}.")
+            return StopKind.KNOWN.stop(f"The window is known, with {expected}.")
+        return StopKind.KNOWN.go_on(f"The window as it is known so far has {expected}.")
 
 
 @dataclass(frozen=True)
@@ -293,16 +291,14 @@ class SmallGain:
         now, earlier = progress.estimate, progress.past[-self.last - 1 :]
         before = earlier[0].expected_f1 if len(earlier) > self.last else None
         if now.expected_f1 is None or now.probability is None or before is None:
-            return StopDecision.not_yet(
-                StopKind.SMALL_GAIN, f"It is too early to say what {self.last} more stimuli would add."
-            )
+            return StopKind.SMALL_GAIN.go_on(f"It is too early to say what {self.last} more stimuli would add.")
         added = f"the last {self.last} stimuli added {now.expected_f1 - before:.2f} to the expected F1"
         small = self.gain > 0 and now.expected_f1 - before < self.gain and now.probability >= self.min_probability
         if small and progress.told >= self.min_told:
             reason = f"Another {self.last} stimuli would add little: {added}, now {now.expected_f1:.2f}."
-            return StopDecision.now(StopKind.SMALL_GAIN, reason)
+            return StopKind.SMALL_GAIN.stop(reason)
         reason = f"Too early to stop: {added}, and a window has probability {now.probability:.2f}."
-        return StopDecision.not_yet(StopKind.SMALL_GAIN, reason)
+        return StopKind.SMALL_GAIN.go_on(reason)
 
 
 @dataclass(frozen=True)
@@ -340,7 +336,7 @@ class AnyOf:
         reasons = dict.fromkeys(decision.reason for decision in decisions)  # what several rules say is said once
         kinds = [decision.kind for decision in decisions]
         kind = next((kind for kind in kinds if kind in OF_THE_WINDOW), kinds[0])
-        return StopDecision.not_yet(kind, " ".join(reasons))
+        return kind.go_on(" ".join(reasons))
 
 
 def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:

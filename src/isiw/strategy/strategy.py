@@ -354,11 +354,7 @@ class Strategy:
     def decision(self) -> StopDecision:
         """Whether to stop now, and why."""
         decision = self._course.decision(mistrials=self._mistrials, silent=self._is_silent)
-        return (
-            StopDecision.not_yet(StopKind.TOO_LITTLE, f"{NO_MEP}")
-            if self._is_silent and not decision.stop
-            else decision
-        )
+        return StopKind.TOO_LITTLE.go_on(f"{NO_MEP}") if self._is_silent and not decision.stop else decision
 
     @property
     def _is_silent(self) -> bool:

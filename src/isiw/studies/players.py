@@ -138,7 +138,7 @@ class _PlayerAlone:
 
     def decision(self, person: int) -> StopDecision:
         del person
-        return StopDecision.not_yet(StopKind.OWN, "The player has no stopping rule.")
+        return StopKind.OWN.go_on("The player has no stopping rule.")
 
     def trouble(self) -> bool:
         return False

@@ -80,14 +80,14 @@ class BayesThreshold:
         posterior = self.posterior(pulses)
         sides = {space.beyond(_quantile(posterior, level)) for level in (0.05, 0.95)}
         if len(sides) == 1 and (side := sides.pop()):
-            return StopDecision.now(StopKind.THRESHOLD, f"The whole 90 % interval of the threshold is {side}.")
+            return StopKind.THRESHOLD.stop(f"The whole 90 % interval of the threshold is {side}.")
         sd = _sd(posterior)
         if sd <= self.stop_sd_pct_mso:
-            return StopDecision.now(StopKind.THRESHOLD, f"The threshold is known to ± {sd:.1f} % MSO (SD).")
+            return StopKind.THRESHOLD.stop(f"The threshold is known to ± {sd:.1f} % MSO (SD).")
         if len(pulses) >= self.max_pulses:
-            return StopDecision.now(StopKind.BUDGET, f"The budget of {self.max_pulses} pulses is used up.")
+            return StopKind.BUDGET.stop(f"The budget of {self.max_pulses} pulses is used up.")
         known = f"The threshold is known to ± {sd:.1f} % MSO (SD)"
-        return StopDecision.not_yet(StopKind.THRESHOLD, f"{known}; {self.stop_sd_pct_mso:g} is wanted.")
+        return StopKind.THRESHOLD.go_on(f"{known}; {self.stop_sd_pct_mso:g} is wanted.")
 
 
 @lru_cache(maxsize=256)

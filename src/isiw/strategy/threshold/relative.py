@@ -95,8 +95,8 @@ class FiveOfTen:
 
 
 def _over(reason: str) -> StopDecision:
-    return StopDecision.now(StopKind.THRESHOLD, reason)
+    return StopKind.THRESHOLD.stop(reason)
 
 
 def _on(reason: str) -> StopDecision:
-    return StopDecision.not_yet(StopKind.THRESHOLD, reason)
+    return StopKind.THRESHOLD.go_on(reason)

@@ -141,7 +141,7 @@ class ThresholdSearch:
         budget = self._budget
         if refused is None or refused.stop or budget is None or len(self.pulses) < budget:
             return refused
-        return StopDecision.now(StopKind.BUDGET, f"{refused.reason} The budget of {budget} pulses is used up. {_LOOK}")
+        return StopKind.BUDGET.stop(f"{refused.reason} The budget of {budget} pulses is used up. {_LOOK}")
 
     @property
     def _budget(self) -> int | None:
