@@ -5,6 +5,7 @@ Nothing else reads meaning out of a text. The words are those of these versions,
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Final, TypeVar
 
@@ -16,8 +17,11 @@ __all__ = ["with_kinds"]
 
 _KindT = TypeVar("_KindT", Kind, StopKind)
 
+_KEY_IN_TEXT: Final = re.compile(r" \(key ([A-Za-z0-9_-]{1,64})\)$")
+"""Before notes had a key, their text ended with it."""
+
 _DECISIONS: Final[Mapping[StopKind, tuple[str, ...]]] = {
-    StopKind.PAUSED: ("The session is paused",),
+    StopKind.PAUSED: ("The session is paused", "The session was ended before its time"),
     StopKind.ABSENT: ("There is no window", "There is probably no window", "The probability "),
     StopKind.KNOWN: ("The window is ", "The window as it is known so far", "The F1 to be expected is not known"),
     StopKind.SMALL_GAIN: ("to the expected F1",),
@@ -51,6 +55,8 @@ def with_kinds(record: Record) -> Record:
         return record.model_copy(update={"stop_kind": _kind(record.reason, _DECISIONS) or StopKind.OWN})
     if isinstance(record, Event) and record.kind in {"doubt", "pause"} and "finding" not in record.model_fields_set:
         return record.model_copy(update={"finding": _kind(record.text, _FINDINGS)})
+    if isinstance(record, Event) and record.kind == "note" and "key" not in record.model_fields_set:
+        return record.model_copy(update={"key": (found := _KEY_IN_TEXT.search(record.text)) and found[1]})
     return record
 
 

@@ -18,7 +18,6 @@ JSON knows no infinity: where a number is not finite it is one of the strings "I
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
@@ -76,7 +75,6 @@ Numbers: TypeAlias = Annotated[
 ]
 
 
-_KEY_IN_TEXT: Final = re.compile(r" \(key ([A-Za-z0-9_-]{1,64})\)$")
 """How the text of a note ended before there was a field for its key."""
 
 
@@ -393,7 +391,7 @@ class Event(_Record):
 
     `trial` is the one that was judged by an operator, refused or answered late, and otherwise the last one before the
     event. What is "refused" was not delivered, whatever the intent before it says. A note with the `key` of an earlier
-    one is not logged; before there was this field, a note's text ended with it. `finding` is
+    one is not logged. `finding` is
     what a doubt or a pause is about.
     """
 
@@ -402,14 +400,6 @@ class Event(_Record):
     trial: TrialNumber | None = None
     text: str = ""
     key: str | None = None
-
-    @property
-    def idempotency_key(self) -> str | None:
-        """The key of a note, in logs old and new."""
-        if self.kind != "note" or "key" in self.model_fields_set:
-            return self.key
-        found = _KEY_IN_TEXT.search(self.text)
-        return found and found[1]
 
 
 AnyHeader: TypeAlias = Header | ProductionHeader

@@ -74,7 +74,7 @@ class Journal:
             events: what happened meanwhile.
         """
         self.trials, self._events = trials, list(events)
-        self._keys = {event.idempotency_key for event in self._events}
+        self._keys = {event.key for event in self._events}
 
     @property
     def last_excluded(self) -> int | None:

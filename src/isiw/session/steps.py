@@ -32,7 +32,7 @@ def paused(reason: str) -> StopDecision:
 
 def ended(reason: str) -> StopDecision:
     """The decision that does not stop, of a session that a person has ended."""
-    return StopDecision(stop=False, reason=f"The session was ended before its time: {reason}")
+    return StopKind.PAUSED.go_on(f"The session was ended before its time: {reason}")
 
 
 class Steps:

@@ -1,0 +1,69 @@
+"""How many tests pin whole sentences, which break when a message is put better: `python -m benchmarks.house [FOLDER]`.
+
+A test pins a sentence if an assert in it, or a `match=` of `pytest.raises` or `pytest.warns`, has a text of at least
+six words that ends with a full stop, a question mark, or, in `match=`, anyhow. What a test means can be asserted by the
+kind of a finding, of a decision or of an error.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+WORDS = 6
+ROOT = Path(__file__).parents[1]
+
+
+def is_sentence(text: str, *, anyhow: bool) -> bool:
+    """Whether a text is a whole sentence; one that is matched needs no full stop."""
+    return len(re.findall(r"[^\W\d_]+", text)) >= WORDS and (anyhow or text.rstrip().endswith((".", "?")))
+
+
+def texts(node: ast.AST) -> Iterator[str]:
+    """The texts within some code; what is filled into one counts as a word."""
+    for part in ast.walk(node):
+        if isinstance(part, ast.JoinedStr):
+            yield "".join(each.value if isinstance(each, ast.Constant) else "x" for each in part.values)
+        elif isinstance(part, ast.Constant) and isinstance(part.value, str):
+            yield part.value
+
+
+def pins(test: ast.AST) -> bool:
+    """Whether a test pins a sentence, in its body or its parameters."""
+    said: list[tuple[ast.AST, bool]] = []
+    for part in ast.walk(test):
+        if isinstance(part, ast.Assert):
+            said.append((part.test, False))
+        elif isinstance(part, ast.keyword) and part.arg == "match":
+            said.append((part.value, True))
+        elif isinstance(part, ast.FunctionDef):
+            said += [(made, False) for made in part.decorator_list]
+    return any(is_sentence(text, anyhow=anyhow) for node, anyhow in said for text in texts(node))
+
+
+def counted(folder: Path) -> tuple[int, Counter[str]]:
+    """How many tests there are, and how many of each room pin a sentence."""
+    total, pinned = 0, Counter[str]()
+    for path in sorted(folder.rglob("test_*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+                total += 1
+                pinned[path.relative_to(folder).parts[0]] += pins(node)
+    return total, pinned
+
+
+def main() -> None:
+    """Count the tests of a folder, or of this checkout."""
+    total, pinned = counted(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "tests")
+    for room, count in pinned.most_common():
+        if count:
+            print(f"{count:4} {room}")
+    print(f"{pinned.total()} of {total} tests pin a whole sentence")
+
+
+if __name__ == "__main__":
+    main()
