@@ -15,7 +15,7 @@ from isiw.server.answers import AskAnswer, EstimateAnswer, SessionAnswer, TrialA
 from isiw.server.refusals import Refusal, failed
 from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, NoteRequest, TellRequest
 from isiw.session.recorder import Recorder
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import Status, Trial
 
 __all__ = ["DrivenSession", "not_open"]
@@ -278,7 +278,7 @@ def _outcomes(record: SessionRecord) -> dict[int, TrialAnswer]:
     decisions: dict[int, StopDecision] = {}
     for estimate in record.estimates:  # the first of a trial; later ones are of verdicts
         decisions.setdefault(estimate.trial, estimate.decision)
-    going_on = StopDecision(stop=False, reason="")
+    going_on = StopKind.OWN.go_on("")
     doubts = [event for event in record.events if event.kind == "doubt"]
     return {
         trial.index: TrialAnswer.of(
