@@ -61,14 +61,19 @@ class IsiwError(Exception):
         got: the offending value, if there is one.
         expected: what would have been accepted.
         remedy: the way out.
+        found: which `isiw.findings.Kind` of finding it is; None for any other error.
     """
 
-    kind: str | None = None  # of the finding that refused a value, as one of `isiw.findings.Kind`
-
     def __init__(
-        self, what: str, *, got: object = None, expected: str | None = None, remedy: str | None = None
+        self,
+        what: str,
+        *,
+        got: object = None,
+        expected: str | None = None,
+        remedy: str | None = None,
+        found: str | None = None,
     ) -> None:
-        self.what, self.got, self.expected, self.remedy = what, got, expected, remedy
+        self.what, self.got, self.expected, self.remedy, self.found = what, got, expected, remedy, found
         parts = [_cut(what, _LONGEST_TEXT // 10)]
         if got is not None:
             parts.append(f"got {_shortened(got)}")

@@ -117,9 +117,7 @@ def refused(
         expected: what would have been accepted.
         error: its type.
     """
-    refusal = error(finding.text, got=got, expected=expected, remedy=finding.remedy or None)
-    refusal.kind = finding.kind
-    return refusal
+    return error(finding.text, got=got, expected=expected, remedy=finding.remedy or None, found=finding.kind)
 
 
 NO_MEP: Final = Finding(

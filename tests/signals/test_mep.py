@@ -110,7 +110,7 @@ def test_the_background_leaves_out_the_artefact_of_the_tap() -> None:
 
 
 def test_too_little_rest_is_an_error() -> None:
-    with pytest.raises(InvalidValueError, match="at rest"):
+    with pytest.raises(InvalidValueError, match="background"):
         background_rms(emg_with_mep(0.1), RATE_HZ, 30.0)
 
 

@@ -29,7 +29,7 @@ def test_what_muscles_give_is_plausible(mep_mv: float) -> None:
 def test_a_slip_is_refused_and_named(isi_ms: float | None, mep_mv: float, kind: Kind, unit: str) -> None:
     with pytest.raises(InvalidValueError, match=r"ISI|amplitude|impact") as refused:
         require_plausible(isi_ms, mep_mv, 100.0, IMPACT_SPACE)
-    assert refused.value.kind is kind
+    assert refused.value.found is kind
     assert f" {unit}" in f"{refused.value.remedy} "
 
 

@@ -81,9 +81,9 @@ def _judge_emg(emg: Channel, timed: Trial, limits: SignalLimits) -> Trial:
 
 def _reason(error: InvalidValueError) -> Kind:
     """Which mistrial an error of a detector is; what is wrong with every trial is raised again."""
-    if error.kind not in MISTRIALS:
+    if error.found not in MISTRIALS:
         raise error
-    return Kind(error.kind)
+    return Kind(error.found)
 
 
 def _is_tense(judged: Trial | Measurement, limits: SignalLimits) -> bool:

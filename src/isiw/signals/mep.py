@@ -14,9 +14,8 @@ from types import MappingProxyType
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.findings import Finding, Kind, Severity, refused
+from isiw.findings import Kind
 from isiw.signals.waveforms import (
-    RESTLESS,
     as_waveforms,
     crossing_before,
     cut,
@@ -59,13 +58,6 @@ TAP_SPAN_MS = 50.0
 
 PULSE_GUARD_MS = 1.0
 """How long before the nominal pulse its artefact may begin."""
-
-_OUTSIDE = Finding(
-    Kind.MISSING_CHANNEL,
-    Severity.REFUSED,
-    "the sweep does not hold the MEP window",
-    "Pulse times count from the sweep's first sample.",
-)
 
 SURE_SHARE = 0.2
 SURE_SD = 6.0
@@ -239,10 +231,12 @@ def _window(
     start = np.ceil((pulse_ms + window_ms[0]) * rate_hz / 1000 - 1e-6)
     stop = (pulse_ms + window_ms[1]) * rate_hz / 1000 + 1e-6
     if not (np.isfinite(pulse_ms).all() and (start >= 0).all() and (stop < waves.shape[-1]).all()):
-        raise refused(
-            _OUTSIDE,
-            f"pulse at {pulse_ms.min():g} ms in a sweep of {waves.shape[-1] * 1000 / rate_hz:g} ms",
-            f"samples {window_ms[0]:g} to {window_ms[1]:g} ms after the pulse",
+        raise InvalidValueError(
+            "the sweep does not hold the MEP window",
+            got=f"pulse at {pulse_ms.min():g} ms in a sweep of {waves.shape[-1] * 1000 / rate_hz:g} ms",
+            expected=f"samples {window_ms[0]:g} to {window_ms[1]:g} ms after the pulse",
+            remedy="Pulse times count from the sweep's first sample.",
+            found=Kind.MISSING_CHANNEL,
         )
     first = start.astype(np.int64)
     count = math.floor((window_ms[1] - window_ms[0]) * rate_hz / 1000 + 1e-6) + 1
@@ -262,5 +256,9 @@ def _quiet(waves: FloatArray, rate_hz: float, pulse_ms: FloatArray, hit_ms: Floa
     later = np.cumsum(resting[:, ::-1], axis=-1)[:, ::-1]  # resting samples from here to the pulse
     resting &= later <= round(BACKGROUND_MS * rate_hz / 1000)
     if (resting.sum(axis=-1) < samples(MIN_BACKGROUND_MS, rate_hz)).any():
-        raise refused(RESTLESS, None, f"at least {MIN_BACKGROUND_MS:g} ms of rest")
+        raise InvalidValueError(
+            "too little EMG before the pulse to know its background",
+            expected=f"at least {MIN_BACKGROUND_MS:g} ms of rest",
+            found=Kind.TOO_LITTLE_REST,
+        )
     return np.where(resting, cut(waves, stop - reach, reach), math.nan)

@@ -11,7 +11,7 @@ from numbers import Real
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.findings import RATE_HZ, Finding, Kind, Severity, refused
+from isiw.findings import RATE_HZ, Kind
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
@@ -31,8 +31,6 @@ __all__ = [
 MIN_REST_MS = 20.0
 REST_MS = 200.0
 """The last part of the rest, where a baseline that drifts is nearest to what it will be."""
-
-RESTLESS = Finding(Kind.TOO_LITTLE_REST, Severity.REFUSED, "too little of the sweep is at rest to know its noise")
 
 MAD_TO_SD = 1.4826  # of a normal distribution
 
@@ -129,7 +127,12 @@ def rest_level(waves: FloatArray, stop: int, rate_hz: float) -> tuple[FloatArray
     """
     stop = min(stop, waves.shape[-1])
     if stop < samples(MIN_REST_MS, rate_hz):
-        raise refused(RESTLESS, f"{1000 * stop / rate_hz:.1f} ms", f"at least {MIN_REST_MS:g} ms before any stimulus")
+        raise InvalidValueError(
+            "too little of the sweep is at rest to know its noise",
+            got=f"{1000 * stop / rate_hz:.1f} ms",
+            expected=f"at least {MIN_REST_MS:g} ms before the first stimulus",
+            found=Kind.TOO_LITTLE_REST,
+        )
     return level_and_noise(waves[:, max(0, stop - round(REST_MS * rate_hz / 1000)) : stop])
 
 
