@@ -53,3 +53,7 @@ def test_no_sweep_raises(
     acceleration = {} if hit else {"acceleration": Channel(0.3 * emg.values[::-1], rate_hz, "m/s^2", t0_ms=-before_ms)}
     trial = judged(Sweep({"emg": emg, **acceleration}, t_tms_ms=0.0, **times), isi_ms)
     assert (trial.status is Status.ACCEPTED) == (trial.mep_mv is not None and trial.reason is None)
+
+
+def test_a_window_that_begins_a_part_of_a_sample_before_the_sweep_is_no_error() -> None:
+    assert judged(Sweep({"emg": emg_of(600.0, -15.1, 100.0)}, t_tms_ms=0.0), None).status is Status.MISTRIAL

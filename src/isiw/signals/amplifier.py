@@ -59,7 +59,7 @@ def is_saturated(
         InvalidValueError: no EMG in that part.
     """
     emg = np.asarray(emg_mv, dtype=np.float64)
-    first, last = (min(edge * rate_hz / 1000, emg.size) for edge in span_ms)
+    first, last = (min(max(edge * rate_hz / 1000, 0.0), emg.size) for edge in span_ms)
     counts = emg[math.floor(first) : math.ceil(last) + 1]
     if not counts.size:
         raise InvalidValueError("there is no EMG in the part that counts", got=span_ms, expected="a part of the sweep")
@@ -117,7 +117,7 @@ def is_blanked(emg_mv: FloatArray, rate_hz: float, pulse_ms: float, span_ms: tup
         pulse_ms: the magnetic pulse [ms from the first sample].
         span_ms: the MEP's window [ms from the first sample].
     """
-    before, first, last = (math.floor(edge_ms * rate_hz / 1000) for edge_ms in (pulse_ms, *span_ms))
+    before, first, last = (max(0, math.floor(edge_ms * rate_hz / 1000)) for edge_ms in (pulse_ms, *span_ms))
     filled = int((emg_mv[:before] != emg_mv[0]).argmax())  # a rig may fill up what it did not record
     held = _longest_run(np.diff(emg_mv[first : last + 1]) == 0)
     at_rest = _longest_run(np.diff(emg_mv[filled:before]) == 0)
