@@ -69,6 +69,17 @@ def test_an_artefact_that_lasts_into_the_window_is_doubted_once(lasting_ms: floa
     assert [finding.severity for finding in found if finding.kind is Kind.ARTEFACT] == [Severity.DOUBT]
 
 
+@pytest.mark.parametrize("lasting_ms", [20.0, 60.0])
+def test_an_artefact_that_decays_slowly_is_doubted_where_there_is_no_mep(lasting_ms: float) -> None:
+    def decaying(emg_mv: FloatArray, rng: np.random.Generator) -> FloatArray:
+        size_mv = np.exp(0.3 * rng.standard_normal())
+        noise_mv = 0.003 * rng.standard_normal(emg_mv.size)
+        return np.asarray(noise_mv + size_mv * np.exp(-SINCE_PULSE_MS / lasting_ms) * (SINCE_PULSE_MS >= 0.6))
+
+    found = pauses([sweep_of(trial, decaying) for trial in range(8)])
+    assert [finding.kind for finding in found].count(Kind.ARTEFACT) == 1
+
+
 @pytest.mark.parametrize("lasting_ms", [0.5, 1.5])
 def test_an_artefact_that_ends_before_the_window_is_none(lasting_ms: float) -> None:
     def decaying(emg_mv: FloatArray, rng: np.random.Generator) -> FloatArray:

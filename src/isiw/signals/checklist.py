@@ -26,6 +26,7 @@ CHECKS: Final[tuple[Check, ...]] = (
     of_told(amplitudes.large),
     of_told(places.misplaced),
     of_told(places.artefact),
+    of_told(places.decay),
 )
 """The surest first: of one trial, the first finding explains the others."""
 

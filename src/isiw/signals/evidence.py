@@ -35,6 +35,7 @@ class Told:
         rest_uv: EMG before the pulse [µV RMS]; None where not known.
         outside: the largest clear response outside the MEP window; None where there is none, or no sweep.
         is_tail: whether what is in the window is the end of a larger artefact before it.
+        only_falls: whether what is in the window only falls, as a slow decay does and no MEP.
         repeats: whether its EMG is that of the trial before, sample by sample.
     """
 
@@ -43,6 +44,7 @@ class Told:
     rest_uv: float | None = None
     outside: Response | None = None
     is_tail: bool = False
+    only_falls: bool = False
     repeats: bool = False
 
     @property

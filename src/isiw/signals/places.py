@@ -15,7 +15,7 @@ from itertools import takewhile
 import numpy as np
 
 from isiw.findings import Finding, Kind, Severity
-from isiw.signals.evidence import Evidence, Response, Told
+from isiw.signals.evidence import OF_REST, Evidence, Response, Told
 from isiw.signals.limits import ARTEFACT_MS, SignalLimits
 from isiw.signals.rig import tap_span_ms
 from isiw.signals.units import EMG_UNITS_MV
@@ -64,7 +64,10 @@ def told_by(sweep: Sweep, trial: Trial, limits: SignalLimits, before_emg: FloatA
     if trial.t_tms_ms is None or not rest_uv:
         return told
     if told.stands_out:
-        return replace(told, is_tail=_is_artefact(sweep, trial, limits.mep_window_ms))
+        span_ms = limits.mep_window_ms
+        return replace(
+            told, is_tail=_is_artefact(sweep, trial, span_ms), only_falls=_only_falls(sweep, trial, span_ms, rest_uv)
+        )
     found = _outside(sweep, trial, limits.mep_window_ms)
     clear = found is not None and found.size_mv >= max(CLEAR * rest_uv / 1000, LEAST_MV)
     return replace(told, outside=found if clear else None)
@@ -115,6 +118,26 @@ def _is_artefact(sweep: Sweep, trial: Trial, window_ms: tuple[float, float]) -> 
     before = (since_ms >= max(SOUGHT_MS[0], window_ms[0] - NEAR_MS)) & (since_ms < window_ms[0]) & ~tap
     within = (since_ms >= window_ms[0]) & (since_ms <= window_ms[1])
     return _is_tail(emg_mv, within, before)
+
+
+def decay(evidence: Evidence) -> Finding | None:
+    """Slow decays in the MEP window; not where there are few."""
+    in_a_row = len(list(takewhile(lambda told: told.only_falls, reversed(evidence.told))))
+    if in_a_row < IN_A_ROW:
+        return None
+    text = f"In {in_a_row} trials in a row the EMG in the MEP window only falls, without a turn, as no MEP does"
+    remedy = "Do skin and electrodes keep the stimulator's charge? Clean the skin, and move cables and ground."
+    return Finding(Kind.ARTEFACT, Severity.DOUBT, text, remedy)
+
+
+def _only_falls(sweep: Sweep, trial: Trial, window_ms: tuple[float, float], rest_uv: float) -> bool:
+    """Whether a parabola that falls towards the level at rest leaves nothing larger than EMG at rest in the window."""
+    emg_mv, since_ms, _ = _since_pulse(sweep, trial)
+    within = (since_ms >= window_ms[0]) & (since_ms <= window_ms[1])
+    share = (since_ms[within] - window_ms[0]) / (window_ms[1] - window_ms[0])
+    fitted = np.polynomial.Polynomial.fit(share, emg_mv[within], 2, domain=[0, 1], window=[0, 1])
+    steps = np.diff(np.abs(fitted(share)))
+    return bool((steps <= 0).all() and np.ptp(emg_mv[within] - fitted(share)) <= OF_REST * rest_uv / 1000)
 
 
 def _since_the_last_mep(told: Sequence[Told]) -> Iterator[Told]:
