@@ -16,6 +16,7 @@ from isiw.studies import differences, means_table, summarise
 def rows(strategy: str, cohort: str, f1s: Sequence[float], **columns: object) -> pd.DataFrame:
     usual = {
         "trial": 10,
+        "expected_f1": math.nan,
         "start_covered": [1.0, 0.0, math.nan][: len(f1s)],
         "end_covered": 1.0,
         "reported_window": [True, True, False][: len(f1s)],
@@ -80,10 +81,11 @@ def several(people: int, **shifts: float) -> pd.DataFrame:
 
 
 def rows_of(strategy: str, f1s: np.ndarray) -> pd.DataFrame:
-    known = {"start_covered": 1.0, "end_covered": 1.0, "reported_window": True, "delivered": 10, "ask_ms": 1.0}
-    stop = {"stop_trial": math.nan, "stop_f1": math.nan, "converged": math.nan, "tell_ms": 1.0}
+    known = {"expected_f1": math.nan, "start_covered": 1.0, "end_covered": 1.0, "reported_window": True}
+    stop = {"stop_trial": math.nan, "stop_f1": math.nan, "converged": math.nan}
+    spent = {"delivered": 10, "ask_ms": 1.0, "tell_ms": 1.0}
     who = {"strategy": strategy, "cohort": "wide", "trial": 10, "person": range(len(f1s)), "f1": f1s}
-    return pd.DataFrame(who | known | stop)
+    return pd.DataFrame(who | known | stop | spent)
 
 
 def test_rows_alone_can_be_summarised() -> None:
@@ -95,6 +97,14 @@ def test_the_band_of_three_people_is_wide_and_stays_within_0_and_1() -> None:
     assert (row["f1_low"], row["f1_high"]) == (0.0, 1.0)  # 0.5 ± 4.30 standard errors
     (one,) = summarise(rows("nr", "wide", [0.9])).to_dict("records")
     assert math.isnan(one["f1_low"])
+
+
+def test_an_answer_is_sure_and_wrong_if_it_expects_much_more_than_it_has() -> None:
+    mixed = rows("default", "wide", [0.3, 0.6, 0.2], expected_f1=[0.7, 0.9, 0.65])
+    (row,) = summarise(mixed).to_dict("records")
+    assert row["sure_and_wrong"] == pytest.approx(1 / 3)  # the first; the second is near enough, the third unsure
+    (unknown,) = summarise(rows("nr", "wide", [0.3])).to_dict("records")
+    assert math.isnan(unknown["sure_and_wrong"])
 
 
 def test_differences_are_paired_by_person() -> None:

@@ -20,6 +20,9 @@ _GROUP: Final = ["cohort", "strategy", "trial"]
 LEVEL: Final = 0.95
 """Confidence level of all intervals."""
 
+SURE_F1, WRONG_F1 = 0.7, 0.35
+"""An answer is sure and wrong if its expected F1 is at least the first, and at least the second above its actual F1."""
+
 RESAMPLES: Final = 4999
 """Bootstrap samples of an interval; enough for the tail of ten comparisons at once."""
 
@@ -37,12 +40,13 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame | None = None) -> pd.Data
     Returns:
         Sorted by cohort, strategy and trial: people; mean F1, its standard error, and its 95 % interval by Student's t,
         cut off at 0 and 1 and NaN for a single person; shares of the people with a window whose start and end lie in
-        the 90 % intervals; share to whom no window is reported, as where a method has no answer yet; mean of the pairs
-        delivered; mean of the pairs after which the stopping rule fired and of the F1 then, over those for whom it did;
-        the same over all, where those for whom it has not count as they stand at this mark (`end_delivered`, `end_f1`;
-        NaN where the rule is ignored); share for whom it did so before the budget was used up; people without rows
-        because they failed; median time of an ask and a tell [ms]. A strategy that failed for everybody has one row,
-        at trial 0.
+        the 90 % intervals; share that is sure and wrong, which expects an F1 of at least .7 and at least .35 more than
+        it has (NaN if a method expects none); share to whom no window is reported, as if a method has no answer yet;
+        mean of the pairs delivered; mean of the pairs after which the stopping rule fired and of the F1 then, over
+        those for whom it did; the same over all, where those for whom it has not count as they stand at this mark
+        (`end_delivered`, `end_f1`; NaN where the rule is ignored); share for whom it did so before the budget was used
+        up; people without rows because they failed; median time of an ask and a tell [ms]. A strategy that failed for
+        everybody has one row, at trial 0.
     """
     failed = pd.Series(dtype="int64") if errors is None or not len(errors) else errors.groupby(_GROUP[:2]).size()
     table = _means(rows) if len(rows) else pd.DataFrame(columns=[*_GROUP, "people"])
@@ -60,6 +64,9 @@ def _means(rows: pd.DataFrame) -> pd.DataFrame:
         "end_delivered": rows["stop_trial"].mask(going_on & ~ignored, rows["delivered"]),
         "end_f1": rows["stop_f1"].mask(going_on & ~ignored, rows["f1"]),
     }
+    expected_f1 = rows["expected_f1"]
+    wrong = (expected_f1 >= SURE_F1) & (expected_f1 - rows["f1"] >= WRONG_F1)
+    at_end |= {"sure_and_wrong": wrong.astype(float).mask(expected_f1.isna())}
     groups = rows.assign(**at_end, called_none=~rows["reported_window"].astype(bool)).groupby(_GROUP)
     people, f1, se = groups.size(), groups["f1"].mean(), groups["f1"].sem()
     reach = se * stats.t.ppf(0.5 + LEVEL / 2, people - 1)
@@ -72,6 +79,7 @@ def _means(rows: pd.DataFrame) -> pd.DataFrame:
             "f1_high": (f1 + reach).clip(upper=1.0),
             "start_coverage": groups["start_covered"].mean(),
             "end_coverage": groups["end_covered"].mean(),
+            "sure_and_wrong": groups["sure_and_wrong"].mean(),
             "called_none": groups["called_none"].mean(),
             "delivered": groups["delivered"].mean(),
             "stop_trial": groups["stop_trial"].mean(),
