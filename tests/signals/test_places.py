@@ -132,6 +132,32 @@ def test_what_may_be_the_taps_is_not_counted(isi_ms: float, counted: int, *, kno
     assert outside(after([reflex], (isi_ms,), "impact" if known else "valve")) == counted
 
 
+@pytest.mark.parametrize("late_ms", [10.0, 12.0, 14.0])
+def test_meps_that_the_window_cuts_off_are_doubted_and_a_wider_window_is_proposed(late_ms: float) -> None:
+    sweeps = [sweep(trial, isi_ms, late_ms=late_ms, size_mv=0.3) for trial, isi_ms in enumerate(ISIS_MS)]
+    doubt = doubt_after(sweeps)
+    assert doubt is not None
+    assert doubt.kind is Kind.CUT_OFF
+    begin_ms, end_ms = map(float, doubt.remedy.partition("[")[2].partition("]")[0].split(", "))
+    assert begin_ms <= 15.0
+    assert end_ms >= 30.0 + late_ms + 4.0  # two SDs behind the last turn
+    assert doubt_after(sweeps[:3], ISIS_MS[:3]) is None
+
+
+def test_in_the_proposed_window_the_amplitude_is_whole() -> None:
+    leg = sweep(0, 90.0, late_ms=12.0, size_mv=0.3)
+    space, stimulus = DesignSpace(0, 500, reference="impact"), Stimulus(0, 90.0)
+    cut, whole = (
+        judge(leg, stimulus, space, SignalLimits(mep_window_ms=span)).mep_mv for span in ((15.0, 35.0), (15.0, 50.0))
+    )
+    assert instance(float, cut) < 0.5 * instance(float, whole)
+
+
+def test_a_response_behind_the_window_at_one_isi_may_be_the_reflex_of_the_tap() -> None:
+    isis_ms = (90.0, 91.0, 92.0, 93.0)
+    assert doubt_after([sweep(trial, isi_ms, late_ms=12.0) for trial, isi_ms in enumerate(isis_ms)], isis_ms) is None
+
+
 def misplaced_of(simulation: Simulation, space: DesignSpace, trials: int, limits: SignalLimits) -> int:
     """How many of a simulation's trials have a response outside the window."""
     rng, found = np.random.default_rng(0), 0
@@ -139,7 +165,8 @@ def misplaced_of(simulation: Simulation, space: DesignSpace, trials: int, limits
         isi_ms = None if trial % 6 == 5 else float(rng.uniform(space.low_ms + 5, space.high_ms - 5))
         one, stimulus = instance(Sweep, simulation.answer(Stimulus(trial, isi_ms))), Stimulus(trial, isi_ms)
         judged = judge(one, stimulus, space, limits)
-        found += judged.told and told_by(one, judged, limits).outside is not None
+        told = told_by(one, judged, limits) if judged.told else None
+        found += told is not None and (told.outside is not None or told.cut_ms is not None)
     return found
 
 

@@ -25,6 +25,7 @@ CHECKS: Final[tuple[Check, ...]] = (
     of_told(amplitudes.small),
     of_told(amplitudes.large),
     of_told(places.misplaced),
+    of_told(places.cut_off),
     of_told(places.artefact),
     of_told(places.decay),
 )

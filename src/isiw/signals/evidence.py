@@ -34,6 +34,7 @@ class Told:
         isi_ms: its ISI [ms]; None for TMS alone.
         rest_uv: EMG before the pulse [µV RMS]; None where not known.
         outside: the largest clear response outside the MEP window; None where there is none, or no sweep.
+        cut_ms: from when to when the EMG responds [ms after the pulse], if it is larger behind the window than within.
         is_tail: whether what is in the window is the end of a larger artefact before it.
         only_falls: whether what is in the window only falls, as a slow decay does and no MEP.
         repeats: whether its EMG is that of the trial before, sample by sample.
@@ -43,6 +44,7 @@ class Told:
     isi_ms: float | None = None
     rest_uv: float | None = None
     outside: Response | None = None
+    cut_ms: tuple[float, float] | None = None
     is_tail: bool = False
     only_falls: bool = False
     repeats: bool = False

@@ -45,6 +45,12 @@ ALIKE_MS = 4.0
 DIFFERING_MS = 15.0
 """So many come equally long after the pulse, while the tap, and with it its reflexes, comes at times that differ."""
 
+EDGE_SHARE = 0.1
+"""The share of its largest deflection at which a response begins and ends."""
+
+ROUND_MS = 5.0
+"""A window is proposed in steps of this."""
+
 VARIES = 1.5
 """From the smallest to the largest of several MEPs it is more than this; the end of an artefact is always the same."""
 
@@ -66,7 +72,10 @@ def told_by(sweep: Sweep, trial: Trial, limits: SignalLimits, before_emg: FloatA
     if told.stands_out:
         span_ms = limits.mep_window_ms
         return replace(
-            told, is_tail=_is_artefact(sweep, trial, span_ms), only_falls=_only_falls(sweep, trial, span_ms, rest_uv)
+            told,
+            cut_ms=_cut_ms(sweep, trial, span_ms, rest_uv),
+            is_tail=_is_artefact(sweep, trial, span_ms),
+            only_falls=_only_falls(sweep, trial, span_ms, rest_uv),
         )
     found = _outside(sweep, trial, limits.mep_window_ms)
     clear = found is not None and found.size_mv >= max(CLEAR * rest_uv / 1000, LEAST_MV)
@@ -97,6 +106,37 @@ def misplaced(evidence: Evidence) -> Finding | None:
     )
     remedy = "Is the time of the pulse right? Does the window fit the muscle? Or is it the stimulator's artefact?"
     return Finding(Kind.MISPLACED, Severity.DOUBT, text, remedy)
+
+
+def cut_off(evidence: Evidence) -> Finding | None:
+    """MEPs that are larger behind the window than within; not where there are few, or they may be of the tap."""
+    cut = list(takewhile(lambda told: told.cut_ms is not None, (t for t in reversed(evidence.told) if t.stands_out)))
+    if len(cut) < IN_A_ROW or not _follow_the_pulse([told.isi_ms for told in cut]):
+        return None
+    begin_ms, end_ms = (
+        statistics.median(span) for span in zip(*(told.cut_ms for told in cut if told.cut_ms), strict=True)
+    )
+    first_ms, last_ms = evidence.limits.mep_window_ms
+    window = f"the MEP window of {first_ms:g}–{last_ms:g} ms"
+    text = f"In {len(cut)} trials in a row the EMG is larger just behind {window} than within it"
+    wider = f"[{min(first_ms, ROUND_MS * (begin_ms // ROUND_MS)):g}, {ROUND_MS * -(-end_ms // ROUND_MS):g}]"
+    remedy = (
+        f"Responses last from about {begin_ms:.0f} to {end_ms:.0f} ms after the pulse. If these are the muscle's MEPs, "
+        f"begin a new session with mep_window_ms = {wider} under [signals]."
+    )
+    return Finding(Kind.CUT_OFF, Severity.DOUBT, text, remedy)
+
+
+def _cut_ms(sweep: Sweep, trial: Trial, window_ms: tuple[float, float], rest_uv: float) -> tuple[float, float] | None:
+    """From when to when the EMG responds, if it is clearly larger behind the window than within."""
+    emg_mv, since_ms, tap = _since_pulse(sweep, trial)
+    within = (since_ms >= window_ms[0]) & (since_ms <= window_ms[1])
+    behind = (since_ms > window_ms[1]) & (since_ms <= SOUGHT_MS[1]) & ~tap
+    if not behind.any() or np.ptp(emg_mv[behind]) < max(np.ptp(emg_mv[within]), CLEAR * rest_uv / 1000, LEAST_MV):
+        return None
+    deviation = np.where((within | behind) & ~tap, np.abs(emg_mv), 0.0)
+    responds = since_ms[deviation > max(EDGE_SHARE * deviation.max(), 0.5 * OF_REST * rest_uv / 1000)]
+    return (float(responds[0]), float(responds[-1])) if responds.size else None
 
 
 def artefact(evidence: Evidence) -> Finding | None:
