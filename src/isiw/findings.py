@@ -64,6 +64,7 @@ class Kind(StrEnum):
     LARGE = "large amplitudes"
     JUMP = "a jump of the scale"
     MISPLACED = "a response outside the MEP window"
+    HUM = "mains hum"
     CUT_OFF = "MEPs that the MEP window cuts off"
     ARTEFACT = "an artefact in the MEP window"
     REPEATED = "the same sweep again"

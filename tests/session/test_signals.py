@@ -21,7 +21,7 @@ from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.safeguards import Safeguards
 from isiw.session.updates import SessionUpdate
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.stopping import StopKind
 from isiw.trials import Measurement, Stimulus
 from scripted import ScriptedDevice, scripted_strategy
 
@@ -208,9 +208,8 @@ def test_a_session_that_was_ended_does_not_say_that_it_is_paused(log: Path) -> N
 
     session = Session(ScriptedDevice(), scripted_strategy(6), log=log, on_trial=on_trial)
     result = session.run()
-    assert result.decision == StopDecision(
-        stop=False, reason="The session was ended before its time: Ended on the live page."
-    )
+    assert (result.decision.stop, result.decision.kind) == (False, StopKind.PAUSED)
+    assert result.decision.reason == "The session was ended before its time: Ended on the live page."
     assert len(resume(log, ScriptedDevice(), scripted_strategy(6)).run().trials) == 6
 
 

@@ -24,6 +24,7 @@ CHECKS: Final[tuple[Check, ...]] = (
     of_told(amplitudes.stopped),
     of_told(amplitudes.small),
     of_told(amplitudes.large),
+    of_told(places.hum),
     of_told(places.misplaced),
     of_told(places.cut_off),
     of_told(places.artefact),

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypeAlias
 
 from isiw.findings import Finding
+from isiw.signals.hum import Hum
 from isiw.signals.limits import SignalLimits
 from isiw.trials import Measurement, Sweep, Trial
 
@@ -35,6 +36,7 @@ class Told:
         rest_uv: EMG before the pulse [µV RMS]; None where not known.
         outside: the largest clear response outside the MEP window; None where there is none, or no sweep.
         cut_ms: from when to when the EMG responds [ms after the pulse], if it is larger behind the window than within.
+        hum: the mains hum that was subtracted; None if there is none.
         is_tail: whether what is in the window is the end of a larger artefact before it.
         only_falls: whether what is in the window only falls, as a slow decay does and no MEP.
         repeats: whether its EMG is that of the trial before, sample by sample.
@@ -45,6 +47,7 @@ class Told:
     rest_uv: float | None = None
     outside: Response | None = None
     cut_ms: tuple[float, float] | None = None
+    hum: Hum | None = None
     is_tail: bool = False
     only_falls: bool = False
     repeats: bool = False

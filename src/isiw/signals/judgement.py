@@ -17,6 +17,7 @@ from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import MISTRIALS, Kind
 from isiw.signals.amplifier import is_blanked, is_saturated
 from isiw.signals.events import tap_artefact_times
+from isiw.signals.hum import at_rest, mains_hum
 from isiw.signals.impact import impact_time
 from isiw.signals.limits import SignalLimits
 from isiw.signals.mep import background_rms, mep_amplitudes
@@ -65,7 +66,7 @@ def _judge_pulse(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: S
 def _judge_emg(emg: Channel, timed: Trial, limits: SignalLimits) -> Trial:
     """The MEP and the EMG before it, of a trial whose timing is right."""
     emg_mv = emg.values * _unit_mv(emg)
-    mep_mv = _mep_mv(emg_mv, emg, timed, limits)
+    mep_mv = _mep_mv(_without_hum(emg_mv, emg, timed), emg, timed, limits)
     timed = replace(timed, background_rms_uv=_background_uv(emg_mv, emg, timed))
     pulse = _on_channel(timed.t_tms_ms, emg)
     span_ms = (pulse + limits.mep_window_ms[0], pulse + limits.mep_window_ms[1])
@@ -261,6 +262,12 @@ def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Trial) -> float | No
         except InvalidValueError as error:
             _reason(error)
     return None
+
+
+def _without_hum(emg_mv: FloatArray, emg: Channel, timed: Trial) -> FloatArray:
+    """The EMG without mains hum, if there is any."""
+    found = mains_hum(emg_mv, emg.rate_hz, at_rest(emg, timed))
+    return emg_mv if found is None else emg_mv - found.course_mv
 
 
 def _mep_mv(emg_mv: FloatArray, emg: Channel, timed: Trial, limits: SignalLimits) -> float:

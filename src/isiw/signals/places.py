@@ -16,6 +16,7 @@ import numpy as np
 
 from isiw.findings import Finding, Kind, Severity
 from isiw.signals.evidence import OF_REST, Evidence, Response, Told
+from isiw.signals.hum import Hum, at_rest, mains_hum
 from isiw.signals.limits import ARTEFACT_MS, SignalLimits
 from isiw.signals.rig import tap_span_ms
 from isiw.signals.units import EMG_UNITS_MV
@@ -66,7 +67,7 @@ def told_by(sweep: Sweep, trial: Trial, limits: SignalLimits, before_emg: FloatA
     """
     rest_uv, emg = trial.background_rms_uv, sweep.channels["emg"].values
     repeats = before_emg is not None and np.array_equal(emg, before_emg)
-    told = Told(trial.mep_mv or 0.0, trial.isi_ms, rest_uv, repeats=repeats)
+    told = Told(trial.mep_mv or 0.0, trial.isi_ms, rest_uv, hum=_hum(sweep, trial), repeats=repeats)
     if trial.t_tms_ms is None or not rest_uv:
         return told
     if told.stands_out:
@@ -82,12 +83,31 @@ def told_by(sweep: Sweep, trial: Trial, limits: SignalLimits, before_emg: FloatA
     return replace(told, outside=found if clear else None)
 
 
+def _hum(sweep: Sweep, trial: Trial) -> Hum | None:
+    emg = sweep.channels["emg"]
+    return mains_hum(EMG_UNITS_MV[emg.unit] * emg.values, emg.rate_hz, at_rest(emg, trial))
+
+
 def repeated(evidence: Evidence) -> Finding | None:
     """A sweep that is the one before."""
     if not evidence.told[-1].repeats:
         return None
     text = "The EMG of the last trial is that of the one before, sample by sample"
     return Finding(Kind.REPEATED, Severity.DOUBT, text, "Does the rig wait for the new recording?")
+
+
+def hum(evidence: Evidence) -> Finding | None:
+    """Mains hum, which was subtracted; not if there are few trials."""
+    waves = list(takewhile(lambda wave: wave is not None, (told.hum for told in reversed(evidence.told))))
+    if len(waves) < IN_A_ROW or waves[0] is None:
+        return None
+    size_uv = 1000 * statistics.median(wave.size_mv for wave in waves if wave is not None)
+    text = (
+        f"In {len(waves)} trials in a row most of the EMG at rest is a wave of {waves[0].frequency_hz:.0f} Hz and "
+        f"{size_uv:.0f} µV peak to peak: mains hum, which is subtracted from each MEP"
+    )
+    remedy = "Check ground and reference electrodes, shorten their cables, and keep power supplies away."
+    return Finding(Kind.HUM, Severity.DOUBT, text, remedy)
 
 
 def misplaced(evidence: Evidence) -> Finding | None:
