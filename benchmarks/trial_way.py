@@ -108,7 +108,7 @@ def way_of_a_trial(*, whole: bool) -> list[str]:
         if seen.trial.index in {PROFILED - 1, PROFILED}:
             way.is_open = whole and seen.trial.index < PROFILED
 
-    Course.after = updated  # type: ignore[method-assign]
+    Course.after = updated  # type: ignore[assignment, method-assign]
     try:
         with tempfile.TemporaryDirectory() as folder, way.looked_at():
             isiw.Session(

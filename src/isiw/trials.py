@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 import pandas as pd
 
-from isiw.checks import check_amplitude, check_numbers, check_texts, check_wholes, choice, text
+from isiw.checks import check_amplitude, check_numbers, check_texts, check_wholes, choice, number, text
 from isiw.errors import InvalidValueError
 from isiw.findings import MISTRIALS, Kind
 from isiw.text.stimuli import TAP, StimulusWords
@@ -195,7 +195,8 @@ class Trial:
         status: accepted trials are told to the strategy, mistrials are not; both count as stimuli.
         commanded_isi_ms: the ISI that was asked for [ms]; None for a control trial.
         reason: why it is a mistrial; None where accepted.
-        isi_ms: the realised ISI [ms]; None for a control trial or where unknown.
+        isi_ms: the realised ISI [ms]; None for a control trial or where unknown. Of a tap alone it is the ISI at which
+            the MEP window would lie that its amplitude was taken in.
         isi_sd_ms: SD of the realised ISI [ms].
         mep_mv: peak-to-peak amplitude of the MEP [mV], also of some mistrials, for whoever looks at them; None where
             none was measured.
@@ -206,6 +207,8 @@ class Trial:
         excluded: excluded by an operator afterwards.
         tap_alone: whether it was a tap without the magnetic pulse, from which a strategy learns nothing.
         overruled: why it had been a mistrial before an operator accepted it; None otherwise.
+        mep_sd_mv: SD of the amplitude, if it is the mean of several [mV]; 0 for one that was measured once.
+        mep_interval_mv: the interval that the amplitude lies in, if no more is known [mV]; its end may be infinite.
 
     Raises:
         InvalidValueError: a mistrial without a reason, an accepted trial with one or without an amplitude, a tap alone
@@ -226,6 +229,9 @@ class Trial:
     excluded: bool = False
     tap_alone: bool = False
     overruled: Kind | None = None
+    mep_sd_mv: float = 0.0
+    mep_interval_mv: tuple[float, float] | None = None
+    __pydantic_config__: ClassVar = {"ser_json_inf_nan": "strings"}  # as JSON knows no infinity
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "status", Status(self.status))
@@ -236,13 +242,16 @@ class Trial:
             raise InvalidValueError("a mistrial needs a reason and an accepted trial has none", got=self.reason)
         if self.tap_alone and self.commanded_isi_ms is not None:
             raise InvalidValueError("a tap alone has no ISI", got=self.commanded_isi_ms, expected="None")
-        if self.status is Status.ACCEPTED and self.mep_mv is None and not self.tap_alone:
+        if self.mep_interval_mv is not None:
+            object.__setattr__(self, "mep_interval_mv", _interval_mv(self.mep_interval_mv))
+        measured = self.mep_mv is not None or self.mep_interval_mv is not None
+        if self.status is Status.ACCEPTED and not measured and not self.tap_alone:
             raise InvalidValueError("an accepted trial needs its MEP", got=self.index)
         check_wholes(self, "index", least=0)
         check_numbers(self, "commanded_isi_ms", "isi_ms", "t_valve_ms", "t_hit_ms", "t_tms_ms", optional=True)
         check_amplitude(self, "mep_mv", optional=True)
         check_numbers(self, "background_rms_uv", least=0, optional=True)
-        check_numbers(self, "isi_sd_ms", least=0)
+        check_numbers(self, "isi_sd_ms", "mep_sd_mv", least=0)
 
     @classmethod
     def unknown(cls, stimulus: Stimulus) -> Trial:
@@ -280,6 +289,17 @@ class Trial:
     def accepted_anyway(self) -> Trial:
         """The same trial, accepted by an operator after looking at it."""
         return dataclasses.replace(self, status=Status.ACCEPTED, reason=None, overruled=self.reason)
+
+
+def _interval_mv(ends_mv: object) -> tuple[float, float]:
+    """An interval of amplitudes, whose upper end may be infinite [mV]."""
+    if isinstance(ends_mv, tuple | list) and len(ends_mv) == 2:
+        low_mv, high_mv = ends_mv
+        if 0 <= number("an amplitude's lower end [mV]", low_mv) < high_mv:
+            return float(low_mv), float(high_mv)
+    raise InvalidValueError(
+        "this is no interval of amplitudes", got=ends_mv, expected="two amplitudes in mV that ascend, such as (0, 0.05)"
+    )
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,15 @@ from pathlib import Path
 
 import pytest
 
+from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.interval.record import begin_log, continue_log, read_productions
 from isiw.interval.task import answer, session_blocks
 from isiw.log.production import Block
 from isiw.log.reader import read_session
-from isiw.log.threshold import read_threshold
+from isiw.log.schema import AnyHeader, StrategyRecipe, ThresholdHeader
 from isiw.log.writer import LogWriter
+from isiw.session import read_threshold
 from isiw.strategy.threshold import IntensityRange
 from log.written import make_header
 
@@ -103,17 +105,26 @@ def test_readers_of_sessions_refuse_it_and_say_what_reads_it(tmp_path: Path) -> 
         read_threshold(log)
 
 
+THRESHOLD = ThresholdHeader(
+    isiw_version="0.1.0",
+    created="2026-11-21T10:00:00+00:00",
+    seed=0,
+    search=StrategyRecipe(name="bayes", seed=0),
+    intensities=IntensityRange(20, 90),
+    min_iti_s=5.0,
+    max_pulses=100,
+    device=DeviceInfo("bench", "impact"),
+)
+
+
 @pytest.mark.parametrize(
-    ("intensities", "match"),
+    ("header", "match"),
     [
-        (None, r"search for a window, not (.|\n)*isiw show \S*s\.mcap"),
-        (IntensityRange(20, 90), r"search for a motor threshold, not (.|\n)*isiw threshold \S*s\.mcap --show"),
+        (make_header(), r"search for a window, not (.|\n)*isiw show \S*s\.mcap"),
+        (THRESHOLD, r"search for a motor threshold, not (.|\n)*isiw threshold \S*s\.mcap --show"),
     ],
 )
-def test_a_log_with_stimuli_is_refused_with_what_shows_it(
-    tmp_path: Path, intensities: IntensityRange | None, match: str
-) -> None:
-    header = make_header().model_copy(update={"intensities": intensities})
+def test_a_log_with_stimuli_is_refused_with_what_shows_it(tmp_path: Path, header: AnyHeader, match: str) -> None:
     LogWriter.create(tmp_path / "s.mcap", header).close()
     with pytest.raises(LogError, match=match):
         read_productions(tmp_path / "s.mcap")

@@ -11,7 +11,7 @@ from isiw.errors import InvalidValueError
 from isiw.findings import Kind
 from isiw.log.production import Production
 from isiw.log.salvage import salvage
-from isiw.log.schema import Estimate, Event, Header, Intent, PulseOutcome, Record, ThresholdBelief, Waveform
+from isiw.log.schema import Correction, Estimate, Event, Header, Intent, PulseOutcome, Record, ThresholdBelief, Waveform
 from isiw.log.topics import CHANNEL_IDS, decode, encode, json_schema, topic_of
 from isiw.log.writer import LogWriter
 from isiw.strategy.stopping import StopDecision
@@ -31,6 +31,10 @@ from log.written import make_header
         Trial(1, Status.MISTRIAL, None, Kind.OUTCOME_UNKNOWN),
         Estimate(trial=1, probability=None, start_ms=-math.inf, end_ms=math.inf, stop=True, reason="µ"),
         Event(kind="fault", text="line one\nline two"),
+        Event(kind="correction", trial=3, text="the amplifier's gain", corrected=Correction(mep_mv=0.2)),
+        Trial(2, Status.ACCEPTED, 12.0, isi_ms=12.0, mep_mv=0.3, mep_sd_mv=0.02),
+        Trial(3, Status.ACCEPTED, 12.0, isi_ms=12.0, mep_interval_mv=(0.5, math.inf)),
+        Trial(4, Status.ACCEPTED, None, isi_ms=60.0, mep_mv=0.1, tap_alone=True),
         Intent(trial=3, isi_ms=None, intensity_pct_mso=62.0),
         PulseOutcome(trial=3, intensity_pct_mso=62.0, mep_mv=0.08),
         PulseOutcome(trial=3, intensity_pct_mso=62.0, reason="lost"),

@@ -11,9 +11,8 @@ import pytest
 from isiw.errors import LogError
 from isiw.log.salvage import salvage
 from isiw.log.schema import PulseOutcome
-from isiw.log.threshold import outcomes, read_threshold
 from isiw.log.writer import LogWriter
-from isiw.session import open_threshold, resume_threshold, run_simulated, search_of
+from isiw.session import open_threshold, read_threshold, resume_threshold, run_simulated, search_of
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
 
 FOLDER = Path(__file__).parents[1] / "data" / "logs" / "threshold"
@@ -36,7 +35,7 @@ def begun(tmp_path: Path) -> Path:
 
 
 def test_a_log_without_an_outcome_yet_is_in_the_way_as_one_of_a_threshold(begun: Path) -> None:
-    with pytest.raises(LogError, match=r"go on with it: isiw threshold .*t\.mcap --resume"):
+    with pytest.raises(LogError, match=r"continue it: isiw threshold .*t\.mcap --resume"):
         open_threshold(make_threshold_search("bayes", IntensityRange(20, 80)), begun)
 
 
@@ -46,7 +45,7 @@ def test_a_second_record_of_a_pulse_is_left_out_and_told(begun: Path) -> None:
         for mep_mv in (0.1, 0.2):
             log.append(PulseOutcome(trial=0, intensity_pct_mso=50.0, mep_mv=mep_mv))
     again = read_threshold(begun)
-    assert [outcome.mep_mv for outcome in outcomes(again)] == [0.1]
+    assert [outcome.mep_mv for outcome in again.outcomes] == [0.1]
     assert again.losses == ("A second record of trial 0 is left out.",)
 
 
@@ -55,7 +54,7 @@ def test_it_opens_whole_and_goes_on(name: str, tmp_path: Path) -> None:
     shutil.copyfile(FOLDER / name, tmp_path / name)
     record = read_threshold(tmp_path / name)
     assert record.losses == ()
-    assert len(outcomes(record)) == len(record.intents) > 5
+    assert len(record.outcomes) == len(record.intents) > 5
     with resume_threshold(tmp_path / name) as resumed:
         assert resumed.search.pulses == search_of(record).pulses
         assert resumed.decision().stop

@@ -21,7 +21,7 @@ from isiw.server.driven import DrivenSession
 from isiw.server.refusals import Refusal
 from isiw.server.requests import AskRequest, CreateRequest, TellRequest
 from isiw.server.sessions import Sessions
-from isiw.session.journal import Journal
+from isiw.session.examination import Examination
 from isiw.strategy.catalogue import make_strategy
 from server.serving import PLAN, SETTINGS, SPACE, client_of, created, done, mep_mv, refused, told
 
@@ -295,7 +295,7 @@ def test_what_breaks_a_log_closes_its_session(
     def full(*_: object) -> None:
         raise LogError("the log cannot be written: no space left")
 
-    monkeypatch.setattr(Journal, "intent", full)
+    monkeypatch.setattr(Examination, "intend", full)
     refused(client.post(f"{session}/ask"), 409, "LogError")
     monkeypatch.undo()
     refused(client.post(f"{session}/ask"), 409, "NotOpen")
@@ -310,7 +310,7 @@ def test_a_trial_that_was_logged_and_could_not_be_learnt_closes_its_session(
 
     isi_ms = done(client.post(f"{session}/ask"))["isi_ms"]
     outcome = {"trial": 0, "isi_ms": isi_ms, "mep_mv": 0.1}
-    monkeypatch.setattr("isiw.session.recorder.learn", refusing)
+    monkeypatch.setattr("isiw.session.examination.learn", refusing)
     assert "not to be learnt" in refused(client.post(f"{session}/tell", json=outcome), 500, "InternalError")["message"]
     monkeypatch.undo()
     refused(client.post(f"{session}/tell", json=outcome), 409, "NotOpen")
@@ -329,7 +329,7 @@ def test_a_call_that_waited_for_one_that_broke_the_session_is_told_that_it_is_no
     session = sessions.opened("P07")
     with session.alone():
         asked = session.ask(AskRequest())
-    monkeypatch.setattr("isiw.session.recorder.learn", refusing)
+    monkeypatch.setattr("isiw.session.examination.learn", refusing)
     kinds = []
     for _ in range(2):
         with pytest.raises(Refusal) as caught, session.alone():
@@ -359,7 +359,7 @@ def test_what_nobody_foresaw_is_an_answer_in_words(
     def broken(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(Journal, "intent", broken)
+    monkeypatch.setattr(Examination, "intend", broken)
     assert "ZeroDivisionError" in refused(client.post(f"{session}/ask"), 500, "InternalError")["message"]
 
 

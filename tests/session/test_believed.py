@@ -12,7 +12,7 @@ import pytest
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Estimate
 from isiw.log.topics import decode, encode
-from isiw.session.believed import believed
+from isiw.session.examination import believed
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.strategy.catalogue import make_strategy

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,11 @@ from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session
 from isiw.log.schema import Intent, Record
 from isiw.session.asking import Asking
-from isiw.session.following import Followers
 from isiw.session.interrupts import Interrupts
 from isiw.session.loop import Session
-from isiw.session.pace import Pace
 from isiw.session.safeguards import Safeguards
+from isiw.session.sink import Sink
+from isiw.session.steps import Pace
 from isiw.session.updates import SessionUpdate
 from isiw.trials import Trial
 from scripted import ScriptedDevice, scripted_strategy
@@ -176,20 +175,19 @@ def test_a_session_that_is_ended_just_when_a_pause_was_decided_ends_all_the_same
 
 
 def test_who_fails_in_two_threads_at_once_is_let_go_of_once() -> None:
-    faults: deque[str] = deque()
-    followers = Followers(faults)
+    sink = Sink()
 
     class Twice(Remembering):
         def ended(self) -> None:
             super().ended()
             if self.ends == 1:
-                followers.ended()  # as another thread would, which is the first to see it fail
+                sink.ended()  # as another thread would, which is the first to see it fail
             raise OSError("no more room")
 
-    followers.add(Twice())
-    followers.ended()
-    assert len(faults) == 1
-    assert not followers
+    sink.followers.append(Twice())
+    sink.ended()
+    assert len(sink.faults) == 1
+    assert not sink.followers
 
 
 def test_the_pace_is_the_usual_one_whatever_rests_were_between() -> None:

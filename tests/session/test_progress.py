@@ -123,7 +123,7 @@ def test_a_table_that_cannot_be_shown_any_more_ends_no_session(
         if len(rows) == 2:
             raise error
 
-    monkeypatch.setattr("isiw.session.loop.show_progress", show)
+    monkeypatch.setattr("isiw.session.desk.show_progress", show)
     session = Session(ScriptedDevice(), scripted_strategy(5), log=tmp_path / "s.mcap")
     session.run(progress=True, keys=False)
     record = read_session(tmp_path / "s.mcap")

@@ -33,8 +33,8 @@ from isiw.log.reader import read_session
 from isiw.log.schema import Estimate, Intent
 from isiw.log.writer import LogWriter
 from isiw.report import final_statement
-from isiw.session import recorder
-from isiw.session.journal import relearned
+from isiw.session import examination
+from isiw.session.examination import relearned
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.session.recorder import Recorder
@@ -527,13 +527,13 @@ def test_a_killed_loop_loses_nothing(log: Path) -> None:
 
 def interrupted_once(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """The next call of a function of the recorder ends in Ctrl-C."""
-    called = getattr(recorder, name)
+    called = getattr(examination, name)
 
     def stopped(*_: object) -> None:
-        monkeypatch.setattr(recorder, name, called)
+        monkeypatch.setattr(examination, name, called)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(recorder, name, stopped)
+    monkeypatch.setattr(examination, name, stopped)
 
 
 @pytest.mark.parametrize("name", ["relearned", "learn"])
@@ -573,7 +573,7 @@ def test_trials_are_judged_in_another_thread_without_losing_any(log: Path, monke
         time.sleep(0.2)  # long enough for several trials of the loop
         return told(strategy, trials)
 
-    monkeypatch.setattr(recorder, "relearned", slowly)
+    monkeypatch.setattr(examination, "relearned", slowly)
     with open_session(scripted_strategy(30), log) as session:
         run(session, 4)
         judging = threading.Thread(target=session.exclude, args=(2,))

@@ -15,7 +15,6 @@ from isiw.session import (
     ThresholdRecorder,
     open_simulated,
     open_threshold,
-    pulses_given,
     read_threshold,
     resume_threshold,
     run_by_hand,
@@ -148,11 +147,11 @@ def test_where_the_operator_ends_the_search_the_pulse_that_was_asked_was_not_giv
     typed(recorder, "n", "q")
     recorder.close()
     log = tmp_path / "t.mcap"
-    assert len(pulses_s(salvage(log))) == pulses_given(read_threshold(log)) == 1
+    assert len(pulses_s(salvage(log))) == read_threshold(log).given == 1
     with resume_threshold(log) as resumed:
         assert [outcome.reason for outcome in resumed.outcomes] == [""]
         typed(resumed, "y")
-    assert pulses_given(read_threshold(log)) == 3
+    assert read_threshold(log).given == 3
 
 
 def test_without_anybody_at_the_keyboard_it_ends_and_goes_on_later(recorder: ThresholdRecorder, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Where a command finds a log, and where it puts what nobody gave a place."""
+"""Whether there is a log, and where a command puts a file that nobody gave a place."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import itertools
 import os
 from pathlib import Path
 
-__all__ = ["free_beside", "is_log"]
+__all__ = ["free_beside", "log_exists"]
 
 
-def is_log(source: str | Path) -> bool:
+def log_exists(source: str | Path) -> bool:
     """Whether there is a log of this name, closed or not.
 
     Args:

@@ -9,7 +9,6 @@ import typer
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, SESSIONS, errors_reported, exit_if_damaged, refuse_ignored, show
-from isiw.text.commands import command
 
 if TYPE_CHECKING:
     from isiw.interval import ProductionRecord
@@ -57,7 +56,7 @@ def interval(  # noqa: PLR0913, PLR0917 - an option each
 
 
 def _way_on(log: Path) -> str:
-    return command("interval", log, "--resume")
+    return isiw.session.LogKind.PRODUCTION.continued_by(log)
 
 
 def _end(record: ProductionRecord) -> None:

@@ -11,7 +11,7 @@ import typer
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, NOT_OVER, SESSIONS, errors_reported, show
-from isiw.cli.files import free_beside, is_log
+from isiw.cli.files import free_beside, log_exists
 from isiw.text.commands import command
 
 if TYPE_CHECKING:
@@ -123,14 +123,14 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
         raise isiw.errors.ConfigError(
             "a log's name cannot begin like an option", got=str(session.log_path), remedy="Give --log a file's name."
         )
-    before, ours = len(session.trials), resumed or not is_log(session.log_path)
+    before, ours = len(session.trials), resumed or not log_exists(session.log_path)
     try:
         with errors_reported(_INTERRUPTED), _shown_live(session) if live else nullcontext():
             show(f"log: {session.log_path}")
             result = session.run(progress=True)
     except BaseException as end:
         delivered, refused = len(session.trials) > before, isinstance(end.__cause__, isiw.errors.DeviceError)
-        if delivered or (refused and ours and is_log(session.log_path)):
+        if delivered or (refused and ours and log_exists(session.log_path)):
             for line in isiw.config.after_error(session, config, end.__cause__, delivered=delivered):
                 show(line)
         raise

@@ -10,7 +10,6 @@ from rich.console import Console
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, SESSIONS, errors_reported, exit_if_damaged, refuse_ignored, show
-from isiw.text.commands import command
 from isiw.text.numbers import counted
 
 if TYPE_CHECKING:
@@ -103,7 +102,7 @@ def _begun(
 
 
 def _resuming(log: Path) -> str:
-    return command("threshold", log, "--resume")
+    return isiw.session.LogKind.THRESHOLD.continued_by(log)
 
 
 def _run(recorder: ThresholdRecorder) -> None:
@@ -124,7 +123,7 @@ def _say_what_is_there(log: Path) -> None:
     record = isiw.session.read_threshold(log)
     search = isiw.session.search_of(record)
     decision = search.decision()
-    given, most = isiw.session.pulses_given(record), record.header.limits.max_pulses
+    given, most = record.given, record.header.max_pulses
     show(f"\n{search.estimate()}", style="bold")
     if decision.stop:
         show(f"Ended: {decision.reason}")

@@ -9,7 +9,7 @@ import typer
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, SESSIONS, Overwrite, errors_reported, show
-from isiw.cli.files import is_log
+from isiw.cli.files import log_exists
 
 if TYPE_CHECKING:
     from isiw.repeatability import TimingStudy
@@ -38,7 +38,7 @@ def timing(
 
 
 def _timing_study(source: str, taps: int, seed: int) -> TimingStudy:
-    if is_log(source):
+    if log_exists(source):
         return isiw.repeatability.study_session(isiw.read_session(source))
     if any(sign in source for sign in "./\\"):
         raise isiw.errors.LogError("there is no such log", got=source, remedy="Give the path of a session's log.")

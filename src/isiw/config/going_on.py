@@ -12,6 +12,7 @@ from isiw.config.run import RunConfig
 from isiw.config.sections import SimulatedConfig
 from isiw.devices.limits import Limits
 from isiw.errors import ConfigError, LogError
+from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Header
 from isiw.session.resume import limits_of_log
@@ -137,7 +138,7 @@ def _require_same_simulated(config: RunConfig, record: SessionRecord) -> None:
             got=f"seed {config.seed}, {config.subject}",
             expected=f"seed {was.seed}, {was.subject}",
             remedy="Leave the configuration out; the simulated person's settings are in the log: "
-            f"{command('resume', record.path)}",
+            f"{continued_by(record.path, record.header)}",
         )
 
 

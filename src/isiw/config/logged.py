@@ -12,10 +12,10 @@ from isiw.config.sections import SimulatedConfig
 from isiw.config.session import simulated_device
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError
+from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import RUN_KEY
 from isiw.subjects.cohorts import person_of
-from isiw.text.commands import command
 from isiw.text.toml_files import checked
 from isiw.window import Window
 
@@ -57,9 +57,7 @@ def run_of_log(record: SessionRecord) -> _LoggedRun:
         raise ConfigError(
             "the session's device is not known here",
             got=record.header.device.name,
-            remedy="Go on where it was run: with the configuration that has your device, CONFIG, "
-            f"{command('resume', record.path, 'CONFIG')}; in your own software by isiw.resume(path, device).run(), or "
-            "for a loop of your own by isiw.open_session(strategy, path, resume=True).",
+            remedy=f"Continue it where it was run: {continued_by(record.path, record.header)}",
         )
     return checked(_LoggedRun, run, f"the run section of {record.path}")
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from isiw.config.taught import learns_from_earlier
 from isiw.errors import IsiwError, LimitExceededError
+from isiw.log.kinds import continued_by
 from isiw.log.reader import read_session
 from isiw.log.schema import RUN_KEY
 from isiw.session.loop import Session
@@ -35,7 +36,7 @@ def after_error(session: Session, config: Path | None, error: BaseException | No
         else []
     )
     safe = "The session ended early. Its log is safe" if delivered else "No stimulus was delivered. The log is kept"
-    return [*lines, f"{safe}; go on with: {_resume(session, config, named=limited)}"]
+    return [*lines, f"{safe}; go on with: {continued_by(session.log_path, session.header, config, changed=limited)}"]
 
 
 def _is_over(log: Path) -> bool:
@@ -57,24 +58,13 @@ def after_end(session: Session, config: Path | None, *, delivered: bool) -> str 
     """
     if not session.strategy.decision().stop:  # so that it was the limits
         where = f"in {config}" if config is not None else "of a configuration"
-        command = f"{_resume(session, config, named=True)}{'' if config else ' CONFIG'}"
-        return f"For more pulses set a higher max_pulses under [limits] {where}, then go on with: {command}"
+        way_on = continued_by(session.log_path, session.header, config, changed=True)
+        return f"For more pulses set a higher max_pulses under [limits] {where}, then go on with: {way_on}"
     if delivered:
         return None
     same = "" if config else ", with the same configuration if there was one"
     more = f"For more trials with this person begin a new session{same}: {_anew(session, config)}"
     return f"The session is over, so no stimulus was delivered. {more}"
-
-
-def _resume(session: Session, config: Path | None, *, named: bool) -> str:
-    """The command that goes on; a simulated person is known from the log, but not where recorded EMG is."""
-    run = session.header.config.get(RUN_KEY)
-    if config is not None and (named or run is None):
-        return command("resume", session.log_path, config)
-    recorded = (
-        isinstance(run, dict) and isinstance(run.get("subject"), dict) and run["subject"].get("kind") == "recorded"
-    )
-    return command("resume", session.log_path, *(["--data", "DIR"] if recorded else []))
 
 
 def _anew(session: Session, config: Path | None) -> str:

@@ -1,11 +1,16 @@
-"""Clocks: real devices wait, simulated ones do not."""
+"""Clocks, by which real devices wait and simulated ones do not, and when the next stimulus may come."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Protocol, runtime_checkable
 
-__all__ = ["ROUNDING_S", "Clock", "MonotonicClock", "VirtualClock"]
+from isiw.devices.limits import Limits
+from isiw.errors import LimitExceededError, NotDelivered
+
+__all__ = ["ROUNDING_S", "Clock", "MonotonicClock", "Pacing", "VirtualClock"]
 
 ROUNDING_S = 1e-6
 """Who sleeps for exactly as long as is left may wake up a rounding error early."""
@@ -53,3 +58,52 @@ class VirtualClock:
     def sleep_s(self, duration_s: float) -> None:
         """Move on by so long [s], at once."""
         self._now_s += max(0.0, duration_s)
+
+
+class Pacing:
+    """The times of a session's stimuli, and how long its limits have the next one wait.
+
+    The first one waits a whole interval, too: nobody knows what came before.
+
+    Args:
+        limits: the interval, the rest and the period.
+        clock: tells the time.
+        earlier_s: how long ago each earlier stimulus was [s], in any order.
+    """
+
+    def __init__(self, limits: Limits, clock: Clock, earlier_s: Sequence[float] = ()) -> None:
+        self._limits, self._clock = limits, clock
+        self._since_s = clock.now_s()
+        self._times_s = [self._since_s - age_s for age_s in sorted(earlier_s, reverse=True)]
+
+    def wait_s(self, interval_s: float = 0.0) -> float:
+        """How long until the next stimulus may come [s].
+
+        Args:
+            interval_s: the least between the last one and it that is asked for beside the limits [s].
+        """
+        last_s = self._times_s[-1] if self._times_s else self._since_s
+        due_s = max(self._limits.earliest_s(self._times_s, self._since_s), last_s + interval_s)
+        return max(0.0, due_s - self._clock.now_s())
+
+    def begin_anew(self) -> None:
+        """From now on there may be stimuli; the next one comes a whole interval later at the earliest."""
+        self._since_s = self._clock.now_s()
+
+    def came(self) -> None:
+        """A stimulus has just come."""
+        self._times_s.append(self._clock.now_s())
+
+    @contextmanager
+    def delivering(self) -> Iterator[None]:
+        """Within, a stimulus is delivered. It counts from its end, even where it fails, unless it was refused."""
+        self.came()
+        try:
+            yield
+        except (NotDelivered, LimitExceededError):
+            self._times_s.pop()
+            raise
+        except BaseException:
+            self._times_s[-1] = self._clock.now_s()
+            raise
+        self._times_s[-1] = self._clock.now_s()

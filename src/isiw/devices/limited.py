@@ -6,9 +6,8 @@ import dataclasses
 import threading
 from collections.abc import Callable, Sequence
 
-from isiw.devices.clock import ROUNDING_S, Clock, VirtualClock
+from isiw.devices.clock import ROUNDING_S, Clock, Pacing, VirtualClock
 from isiw.devices.limits import Limits
-from isiw.devices.pacing import Pacing
 from isiw.devices.protocol import Answer, Device, DeviceInfo, readiness_of, require_staged
 from isiw.errors import DeviceError, LimitExceededError, NotDelivered
 from isiw.trials import Stimulus
@@ -50,6 +49,7 @@ class LimitedDevice:
         earlier_s: how long ago each earlier delivery was to the same person [s], as far as they count for a block or a
             period.
         dead_man: is called before each delivery; anything but True refuses it.
+        waits_for_nobody: whether a virtual clock may be that of a real device, as where somebody checks one.
 
     Raises:
         DeviceError: a virtual clock, which waits for nobody, for a device that is not simulated.
@@ -64,9 +64,11 @@ class LimitedDevice:
         delivered: int = 0,
         earlier_s: Sequence[float] = (),
         dead_man: Callable[[], bool] | None = None,
+        waits_for_nobody: bool = False,
     ) -> None:
         info = device.describe()
-        require_real_time(info, clock)
+        if not waits_for_nobody:
+            require_real_time(info, clock)
         self._device, self._info, self._dead_man = device, info, dead_man
         self._limits = Limits(**dataclasses.asdict(limits))
         self._delivered = delivered

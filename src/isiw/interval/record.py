@@ -18,7 +18,7 @@ from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.production import PRODUCTION_VERSION, Block, Production, ProductionHeader
 from isiw.log.records import Records
 from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import SCHEMA_VERSION, Event, Header
+from isiw.log.schema import SCHEMA_VERSION, Event, Header, ThresholdHeader
 from isiw.log.writer import LogWriter
 
 __all__ = ["NEAR_MS", "ProductionRecord", "begin_log", "continue_log", "read_productions"]
@@ -149,11 +149,11 @@ def read_productions(path: str | Path) -> ProductionRecord:
 def _record_of(found: Salvage) -> ProductionRecord:
     records = Records.of(found)
     if any(message.topic == "/header" for message in found.messages):
-        kind = kind_of(records.header_of(Header, SCHEMA_VERSION))
+        kind = kind_of(records.header_of((Header, ThresholdHeader), SCHEMA_VERSION))
         raise of_another_kind(found.path, kind, LogKind.PRODUCTION)
     return ProductionRecord(
         found.path,
-        records.header_of(ProductionHeader, PRODUCTION_VERSION),
+        records.header_of((ProductionHeader,), PRODUCTION_VERSION),
         tuple(record for record in records.history if isinstance(record, Production)),
         tuple(record for record in records.history if isinstance(record, Event)),
         records.told_losses,

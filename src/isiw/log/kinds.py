@@ -1,15 +1,21 @@
-"""What a log is of, and how to look at one that is of something else than is wanted."""
+"""What a log is of, how to look at it, and how to continue it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
+from typing import Final
 
 from isiw.errors import LogError
-from isiw.log.schema import Header
+from isiw.log.durable import log_of
+from isiw.log.schema import RUN_KEY, SERVED_KEY, AnyHeader, Header
 from isiw.text.commands import command
 
-__all__ = ["LogKind", "kind_of", "of_another_kind"]
+__all__ = ["OWN_LOOP", "LogKind", "continued_by", "kind_of", "of_another_kind"]
+
+OWN_LOOP: Final = "a loop of the lab's own"
+"""What the log calls the device of a session whose loop is not isiw's."""
 
 
 class LogKind(StrEnum):
@@ -33,14 +39,62 @@ class LogKind(StrEnum):
             case LogKind.PRODUCTION:
                 return command("interval", path, "--show")
 
+    def continued_by(self, path: Path) -> str:
+        """The command that continues a log of this kind.
 
-def kind_of(header: Header) -> LogKind:
-    """What a log is of in which stimuli are given.
+        Args:
+            path: the log.
+        """
+        match self:
+            case LogKind.SEARCH:
+                return command("resume", path)
+            case LogKind.THRESHOLD:
+                return command("threshold", path, "--resume")
+            case LogKind.PRODUCTION:
+                return command("interval", path, "--resume")
+
+
+_OF_TAG: Final = {"session": LogKind.SEARCH, "threshold": LogKind.THRESHOLD, "production": LogKind.PRODUCTION}
+
+
+def kind_of(header: AnyHeader) -> LogKind:
+    """What a log is of.
 
     Args:
         header: the log's.
     """
-    return LogKind.SEARCH if header.intensities is None else LogKind.THRESHOLD
+    return _OF_TAG[header.kind]
+
+
+def continued_by(
+    path: Path, header: AnyHeader, config: Path | None = None, *, end_lost: bool = False, changed: bool = False
+) -> str:
+    """How to continue what a log is of: a command, or the call that a loop of the lab's own was begun with.
+
+    Args:
+        path: the log.
+        header: its header.
+        config: the configuration that it was run with, if it is known.
+        end_lost: whether its end is missing, so that somebody has to say how many stimuli, N, it told of.
+        changed: whether the configuration has to be named, as something in it is to be changed.
+    """
+    if not isinstance(header, Header):
+        return kind_of(header).continued_by(path)
+    if SERVED_KEY in header.config:
+        lost = ", with N as lost_pulses in its body" if end_lost else ""
+        return f"POST /sessions/{log_of(path).stem}/resume to isiw serve{lost}"
+    if header.device.name == OWN_LOOP:
+        lost = ", lost_pulses=N" if end_lost else ""
+        return f'isiw.open_session(strategy, "{path}", resume=True{lost})'
+    words, run = ["resume", *(["--lost-pulses", "N"] if end_lost else []), path], header.config.get(RUN_KEY)
+    if isinstance(run, Mapping) and "device" not in run and not changed:
+        subject = run.get("subject")
+        recorded = isinstance(subject, Mapping) and subject.get("kind") == "recorded"
+        return command(*words, *(["--data", "DIR"] if recorded else []))  # no log says where recorded EMG is
+    if config is not None or changed:
+        return command(*words, config or "CONFIG")
+    by_hand = "where CONFIG names your device, or in your own software isiw.resume(path, device).run()"
+    return f"{command(*words, 'CONFIG')}, {by_hand}"
 
 
 def of_another_kind(path: Path, kind: LogKind, wanted: LogKind) -> LogError:

@@ -10,7 +10,7 @@ from typing import Final
 from isiw.errors import InvalidValueError
 from isiw.files import in_the_way, is_reserved, opened, put
 
-__all__ = ["check_output", "is_log", "made_folder", "write_output"]
+__all__ = ["check_output", "is_mcap", "made_folder", "write_output"]
 
 _LOG: Final = b"\x89MCAP"
 """What every log begins with."""
@@ -60,7 +60,7 @@ def check_output(path: str | Path, *, overwrite: bool = False) -> None:
         raise InvalidValueError("Windows keeps this name for itself", got=str(target), remedy="Choose another name.")
     if (other := in_the_way(target)) is not None:
         raise InvalidValueError(f"there is {other} of this name", got=str(target), remedy="Name a file.")
-    if overwrite and is_log(target):
+    if overwrite and is_mcap(target):
         raise InvalidValueError("a log is never overwritten", got=str(target), remedy="Choose another path.")
     if not overwrite and target.exists():
         raise _taken(target)
@@ -94,7 +94,7 @@ def _taken(target: Path) -> InvalidValueError:
     )
 
 
-def is_log(path: Path) -> bool:
+def is_mcap(path: Path) -> bool:
     """Whether a file begins as every log does, whatever its name.
 
     Args:

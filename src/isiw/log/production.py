@@ -10,7 +10,7 @@ The file is written as a session's is. These two topics have no frozen channel n
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -70,6 +70,7 @@ class _Record(BaseModel):
 class ProductionHeader(_Record):
     """What a task is; the seed draws the lights of mode 2."""
 
+    kind: Literal["production"] = "production"
     schema_version: int = PRODUCTION_VERSION
     isiw_version: str
     created: str

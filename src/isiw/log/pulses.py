@@ -9,7 +9,7 @@ from pathlib import Path
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.durable import kept_for, log_exists, log_of
-from isiw.log.outputs import is_log
+from isiw.log.outputs import is_mcap
 from isiw.log.reader import of_production, read_any
 from isiw.log.salvage import Message, Salvage, holds, salvage
 from isiw.log.schema import Event, Intent, Record
@@ -93,7 +93,7 @@ def _recent(folder: Path, period_s: float) -> set[Path]:
     since_s = time.time() - period_s
     try:
         recent = [file for file in _files(folder) if file.is_file() and file.stat().st_mtime >= since_s]
-        return {log_of(file.resolve()) for file in recent if file.suffix in _SUFFIXES or is_log(file)}
+        return {log_of(file.resolve()) for file in recent if file.suffix in _SUFFIXES or is_mcap(file)}
     except OSError as error:
         raise LogError(
             f"a folder of earlier logs cannot be read: {error.strerror}",

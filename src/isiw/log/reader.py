@@ -3,33 +3,35 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import cast
 
 import pandas as pd
 
-from isiw.errors import DamagedLogError, InvalidValueError, LogError
+from isiw.errors import DamagedLogError, InvalidValueError
 from isiw.findings import lacking
 from isiw.log.frames import trial_frame
-from isiw.log.kinds import LogKind, kind_of, of_another_kind
+from isiw.log.headers import require_read
+from isiw.log.kinds import LogKind, continued_by, of_another_kind
 from isiw.log.onsets import Onset
-from isiw.log.records import Records
+from isiw.log.records import Records, unknown_of
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import (
-    MOST_TRIALS,
     SCHEMA_VERSION,
     Estimate,
     Event,
     Header,
     Intent,
     Record,
+    ThresholdHeader,
 )
+from isiw.log.threshold import ThresholdRecord
 from isiw.log.verdicts import VERDICTS, under_all
 from isiw.signals.amplitudes import is_silent
 from isiw.strategy.stopping import StopDecision
-from isiw.text.commands import command
 from isiw.trials import Channel, Stimulus, Trial, TrialTable
 
 __all__ = ["SessionRecord", "of_production", "read_any", "read_salvaged", "read_session", "require_records"]
@@ -96,13 +98,7 @@ class SessionRecord:
         Raises:
             LogError: one of them cannot be read.
         """
-        needed = {part: why for part, why in self.unread.items() if part in parts or not parts}
-        if needed:
-            raise LogError(
-                f"what is needed of the log's header cannot be read: {', '.join(needed)}",
-                got=f"{self.path}: {'; '.join(needed.values())}",
-                remedy="Use the version of isiw that wrote it; isiw show, plot, report and export show the rest.",
-            )
+        require_read(self.path, self.unread, parts)
 
     @cached_property
     def table(self) -> TrialTable:
@@ -129,7 +125,7 @@ class SessionRecord:
                 "the log's end is missing, so nobody knows how many stimuli were given",
                 got=str(self.path),
                 remedy="Look at the stimulator's counter, and resume with the number N of pulses that isiw show does "
-                f"not list: {command('resume', '--lost-pulses', 'N', self.path)}, or isiw.resume(..., lost_pulses=N).",
+                f"not list: {continued_by(self.path, self.header, end_lost=True)}",
             )
 
     @property
@@ -183,12 +179,7 @@ class SessionRecord:
     @cached_property
     def unknown(self) -> tuple[Intent, ...]:
         """Stimuli that were delivered, or may have been, and whose outcome is not in the log."""
-        known = {trial.index for trial in self.table}
-        intents = _standing(self.history)
-        last = max(itertools.chain(known, intents, [min(self.delivered, MOST_TRIALS) - 1]))
-        return tuple(
-            intents.get(number, Intent(trial=number, isi_ms=None)) for number in range(last + 1) if number not in known
-        )
+        return unknown_of(self.history, {trial.index for trial in self.table}, self.delivered)
 
     @property
     def unknown_trials(self) -> tuple[Trial, ...]:
@@ -218,25 +209,24 @@ def read_session(path: str | Path) -> SessionRecord:
     return read_salvaged(salvage(path))
 
 
-def read_salvaged(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionRecord:
-    """The search in what was salvaged from a log.
+def read_salvaged(salvaged: Salvage) -> SessionRecord:
+    """The session in what was salvaged from a log.
 
     Args:
         salvaged: what was read.
-        wanted: what the log should be of.
 
     Raises:
         LogError: the log is of something else, or from a newer version.
         DamagedLogError: not even the header can be read.
     """
-    record = read_any(salvaged, wanted)
-    if (kind := kind_of(record.header)) is not wanted:
-        raise of_another_kind(record.path, kind, wanted)
+    record = read_any(salvaged)
+    if isinstance(record, ThresholdRecord):
+        raise of_another_kind(record.path, LogKind.THRESHOLD, LogKind.SEARCH)
     return record
 
 
-def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionRecord:
-    """What was salvaged from a log, be it of a search for a window or of a motor threshold.
+def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionRecord | ThresholdRecord:
+    """What was salvaged from a log in which a person is stimulated.
 
     Args:
         salvaged: what was read.
@@ -249,18 +239,22 @@ def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionReco
     if of_production(salvaged):
         raise of_another_kind(salvaged.path, LogKind.PRODUCTION, wanted)
     records = Records.of(salvaged)
-    header = records.header_of(Header, SCHEMA_VERSION)
+    header = cast("Header | ThresholdHeader", records.header_of((Header, ThresholdHeader), SCHEMA_VERSION))
+    history, losses = tuple(records.history), records.told_losses
+    finished, end_lost, unread = salvaged.finished, salvaged.end_lost, records.unread
+    if isinstance(header, ThresholdHeader):
+        return ThresholdRecord(salvaged.path, header, history, losses, finished, end_lost, records.delivered, unread)
     return SessionRecord(
         salvaged.path,
         header,
-        tuple(records.history),
+        history,
         records.waveforms,
-        records.told_losses,
-        salvaged.finished,
-        salvaged.end_lost,
-        _delivered(salvaged, records.history),
+        losses,
+        finished,
+        end_lost,
+        records.delivered,
         records.onsets.by_trial,
-        records.unread,
+        unread,
     )
 
 
@@ -271,23 +265,6 @@ def of_production(salvaged: Salvage) -> bool:
         salvaged: what was read.
     """
     return any(message.topic in {"/production_header", "/production"} for message in salvaged.messages)
-
-
-def _delivered(salvaged: Salvage, history: Sequence[Record]) -> int:
-    """How many stimuli the index counts, those of lost records among them; refused ones do not count."""
-    lost = salvaged.counted.get("/intent", 0) - sum(isinstance(record, Intent) for record in history)
-    return max(lost + len(_standing(history)), salvaged.counted.get("/trial", 0))
-
-
-def _standing(history: Sequence[Record]) -> dict[int, Intent]:
-    """What was about to be delivered and was not refused, by trial; what was asked for again is one stimulus."""
-    intents: dict[int, Intent] = {}
-    for entry in history:
-        if isinstance(entry, Intent):
-            intents[entry.trial] = entry
-        elif isinstance(entry, Event) and entry.kind == "refused" and entry.trial is not None:
-            intents.pop(entry.trial, None)
-    return intents
 
 
 def require_records(records: Iterable[object]) -> None:

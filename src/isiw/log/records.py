@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, TypeVar
@@ -12,9 +15,9 @@ from isiw.errors import DamagedLogError, LogError
 from isiw.log.earlier import with_kinds
 from isiw.log.headers import first_fault, header_in_parts
 from isiw.log.onsets import Onsets
-from isiw.log.production import Production, ProductionHeader
+from isiw.log.production import Production
 from isiw.log.salvage import Message, Salvage
-from isiw.log.schema import MOST_TRIALS, AnyHeader, Event, Header, Intent, PulseOutcome, Record, Waveform
+from isiw.log.schema import MOST_TRIALS, AnyHeader, Event, Intent, PulseOutcome, Record, Waveform
 from isiw.log.topics import decode
 from isiw.log.writer import CONFIGURATION
 from isiw.text.json_texts import read_json
@@ -22,9 +25,9 @@ from isiw.text.numbers import counted
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial
 
-__all__ = ["Records"]
+__all__ = ["Records", "unknown_of"]
 
-HeaderKind = TypeVar("HeaderKind", Header, ProductionHeader)
+HeaderKind = TypeVar("HeaderKind", bound=AnyHeader)
 
 MOST_LOSSES: Final = 50
 """Losses that are listed one by one."""
@@ -76,22 +79,31 @@ class Records:
             listed = (f"Only trials up to {MOST_TRIALS - 1} are read: {records} of later ones.", *listed)
         return listed if left <= 0 else (*listed, f"{left} more losses are not listed.")
 
-    def header_of(self, kind: type[HeaderKind], newest: int) -> HeaderKind:
+    def header_of(self, kinds: tuple[type[HeaderKind], ...], newest: int) -> HeaderKind:
         """The log's header, from its records or else from the configuration that is attached.
 
         Args:
-            kind: of header.
+            kinds: of header that it may be.
             newest: version that this isiw reads.
 
         Raises:
             LogError: the log is from a newer version.
             DamagedLogError: the header cannot be read.
         """
-        header = self.header if isinstance(self.header, kind) else None
-        if header is None or (self.losses and CONFIGURATION in self.salvaged.attachments):
+        header = self.header
+        if not isinstance(header, kinds) or (self.losses and CONFIGURATION in self.salvaged.attachments):
             # what is lost may have been the last header
-            header, self.unread = _header_from_attachment(self.salvaged, kind)
+            header, self.unread = _header_from_attachment(self.salvaged)
+        if not isinstance(header, kinds):
+            raise _lost_header(self.salvaged)
         return _checked_version(header, newest, self.salvaged.path)
+
+    @property
+    def delivered(self) -> int:
+        """How many stimuli the index counts, those of lost records among them; refused ones do not count."""
+        counted, history = self.salvaged.counted, self.history
+        lost = counted.get("/intent", 0) - sum(isinstance(record, Intent) for record in history)
+        return max(lost + len(_standing(history)), counted.get("/trial", 0))
 
     def take(self, message: Message) -> None:
         """Take one more record."""
@@ -106,7 +118,7 @@ class Records:
                 return
             self.losses.append(f"A record on {message.topic} makes no sense and is left out: {first_fault(error)}")
             return
-        if isinstance(record, Header | ProductionHeader):
+        if isinstance(record, AnyHeader):
             self.header, self.unread = record, unread
         elif (trial := _concluded(record)) is not None and trial in self._trials:
             self.losses.append(f"A second record of trial {trial} is left out.")
@@ -152,19 +164,46 @@ def _concluded(record: Record) -> int | None:
     return record.trial if isinstance(record, PulseOutcome | Production) else None
 
 
-def _header_from_attachment(salvaged: Salvage, kind: type[HeaderKind]) -> tuple[HeaderKind, dict[str, str]]:
+def unknown_of(history: Sequence[Record], known: AbstractSet[int], delivered: int) -> tuple[Intent, ...]:
+    """Stimuli that were delivered, or may have been, and whose outcome is not in the log.
+
+    Args:
+        history: the records of the log, in order.
+        known: the numbers of those whose outcome is.
+        delivered: how many there were by the index.
+    """
+    intents = _standing(history)
+    last = max(itertools.chain(known, intents, [min(delivered, MOST_TRIALS) - 1]))
+    return tuple(
+        intents.get(number, Intent(trial=number, isi_ms=None)) for number in range(last + 1) if number not in known
+    )
+
+
+def _standing(history: Sequence[Record]) -> dict[int, Intent]:
+    """What was about to be delivered and was not refused, by trial; what was asked for again is one stimulus."""
+    intents: dict[int, Intent] = {}
+    for entry in history:
+        if isinstance(entry, Intent):
+            intents[entry.trial] = entry
+        elif isinstance(entry, Event) and entry.kind == "refused" and entry.trial is not None:
+            intents.pop(entry.trial, None)
+    return intents
+
+
+def _header_from_attachment(salvaged: Salvage) -> tuple[AnyHeader, dict[str, str]]:
     text = salvaged.attachments.get(CONFIGURATION, b"")
     try:
-        values = parsed(text.decode())
-        if kind is Header:
-            return header_in_parts(values)  # type: ignore[return-value] # which is this kind
-        return kind.model_validate(values), {}
+        return header_in_parts(parsed(text.decode()))
     except (ValueError, RecursionError) as error:
-        raise DamagedLogError(
-            "the log's header is lost",
-            got=str(salvaged.path),
-            remedy="Its records may still be readable with any MCAP tool.",
-        ) from error
+        raise _lost_header(salvaged) from error
+
+
+def _lost_header(salvaged: Salvage) -> DamagedLogError:
+    return DamagedLogError(
+        "the log's header is lost",
+        got=str(salvaged.path),
+        remedy="Its records may still be readable with any MCAP tool.",
+    )
 
 
 def _checked_version(header: HeaderKind, newest: int, path: Path) -> HeaderKind:

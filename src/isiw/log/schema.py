@@ -7,7 +7,7 @@
     /estimate   what was believed after the trial, and what is asked next
     /event      what happened: an exclusion, a limit, a fault, a resumption, a pause, a note … (`EventKind`)
 
-A log of a motor threshold has intents with an intensity, and in place of trials and estimates
+A log of a motor threshold has a header of its own, intents with an intensity, and in place of trials and estimates
 
     /threshold/pulse    what came of a pulse
     /threshold/belief   what was believed of the threshold after it
@@ -22,9 +22,21 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    FiniteFloat,
+    Tag,
+    TypeAdapter,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
 
-from isiw.checks import mean_and_sd, number
+from isiw.checks import MOST_MEP_MV, mean_and_sd, number
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
@@ -36,17 +48,19 @@ from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, ThresholdEstimate
 from isiw.text.stimuli import STIMULI, StimulusWords
 from isiw.text.summary import summary
-from isiw.trials import Channel, Trial
+from isiw.trials import Channel, Stimulus, Trial
 from isiw.types import Conditioning, FloatArray
 from isiw.visit import Visit, VisitProtocol
 from isiw.window import Window, WindowEstimate, depression, nothing_found
 
 __all__ = [
+    "ANY_HEADER",
     "MOST_TRIALS",
     "RUN_KEY",
     "SCHEMA_VERSION",
     "SERVED_KEY",
     "AnyHeader",
+    "Correction",
     "Estimate",
     "Event",
     "EventKind",
@@ -56,7 +70,9 @@ __all__ = [
     "Record",
     "StrategyRecipe",
     "ThresholdBelief",
+    "ThresholdHeader",
     "Waveform",
+    "kind_tag",
     "with_reference",
 ]
 
@@ -73,9 +89,6 @@ Number: TypeAlias = Annotated[float, WithJsonSchema({"type": ["number", "string"
 Numbers: TypeAlias = Annotated[
     tuple[float, ...], WithJsonSchema({"type": "array", "items": {"type": ["number", "string"]}})
 ]
-
-
-"""How the text of a note ended before there was a field for its key."""
 
 
 class _Record(BaseModel):
@@ -120,31 +133,38 @@ def with_reference(space: object) -> object:
     return {"reference": "impact", **space} if isinstance(space, dict) else space
 
 
-class Header(_Record):
-    """What a session is, written before anything else, and again before it goes on: the last one holds.
-
-    `asks_from` is the first trial that was asked with these versions. `intensities` is given where the motor threshold
-    is sought: then every pulse is TMS alone, and `space` has no meaning.
-    """
+class _Header(_Record):
+    """What the header of a log says in which a person is stimulated; its tag is `kind`, which older logs lack."""
 
     schema_version: int = SCHEMA_VERSION
     isiw_version: str
     created: str
     subject: str = ""
     seed: int
+    device: DeviceInfo
+    versions: dict[str, str] = Field(default_factory=dict)
+    config: dict[str, Any] = Field(default_factory=dict)
+
+
+class Header(_Header):
+    """What a session is, written before anything else, and again before it goes on: the last one holds.
+
+    `asks_from` is the first trial that was asked with these versions. `belief_version` and `engine_version` grow where
+    the same settings come to believe something else, or compute it otherwise; 1 is what older logs mean.
+    """
+
+    kind: Literal["session"] = "session"
     strategy: StrategyRecipe
     space: Annotated[DesignSpace, BeforeValidator(with_reference)]
     limits: Limits
-    device: DeviceInfo
     signals: SignalLimits
     timeout_s: float = 30.0
     ask_deadline_s: float | None = None
     visit: Visit = Visit()
     protocol: VisitProtocol = VisitProtocol()
-    versions: dict[str, str] = Field(default_factory=dict)
     asks_from: int = 0
-    config: dict[str, Any] = Field(default_factory=dict)
-    intensities: IntensityRange | None = None
+    belief_version: int = 1
+    engine_version: int = 1
 
     @property
     def conditioning(self) -> Conditioning:
@@ -164,6 +184,26 @@ class Header(_Record):
         return self.device.detection_limit_mv if told is None else float(told)
 
 
+class ThresholdHeader(_Header):
+    """What a search for a motor threshold is: every pulse is TMS alone, at an intensity of a range."""
+
+    kind: Literal["threshold"] = "threshold"
+    search: StrategyRecipe
+    intensities: IntensityRange
+    min_iti_s: float
+    max_pulses: int
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_before(cls, values: Any) -> Any:
+        """An older header is a session's, whose space and signals have no meaning."""
+        recipe, limits = (values.get(key) if isinstance(values, dict) else None for key in ("strategy", "limits"))
+        if not isinstance(recipe, dict) or not isinstance(limits, dict):
+            return values
+        search = {**recipe, "name": str(recipe.get("name", "")).removeprefix("threshold/")}
+        return {**limits, **values, "search": search}
+
+
 class Intent(_Record):
     """What is about to be delivered: a pair of stimuli, or without an ISI TMS alone or a tap alone."""
 
@@ -172,6 +212,16 @@ class Intent(_Record):
     t_s: float = 0.0
     tap_alone: bool = False
     intensity_pct_mso: float | None = None
+
+    @classmethod
+    def of(cls, stimulus: Stimulus, t_s: float) -> Self:
+        """The intent to deliver a stimulus.
+
+        Args:
+            stimulus: what is to be delivered.
+            t_s: the time [s].
+        """
+        return cls(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=t_s, tap_alone=stimulus.tap_alone)
 
 
 class PulseOutcome(_Record):
@@ -373,6 +423,7 @@ EventKind: TypeAlias = Literal[
     "exclusion",
     "inclusion",
     "acceptance",
+    "correction",
     "limit",
     "fault",
     "resume",
@@ -386,13 +437,23 @@ EventKind: TypeAlias = Literal[
 ]
 
 
+class Correction(_Record):
+    """The values of a trial that were others than its record says; None for those that stay."""
+
+    isi_ms: FiniteFloat | None = None
+    isi_sd_ms: FiniteFloat | None = Field(default=None, ge=0)
+    mep_mv: FiniteFloat | None = Field(default=None, ge=0, le=MOST_MEP_MV)
+    mep_sd_mv: FiniteFloat | None = Field(default=None, ge=0)
+    background_rms_uv: FiniteFloat | None = Field(default=None, ge=0)
+
+
 class Event(_Record):
     """Something that happened to a session.
 
     `trial` is the one that was judged by an operator, refused or answered late, and otherwise the last one before the
     event. What is "refused" was not delivered, whatever the intent before it says. A note with the `key` of an earlier
-    one is not logged. `finding` is
-    what a doubt or a pause is about.
+    one is not logged. `finding` is what a doubt or a pause is about, and `corrected` what a correction says that the
+    trial's values really were.
     """
 
     kind: EventKind
@@ -400,9 +461,28 @@ class Event(_Record):
     trial: TrialNumber | None = None
     text: str = ""
     key: str | None = None
+    corrected: Correction | None = None
 
 
-AnyHeader: TypeAlias = Header | ProductionHeader
+def kind_tag(header: Any) -> str | None:
+    """The kind of a header, be it a value or what was read of one; without a tag its fields say which."""
+    if not isinstance(header, Mapping):
+        return getattr(header, "kind", None)
+    untagged = "threshold" if header.get("intensities") else "production" if "blocks" in header else "session"
+    return str(header.get("kind", untagged))
+
+
+AnyHeader: TypeAlias = Header | ThresholdHeader | ProductionHeader
+ANY_HEADER: Final[TypeAdapter[AnyHeader]] = TypeAdapter(
+    Annotated[
+        Annotated[Header, Tag("session")]
+        | Annotated[ThresholdHeader, Tag("threshold")]
+        | Annotated[ProductionHeader, Tag("production")],
+        Discriminator(kind_tag),
+    ]
+)
+"""What turns a header into JSON and back, by its kind."""
+
 Record: TypeAlias = (
     AnyHeader | Intent | Trial | Waveform | Estimate | Event | PulseOutcome | ThresholdBelief | Production
 )

@@ -1,59 +1,70 @@
-"""Reading the log of a search for the motor threshold."""
+"""A search for the motor threshold as its log tells it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
-from isiw.log.kinds import LogKind
-from isiw.log.reader import SessionRecord, read_salvaged
-from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import PulseOutcome
+from isiw.log.headers import require_read
+from isiw.log.records import unknown_of
+from isiw.log.schema import Event, Intent, PulseOutcome, Record, ThresholdHeader
 
-__all__ = ["outcomes", "pulses_given", "read_threshold", "read_threshold_salvaged"]
-
-
-def read_threshold(path: str | Path) -> SessionRecord:
-    """Read the log of a search for the motor threshold, finished or not, whole or damaged.
-
-    Args:
-        path: the log, with or without `.part`.
-
-    Raises:
-        LogError: no such file, not a log, or one of something else.
-        DamagedLogError: a log of which not even the header can be read.
-    """
-    return read_threshold_salvaged(salvage(path))
+__all__ = ["ThresholdRecord"]
 
 
-def read_threshold_salvaged(salvaged: Salvage) -> SessionRecord:
-    """The search for the motor threshold in what was salvaged from a log.
+@dataclass(frozen=True, eq=False)
+class ThresholdRecord:
+    """A search for the motor threshold.
 
     Args:
-        salvaged: what was read.
-
-    Raises:
-        LogError: the log is of something else.
+        path: the file that was read.
+        header: what the search is.
+        history: intents, outcomes, beliefs and events, in the order in which they were logged.
+        losses: what could not be read, a sentence each; empty if the log is whole.
+        finished: whether the search closed its log.
+        end_lost: whether its end is missing, so that nobody knows how many pulses it told of.
+        delivered: how many pulses were given by its index, or may have been.
+        unread: parts of the header that this version cannot read, and why.
     """
-    return read_salvaged(salvaged, LogKind.THRESHOLD)
 
+    path: Path
+    header: ThresholdHeader
+    history: tuple[Record, ...] = field(repr=False)
+    losses: tuple[str, ...]
+    finished: bool
+    end_lost: bool
+    delivered: int
+    unread: Mapping[str, str]
 
-def outcomes(record: SessionRecord) -> tuple[PulseOutcome, ...]:
-    """What came of each pulse, as it counts after what an operator said about it.
+    def require_read(self, *parts: str) -> None:
+        """As `SessionRecord.require_read`."""
+        require_read(self.path, self.unread, parts)
 
-    Args:
-        record: the log.
-    """
-    excluded = {event.trial: event.text for event in record.events if event.kind == "exclusion"}
-    found = [entry for entry in record.history if isinstance(entry, PulseOutcome)]
-    return tuple(
-        each.model_copy(update={"reason": excluded[each.trial]}) if each.trial in excluded else each for each in found
-    )
+    @cached_property
+    def outcomes(self) -> tuple[PulseOutcome, ...]:
+        """What came of each pulse, as it counts after what an operator said about it."""
+        excluded = {
+            event.trial: event.text for event in self.history if isinstance(event, Event) and event.kind == "exclusion"
+        }
+        return tuple(
+            each.model_copy(update={"reason": excluded[each.trial]}) if each.trial in excluded else each
+            for each in self.history
+            if isinstance(each, PulseOutcome)
+        )
 
+    @property
+    def intents(self) -> tuple[Intent, ...]:
+        """What was about to be given."""
+        return tuple(record for record in self.history if isinstance(record, Intent))
 
-def pulses_given(record: SessionRecord) -> int:
-    """How many pulses were given, or may have been; those that an operator left without giving them do not count.
+    @property
+    def unknown(self) -> tuple[Intent, ...]:
+        """Pulses that were given, or may have been, and whose outcome is not in the log."""
+        return unknown_of(self.history, {outcome.trial for outcome in self.outcomes}, self.delivered)
 
-    Args:
-        record: the log.
-    """
-    return len({intent.trial for intent in record.unknown} | {outcome.trial for outcome in outcomes(record)})
+    @property
+    def given(self) -> int:
+        """How many pulses were given, or may have been; one that an operator has withdrawn does not count."""
+        return len(self.outcomes) + len(self.unknown)

@@ -14,6 +14,7 @@ from pydantic_core import PydanticSerializationError
 from isiw.errors import InvalidValueError, told
 from isiw.log.production import Production, ProductionHeader
 from isiw.log.schema import (
+    ANY_HEADER,
     MOST_TRIALS,
     Estimate,
     Event,
@@ -22,6 +23,7 @@ from isiw.log.schema import (
     PulseOutcome,
     Record,
     ThresholdBelief,
+    ThresholdHeader,
     Waveform,
 )
 from isiw.text.json_texts import refuse_doubled
@@ -51,7 +53,7 @@ _KINDS: dict[str, type[Any]] = {
     "/production_header": ProductionHeader,
     "/production": Production,
 }
-_TOPIC_OF_KIND = {kind: topic for topic, kind in _KINDS.items()}
+_TOPIC_OF_KIND = {kind: topic for topic, kind in _KINDS.items()} | {ThresholdHeader: "/header"}
 
 CHANNEL_IDS: Final[Mapping[str, int]] = MappingProxyType(
     {
@@ -85,7 +87,9 @@ def announcement(number: int, topic: str) -> tuple[str, dict[str, str]]:
     return f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic}
 
 
-_ADAPTERS: dict[str, TypeAdapter[Any]] = {topic: TypeAdapter(kind) for topic, kind in _KINDS.items()}
+_ADAPTERS: dict[str, TypeAdapter[Any]] = {topic: TypeAdapter(kind) for topic, kind in _KINDS.items()} | {
+    "/header": ANY_HEADER
+}
 _WAVEFORM: TypeAdapter[Any] = TypeAdapter(Waveform)
 
 
@@ -173,4 +177,5 @@ def json_schema(topic: str) -> tuple[str, bytes]:
 @cache
 def _json_schema(topic: str) -> tuple[str, bytes]:
     kind = _KINDS.get(topic, Waveform)
-    return f"isiw.{kind.__name__}", json.dumps(adapter(topic).json_schema(mode="serialization")).encode()
+    schema = {"type": "object"} | adapter(topic).json_schema(mode="serialization")
+    return f"isiw.{kind.__name__}", json.dumps(schema).encode()

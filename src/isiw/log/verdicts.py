@@ -4,22 +4,33 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable
-from typing import Final
+from typing import Any, Final
 
 from isiw.checks import text
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
-from isiw.log.schema import Event, EventKind
+from isiw.log.schema import Correction, Event, EventKind
 from isiw.signals.values import implausible_amplitude
 from isiw.trials import Trial, TrialTable
 
-__all__ = ["LOOKED_AT", "VERDICTS", "acceptance", "excluded_by", "exclusion", "inclusion", "under", "under_all"]
+__all__ = [
+    "LOOKED_AT",
+    "VERDICTS",
+    "acceptance",
+    "correction",
+    "excluded_by",
+    "exclusion",
+    "inclusion",
+    "under",
+    "under_all",
+]
 
-VERDICTS: Final[dict[EventKind, Callable[[Trial], Trial]]] = {
-    "exclusion": lambda trial: dataclasses.replace(trial, excluded=True),
-    "inclusion": lambda trial: dataclasses.replace(trial, excluded=False),
-    "acceptance": Trial.accepted_anyway,
+VERDICTS: Final[dict[EventKind, Callable[[Trial, Event], Trial]]] = {
+    "exclusion": lambda trial, _: dataclasses.replace(trial, excluded=True),
+    "inclusion": lambda trial, _: dataclasses.replace(trial, excluded=False),
+    "acceptance": lambda trial, _: trial.accepted_anyway(),
+    "correction": lambda trial, event: dataclasses.replace(trial, **_right_values(event)),
 }
 """What each kind of verdict makes of a trial."""
 
@@ -37,7 +48,7 @@ def under(trial: Trial, event: Event) -> Trial:
         event: what happened.
     """
     verdict = VERDICTS.get(event.kind)
-    return trial if verdict is None or event.trial != trial.index else verdict(trial)
+    return trial if verdict is None or event.trial != trial.index else verdict(trial, event)
 
 
 def under_all(trials: TrialTable, events: Iterable[Event]) -> TrialTable:
@@ -61,7 +72,7 @@ def excluded_by(events: Iterable[Event]) -> list[int]:
     """
     excluded: list[int] = []
     for event in events:
-        if event.kind in VERDICTS and event.trial is not None:
+        if event.kind in VERDICTS and event.kind != "correction" and event.trial is not None:
             excluded = [number for number in excluded if number != event.trial]
             if event.kind == "exclusion":
                 excluded.append(event.trial)
@@ -121,6 +132,27 @@ def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:
         )
     _require_of_a_muscle(trial, trial.mep_mv)
     return Event(kind="acceptance", trial=number, text=f"Accepted by the operator all the same: {trial.reason}.")
+
+
+def correction(trials: TrialTable, number: int, why: str, corrected: Correction) -> Event:
+    """That some values of a trial were others than its record says; the record stays as it is.
+
+    Args:
+        trials: all trials.
+        number: the trial's number.
+        why: how that is known, for whoever reads the log.
+        corrected: the right values.
+
+    Raises:
+        InvalidValueError: no trial has this number, or a reason that is no text.
+    """
+    _require("correct", number, [trial.index for trial in trials], "of this session")
+    why = text("the reason of a correction", why)
+    return Event(kind="correction", trial=number, text=why, corrected=corrected)
+
+
+def _right_values(event: Event) -> dict[str, Any]:
+    return {} if event.corrected is None else event.corrected.model_dump(exclude_none=True)
 
 
 def _require_of_a_muscle(trial: Trial, mep_mv: float) -> None:

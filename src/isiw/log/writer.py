@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -24,12 +24,12 @@ from isiw.log.durable import (
     part_of,
 )
 from isiw.log.headers import as_toml
+from isiw.log.kinds import continued_by
 from isiw.log.locks import claimed, refuse_if_locked
 from isiw.log.memory import Memory, found_in
 from isiw.log.salvage import Message, Salvage, holds, salvage_file
-from isiw.log.schema import RUN_KEY, AnyHeader, Event, Header, Record
+from isiw.log.schema import AnyHeader, Event, Record
 from isiw.log.topics import CHANNEL_IDS, announcement, decode, encode, is_of_isiw, json_schema, topic_of
-from isiw.text.commands import command
 
 __all__ = ["CONFIGURATION", "LogWriter"]
 
@@ -45,8 +45,7 @@ _COPYING = ".resuming"
 class LogWriter:
     """One session's log: `FILE.part` while it is written, `FILE` once it is closed.
 
-    Use `LogWriter.create` or `LogWriter.continuing`; as a context manager it closes itself. `on_append` is told every
-    record, with the channel of a waveform, once it is appended.
+    Use `LogWriter.create` or `LogWriter.continuing`; as a context manager it closes itself.
 
     Args:
         path: where the log will be.
@@ -64,7 +63,6 @@ class LogWriter:
         self._memory = Memory()
         self._log_time_ns = 0
         self._replaces: Fingerprint | None = None
-        self.on_append: Callable[[Record, str | None], None] | None = None
         self._writer.start(profile="isiw", library="isiw")
         for topic in CHANNEL_IDS:
             self._register(topic)
@@ -178,8 +176,6 @@ class LogWriter:
         data = encode(topic, record)
         with self._lock:
             self._copy(Message(topic, data, log_time_ns()))
-        if self.on_append is not None:
-            self.on_append(record, channel_name)
 
     def sync(self) -> None:
         """Return when everything appended is on the disk.
@@ -333,28 +329,17 @@ def _way_on(existing: Path) -> str:
         found = salvage_file(existing)
     except LogError:
         return "Choose another path; this is not a log that can be continued."
-    topics = {message.topic for message in found.messages}
-    name = log_of(existing)
-    if "/production_header" in topics:
-        return f"Choose another path, or go on with it: {command('interval', name, '--resume')}"
     header = _header_of(found)
     if header is None:
         return "Choose another path; nothing of this log can be continued."
-    if header.intensities is not None:
-        return f"Choose another path, or go on with it: {command('threshold', name, '--resume')}"
-    if RUN_KEY in header.config:
-        return f"Choose another path, or go on with it: {command('resume', name)}"
-    return (
-        f"Choose another path, or go on with it: {command('resume', name, 'CONFIG')}, where CONFIG names your device, "
-        "or in your own software isiw.resume(path, device).run() or isiw.open_session(strategy, path, resume=True)."
-    )
+    return f"Choose another path, or continue it: {continued_by(log_of(existing), header)}"
 
 
-def _header_of(found: Salvage) -> Header | None:
+def _header_of(found: Salvage) -> AnyHeader | None:
     for message in reversed(found.messages):
-        if message.topic == "/header":
+        if message.topic in {"/header", "/production_header"}:
             with suppress(ValueError):
-                return cast("Header", decode(message.topic, message.data))
+                return cast("AnyHeader", decode(message.topic, message.data))
     return None
 
 

@@ -7,9 +7,9 @@ from collections import Counter
 from pathlib import Path
 
 from isiw.design import DesignSpace
-from isiw.log.durable import log_of
+from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord, require_records
-from isiw.log.schema import RUN_KEY, SERVED_KEY, Estimate
+from isiw.log.schema import Estimate
 from isiw.metrics import f1
 from isiw.report.depression import depression_sentence
 from isiw.report.evidence import (
@@ -20,7 +20,6 @@ from isiw.report.evidence import (
     nothing_measured,
     nothing_stood_out,
 )
-from isiw.session.header import OWN_LOOP
 from isiw.session.progress import asked, outcome
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.strategy.stopping import OF_THE_WINDOW
@@ -70,7 +69,8 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
         InvalidValueError: no record of a session.
     """
     require_records((record,))
-    last, way_on = record.estimates[-1] if record.estimates else None, _resuming(record, config)
+    last = record.estimates[-1] if record.estimates else None
+    way_on = continued_by(record.path, record.header, config, end_lost=record.end_lost)
     sentences = finding_sentences(record)
     if last is not None:
         sentences += [
@@ -90,23 +90,6 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
     if last is not None and record.is_judged_since:
         sentences.append(JUDGED_SINCE)
     return " ".join(sentence for sentence in sentences if sentence)
-
-
-def _resuming(record: SessionRecord, config: Path | None) -> str:
-    """What goes on with a session: a command, or the call that a loop of the lab's own was begun with."""
-    if SERVED_KEY in record.header.config:
-        lost = ", with N as lost_pulses in its body" if record.end_lost else ""
-        return f"POST /sessions/{log_of(record.path).stem}/resume to isiw serve{lost}"
-    if record.header.device.name == OWN_LOOP:
-        lost = ", lost_pulses=N" if record.end_lost else ""
-        return f'isiw.open_session(strategy, "{record.path}", resume=True{lost})'
-    words = ["resume", *(["--lost-pulses", "N"] if record.end_lost else []), record.path]
-    if RUN_KEY in record.header.config:
-        return command(*words)
-    if config is not None:
-        return command(*words, config)
-    by_hand = "where CONFIG names your device, or in your own software isiw.resume(path, device).run()"
-    return f"{command(*words, 'CONFIG')}, {by_hand}"
 
 
 def finding_sentences(record: SessionRecord) -> list[str]:

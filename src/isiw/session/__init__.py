@@ -1,17 +1,18 @@
 """A session: the closed loop from the first ask to the decision, and going on with one from its log."""
 
-from isiw.log.threshold import pulses_given, read_threshold
+from isiw.log.kinds import LogKind
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.session.progress import PROGRESS_HEADINGS, aligned, progress_row
 from isiw.session.recorder import Recorder
 from isiw.session.resume import resume
-from isiw.session.threshold import ThresholdRecorder, open_threshold, resume_threshold, search_of
+from isiw.session.threshold import ThresholdRecorder, open_threshold, read_threshold, resume_threshold, search_of
 from isiw.session.threshold_loops import open_simulated, run_by_hand, run_simulated, simulated_person
 from isiw.session.updates import SessionResult, SessionUpdate
 
 __all__ = [
     "PROGRESS_HEADINGS",
+    "LogKind",
     "Recorder",
     "Session",
     "SessionResult",
@@ -22,7 +23,6 @@ __all__ = [
     "open_simulated",
     "open_threshold",
     "progress_row",
-    "pulses_given",
     "read_threshold",
     "resume",
     "resume_threshold",

@@ -1,14 +1,19 @@
-"""The operator's desk: what each key does while a session runs, how a pause is decided, and the countdown of a rest."""
+"""The operator's desk: what each key does while a session runs, how a pause is decided, and what the screen shows."""
 
 from __future__ import annotations
 
+import sys
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Final, Protocol
 
-from isiw.errors import InvalidValueError, LogError
+from isiw.errors import InvalidValueError, LogError, told
+from isiw.log.schema import Header
 from isiw.session.asking import Asking
-from isiw.session.terminal import ERASED, ESCAPE, Keys, Screen
+from isiw.session.progress import fitted, progress_row, show_legend, show_progress, standing
+from isiw.session.terminal import ERASED, ESCAPE, Keys, Screen, is_terminal
+from isiw.session.updates import SessionUpdate
 from isiw.trials import TrialTable
 
 __all__ = ["KEYS", "Desk", "Operated"]
@@ -65,24 +70,36 @@ class Desk:
     Attributes:
         shown: the trial whose row the operator saw last, which is what the keys mean, since a later one may have been
             delivered; None where no row was shown.
-        away: is entered while the keys are not heard.
     """
 
     def __init__(self, session: Operated, asking: Asking | None = None) -> None:
         self._session, self.screen, self._asking = session, Screen(), asking or Asking()
+        self._keys: Keys | None = None
         self._note: str | None = None
         self._left_alone = False
         self._counted: int | None = None
         self.shown: int | None = None
-        self.away: Callable[[], AbstractContextManager[None]] = nullcontext
 
     @contextmanager
     def staffed(self) -> Iterator[None]:
         """Within, keys of the terminal are heard."""
+        self.screen = Screen()
         with self.screen, Keys(self.press, self.leave) as keys:
-            self.away = keys.away
+            self._keys = keys
             self.screen.say(f"Keys: {KEYS}.")
-            yield
+            try:
+                yield
+            finally:
+                self._keys = None
+
+    @property
+    def is_staffed(self) -> bool:
+        """Whether keys of the terminal are heard."""
+        return self._keys is not None
+
+    def away(self) -> AbstractContextManager[None]:
+        """Within, the keys are not heard."""
+        return nullcontext() if self._keys is None else self._keys.away()
 
     def leave(self) -> None:
         """Nobody is there any more: whatever is asked is answered with no."""
@@ -208,3 +225,40 @@ class Desk:
         elif key.isprintable():
             self._note = note + key
             self.screen.type(key)
+
+
+class Table:
+    """The table of trials on the screen; if it cannot be shown any more, a fault says so, and the session goes on."""
+
+    def __init__(self, desk: Desk, header: Header, faults: deque[str], *, shown: bool) -> None:
+        self._desk, self._header, self._faults, self._shown = desk, header, faults, shown
+        if shown:
+            show_legend()
+
+    def updated(self, update: SessionUpdate) -> None:
+        """Show a trial: in a terminal with a last line that says how the session stands."""
+        if not self._shown:
+            return
+        try:
+            self._show(update)
+        except (OSError, UnicodeError) as error:  # a full disk, a reader who has gone, a sign that is lacking
+            self._faults.append(f"the table of trials cannot be shown any more: {told(error)}")
+            self._shown = False
+
+    def _show(self, update: SessionUpdate) -> None:
+        row = progress_row(update, self._header.stimulus)
+        if self._desk.is_staffed and is_terminal(sys.stdout):
+            self._desk.show(fitted(row), standing(update, self._header.space))
+        else:
+            show_progress(row)
+        self._desk.shown = update.trial.index
+
+    def waiting(self, left_s: float, text: str) -> None:
+        """Count down until the next stimulus."""
+        if self._desk.is_staffed:
+            self._desk.count_down(left_s, text)
+
+    def waited(self) -> None:
+        """The wait is over."""
+        if self._desk.is_staffed:
+            self._desk.counted_down()

@@ -37,20 +37,23 @@ class Interrupts:
     Ctrl-Z suspends the process when the device is disarmed. Outside the main thread, which is where Python delivers
     signals, nothing is heard; what the process ignores, as under nohup, it goes on ignoring.
 
-    `away` is entered while the process is suspended.
-
     Args:
         disarm: disarms; called in another thread, at every signal.
         stuck: called in another thread where the main one does not react to a second signal.
+        away: is entered while the process is suspended.
     """
 
-    def __init__(self, disarm: Callable[[], object], stuck: Callable[[], object]) -> None:
-        self._disarm, self._stuck = disarm, stuck
+    def __init__(
+        self,
+        disarm: Callable[[], object],
+        stuck: Callable[[], object],
+        away: Callable[[], AbstractContextManager[None]] = nullcontext,
+    ) -> None:
+        self._disarm, self._stuck, self._away = disarm, stuck, away
         self._pending = self._allowed = False
         self._heard = self._disarmed = self._handled = 0
         self._acknowledged = self._settled = self._ended = 0
         self._before: dict[signal.Signals, Any] = {}
-        self.away: Callable[[], AbstractContextManager[None]] = nullcontext
         self._watcher: threading.Thread | None = None
         self._over = False
 
@@ -148,7 +151,7 @@ class Interrupts:
     def _suspend(self) -> None:
         """Stop the process as Ctrl-Z does, but disarmed; it goes on here."""
         self._wait_until(self._is_disarmed, _DISARMING_S)
-        with self.away():
+        with self._away():
             os.kill(os.getpid(), signal.SIGSTOP)
 
     def _watch(self) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
-from isiw.design import DesignSpace
 from isiw.log.schema import Event
 from isiw.log.verdicts import LOOKED_AT, acceptance, exclusion, inclusion
-from isiw.session.journal import Journal
+from isiw.session.examination import WindowExamination
+from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 
 __all__ = ["Judging"]
@@ -17,17 +17,21 @@ __all__ = ["Judging"]
 class Judging(ABC):
     """An open session whose trials an operator judges; each verdict is on disk when its call returns."""
 
-    _journal: Journal
-    _space: DesignSpace
+    _examination: WindowExamination
 
     @abstractmethod
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         """Put a verdict on disk, and see to it that it is learnt before the next stimulus is asked for."""
 
     @property
+    def strategy(self) -> Strategy:
+        """What proposes ISIs and learns; another object once a trial was judged later."""
+        return self._examination.learner.strategy
+
+    @property
     def trials(self) -> TrialTable:
         """All trials so far."""
-        return self._journal.trials
+        return self._examination.trials
 
     def note(self, text: str, *, key: str | None = None) -> None:
         """Log a remark; with a key that a note of this session has already, nothing.
@@ -39,12 +43,12 @@ class Judging(ABC):
         Raises:
             InvalidValueError: text or key is no text, or the session is not open.
         """
-        self._journal.note(text, key=key)
+        self._examination.note(text, key=key)
 
     @property
     def last_excluded(self) -> int | None:
         """The trial that was excluded last, of those that are; None where none is."""
-        return self._journal.last_excluded
+        return self._examination.last_excluded
 
     def exclude(self, trial: int, reason: str = "") -> None:
         """Let a trial not count from here on: an event is appended, and the strategy learns anew without it.
@@ -90,4 +94,4 @@ class Judging(ABC):
             InvalidValueError: no such trial, one that counts already or of which no MEP was measured that a muscle can
                 give, or the session is not open.
         """
-        self._judge(lambda trials: acceptance(trials, trial, self._space))
+        self._judge(lambda trials: acceptance(trials, trial, self.strategy.space))

@@ -1,44 +1,35 @@
-"""The closed loop: ask, log the intent, deliver, judge, log the trial, tell.
+"""The closed loop: ask, log the intent, deliver, judge, log the trial, learn.
 
-What is on disk is always ahead of what happens next: the intent before its stimulus, the trial before it is told.
+What is on disk is always ahead of what happens next: the intent before its stimulus, the trial before it is learnt.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
-from isiw.checks import deadline, number, text
-from isiw.devices.clock import Clock
-from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
-from isiw.errors import InvalidValueError, NotDelivered, StrategyError, told
+from isiw.errors import NotDelivered, StrategyError
 from isiw.log.pulses import earlier_pulses_s
-from isiw.log.schema import Event, Header, Record
+from isiw.log.schema import Event, Header
 from isiw.log.writer import LogWriter
-from isiw.session.delivery import Delivery
-from isiw.session.desk import Desk
-from isiw.session.following import Follower, Followers
-from isiw.session.header import header_of, require_parts
-from isiw.session.journal import Journal
+from isiw.session.assembly import Options, assembled
+from isiw.session.desk import Table
+from isiw.session.header import Earlier
 from isiw.session.judging import Judging
-from isiw.session.pausing import Pause, Pausing
-from isiw.session.progress import fitted, progress_row, show_legend, show_progress, standing
-from isiw.session.rig import Rig, require_matching
-from isiw.session.safeguards import Safeguards
-from isiw.session.steps import Steps, ended, paused
+from isiw.session.operator import goes_on
+from isiw.session.pausing import Pause
+from isiw.session.sink import Follower
+from isiw.session.steps import ended, paused
 from isiw.session.terminal import is_terminal, somebody_there
-from isiw.session.updates import SessionResult, SessionUpdate
-from isiw.signals.limits import SignalLimits
-from isiw.signals.watch import Watch
+from isiw.session.updates import SessionResult
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
-from isiw.visit import Visit, VisitProtocol
 
 __all__ = ["Session"]
 
@@ -52,6 +43,7 @@ class Session(Judging):
         device: delivers the stimuli; its ISIs count from the same event as the strategy's space.
         strategy: proposes ISIs and learns.
         log: where the log will be; must not exist yet.
+        earlier: where an earlier run ended; `isiw.resume` says so.
         limits: what may be delivered; the strategy's space, 5 s between stimuli and 200 pulses by default.
         clock: tells the time and waits; a virtual one by default where the device is simulated.
         on_trial: called after every trial, when it is safely on disk.
@@ -72,73 +64,21 @@ class Session(Judging):
             whose name or unit a session cannot use, or earlier logs without a subject to find in them.
     """
 
-    def __init__(  # noqa: PLR0913 - the public surface of the design; all but two are keyword-only
+    def __init__(
         self,
         device: Device,
         strategy: Strategy,
         *,
         log: str | Path,
-        limits: Limits | None = None,
-        clock: Clock | None = None,
-        on_trial: Callable[[SessionUpdate], None] | None = None,
-        subject: str = "",
-        signals: SignalLimits | None = None,
-        config: Mapping[str, Any] | None = None,
-        timeout_s: float = 30.0,
-        ask_deadline_s: float | None = None,
-        safeguards: Safeguards | None = None,
-        visit: Visit | None = None,
-        protocol: VisitProtocol | None = None,
+        earlier: Earlier | None = None,
+        **options: Unpack[Options],
     ) -> None:
-        self.log_path = require_parts(
-            log,
-            device=(device, Device),
-            strategy=(strategy, Strategy),
-            limits=(limits, Limits | None),
-            visit=(visit, Visit | None),
-            protocol=(protocol, VisitProtocol | None),
-        )
-        visit, protocol, self._safeguards = visit or Visit(), protocol or VisitProtocol(), safeguards or Safeguards()
-        self._limits = limits or Limits.of_space(strategy.space)
-        self._rig = Rig(device, self._limits, clock, self._safeguards)
-        require_matching(self._rig.info, strategy, protocol)
-        self._on_trial = on_trial
-        self._header = header_of(
-            strategy,
-            subject=text("subject", subject),
-            visit=visit,
-            protocol=protocol,
-            limits=self._limits,
-            device=self._rig.info,
-            signals=signals or SignalLimits(),
-            timeout_s=number("timeout_s", timeout_s, above=0),
-            ask_deadline_s=deadline("ask_deadline_s", ask_deadline_s),
-            config=dict(config or {}),
-        )
-        if self._safeguards.earlier_logs is not None and not subject:
-            raise InvalidValueError(
-                "earlier logs count for the same subject only, and there is none", remedy="Give the session a subject."
-            )
-        self._open_log: Callable[[Header], LogWriter] = partial(LogWriter.create, log)
-        self._first_records: Sequence[Record] = ()
-        self._own_earlier_s: Callable[[], Sequence[float]] = tuple
-        self._resumed = False
-        self._journal, self._space = Journal(), strategy.space
-        self._pausing = Pausing(self._rig, self._journal, self._safeguards)
-        self._followers = Followers(self._rig.faults)
-        self._steps = self._steps_with(strategy)
-
-    def _steps_with(self, strategy: Strategy) -> Steps:
-        header, rig, journal, pausing = self._header, self._rig, self._journal, self._pausing
-        max_in_a_row = header.limits.max_consecutive_mistrials
-        watch = Watch(header.space, header.signals, max_in_a_row, header.detection_limit_mv)
-        delivery = Delivery(rig, journal, pausing, watch, header.space, header.signals, header.timeout_s)
-        return Steps(strategy, rig, journal, pausing, delivery, header, self._safeguards.backoffs_s)
-
-    @property
-    def strategy(self) -> Strategy:
-        """What proposes ISIs and learns; another object once a trial was judged anew."""
-        return self._steps.strategy
+        self._earlier = earlier or Earlier(partial(LogWriter.create, log))
+        parts = assembled(self, device, strategy, log, self._earlier, options)
+        self.log_path, self._header = parts.log_path, parts.header
+        self._limits, self._safeguards = parts.limits, parts.safeguards
+        self._sink, self._rig, self._examination, self._steps = parts.sink, parts.rig, parts.examination, parts.steps
+        self._asking, self._pausing, self._desk = parts.asking, parts.pausing, parts.desk
 
     @property
     def header(self) -> Header:
@@ -147,7 +87,7 @@ class Session(Judging):
 
     @property
     def paused(self) -> str | None:
-        """Why the session waits for somebody to say whether it goes on; None where it does not."""
+        """Why the session waits for somebody to say whether it goes on; None if it does not."""
         pause = self.pause_waiting
         return None if pause is None else pause.reason
 
@@ -157,38 +97,12 @@ class Session(Judging):
         return self._pausing.waiting
 
     def follow(self, follower: Follower) -> None:
-        """Let somebody look on; before `run`. Where there is no terminal, pauses are decided by who looks on.
+        """Let somebody look on; before `run`. If there is no terminal, who looks on decides about pauses.
 
         Args:
-            follower: is told what is logged; what fails in it does not stop the session.
+            follower: gets what is logged; what fails in it does not stop the session.
         """
-        self._followers.add(follower)
-
-    def continue_from(
-        self,
-        trials: TrialTable,
-        header: Header,
-        open_log: Callable[[Header], LogWriter],
-        first_records: Sequence[Record],
-        earlier_s: Callable[[], Sequence[float]] = tuple,
-        events: Sequence[Event] = (),
-    ) -> None:
-        """Begin where another run ended; `isiw.resume` does this for you.
-
-        Args:
-            trials: what was delivered before; the strategy has learned it.
-            header: this session's, with what it keeps of the log's.
-            open_log: opens the log that goes on, with that header.
-            first_records: what it holds next.
-            earlier_s: says how long ago each stimulus before was [s].
-            events: what happened before.
-        """
-        self._journal.begin_after(trials, events)
-        self._header = header
-        self._open_log, self._first_records = open_log, first_records
-        self._own_earlier_s, self._resumed = earlier_s, True
-        pauses = [event.finding for event in events if event.kind == "pause" and event.finding is not None]
-        self._steps.delivery.watch = self._steps.delivery.watch.resumed(trials, pauses)
+        self._sink.followers.append(follower)
 
     def run(self, *, progress: bool | None = None, keys: bool = True) -> SessionResult:
         """Run to the end, and close the log whatever happens.
@@ -213,77 +127,44 @@ class Session(Judging):
         try:
             return self._run(progress=progress, keys=keys)
         finally:
-            self._followers.ended()
+            self._sink.ended()
 
     def _run(self, *, progress: bool | None, keys: bool) -> SessionResult:
         self._require_own_strategy()
         self._require_effect()
-        earlier_s = self._earlier_s()
-        self._steps.on_trial = self._reporting(progress=progress)
-        with self._rig.driven(), self._open_log(self._header) as log, self._journal.writing(log):
-            self._rig.log, log.on_append = log, self._followers.logged
+        earlier_s, sink = self._earlier_s(), self._sink
+        shown = sink.on_trial is None and is_terminal(sys.stdout) if progress is None else progress
+        table = Table(self._desk, self._header, sink.faults, shown=shown)
+        with self._rig.driven(), self._earlier.open_log(self._header) as log, sink.writing(log, table):
             try:
                 self._log_beginning()
                 self._rig.begin(len(self.trials), earlier_s)
                 decision = self._steps.at_the_end()  # of a session that was resumed; it need not be armed for nothing
                 if decision is None:
-                    with self._operated(keys=keys), self._rig.armed():
+                    with self._operated(keys=keys) as decide, self._rig.armed():
                         self._log_locked_limits()
-                        decision = self._loop()
-                self._journal.faults(self._rig.faults)
+                        decision = self._loop(decide)
+                self._examination.log_faults()
             except BaseException as error:
-                self._journal.faults(self._rig.faults)
-                self._journal.failure(error)
-                if not (self._rig.staged_once or self._resumed):
+                self._examination.log_faults()
+                self._examination.log_failure(error)
+                if not (self._rig.staged_once or self._earlier.first_records):
                     log.discard()
                 raise
         return SessionResult(self.strategy.estimate(), decision, self.trials, log.path)
 
-    def _reporting(self, *, progress: bool | None) -> Callable[[SessionUpdate], None] | None:
-        """What is called after every trial."""
-        shown = self._on_trial is None and is_terminal(sys.stdout) if progress is None else progress
-        if shown:
-            show_legend()
-
-        def report(update: SessionUpdate) -> None:
-            nonlocal shown
-            self._followers.updated(update)
-            if shown:
-                try:
-                    self._show(update)
-                except (OSError, UnicodeError) as error:  # a full disk, a reader who has gone, a sign that is lacking
-                    self._rig.faults.append(f"the table of trials cannot be shown any more: {told(error)}")
-                    shown = False
-            if self._on_trial is not None:
-                self._on_trial(update)
-
-        return report if shown or self._followers else self._on_trial
-
-    def _show(self, update: SessionUpdate) -> None:
-        """Show a trial: in a terminal with a last line that says how the session stands."""
-        row, desk = progress_row(update, self.header.stimulus), self._steps.desk
-        if desk is not None and is_terminal(sys.stdout):
-            desk.show(fitted(row), standing(update, self._space))
-        else:
-            show_progress(row)
-        if desk is not None:
-            desk.shown = update.trial.index
-
     @contextmanager
-    def _operated(self, *, keys: bool) -> Iterator[None]:
-        """Within, the operator's keys are heard, where there is an operator at a terminal."""
-        if self._safeguards.on_pause is None and self._followers:
-            self._pausing.decide = lambda _: self._pausing.asking.wait(self._followers.nobody)
-        if not keys or self._safeguards.on_pause is not None or not somebody_there():
-            yield
-            return
-        desk = Desk(self, self._pausing.asking)
-        with desk.staffed():
-            self._steps.desk, self._pausing.decide, self._rig.interrupts.away = desk, desk.goes_on, desk.away
-            try:
-                yield
-            finally:
-                self._rig.interrupts.away = nullcontext
+    def _operated(self, *, keys: bool) -> Iterator[Callable[[str], bool]]:
+        """Within, the operator's keys are heard, if there is an operator at a terminal; what decides about pauses."""
+        if self._safeguards.on_pause is not None:
+            yield self._safeguards.on_pause
+        elif keys and somebody_there():
+            with self._desk.staffed():
+                yield self._desk.goes_on
+        elif self._sink.followers:
+            yield lambda _: self._asking.wait(self._sink.nobody)
+        else:
+            yield goes_on
 
     def pause(self, reason: str) -> None:
         """Disarm now, and pause before the next stimulus; from any thread, also from `on_trial`.
@@ -305,7 +186,7 @@ class Session(Judging):
         Raises:
             InvalidValueError: it is not paused, or pauses anew, or is to end, or `Safeguards.on_pause` decides.
         """
-        self._pausing.asking.answer(goes_on=True, number=number)
+        self._asking.answer(goes_on=True, number=number)
 
     def end(self, reason: str) -> None:
         """Disarm now, and end before the next stimulus; from any thread. The session can be resumed later.
@@ -321,10 +202,10 @@ class Session(Judging):
     @property
     def running(self) -> bool:
         """Whether its log is open."""
-        return self._journal.is_open
+        return self._sink.is_open
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
-        self._journal.judge(verdict)
+        self._examination.judge(verdict)
 
     def _require_own_strategy(self) -> None:
         if self.strategy.delivered > len(self.trials):
@@ -336,7 +217,7 @@ class Session(Judging):
             )
 
     def _require_effect(self) -> None:
-        if not self._resumed:  # what an earlier log says goes on as it was
+        if not self._earlier.first_records:  # what an earlier log says goes on as it was
             self._limits.require_effect()
             self._header.protocol.require_effect(self._limits.min_iti_s)
             self._header.signals.require_behind_artefact()
@@ -347,31 +228,31 @@ class Session(Judging):
         matter = (limits.max_block_pulses, limits.max_period_pulses, self._header.protocol.block_trials)
         if self._header.device.simulated or not any(matter):
             return []
-        earlier_s = list(self._own_earlier_s())
+        earlier_s = list(self._earlier.ages_s())
         if folder is not None:
             period_s = max(limits.period_s, limits.rest_s)
             earlier_s += earlier_pulses_s(folder, self._header.subject, period_s, but=self.log_path)
         return earlier_s
 
     def _log_beginning(self) -> None:
-        for record in self._first_records:
-            self._journal.log.append(record)
+        for record in self._earlier.first_records:
+            self._sink.append(record)
         if self.trials:
-            self._steps.log_estimate(len(self.trials) - 1)
+            self._steps.log_belief()
 
     def _log_locked_limits(self) -> None:
         """Log the intensity that the device reported when it was armed, so that a resumed session is held to it."""
         if self._rig.limits != self._header.limits:
             self._header = self._header.model_copy(update={"limits": self._rig.limits})
-            self._journal.log.append(self._header)
+            self._sink.append(self._header)
 
-    def _loop(self) -> StopDecision:
+    def _loop(self, decide: Callable[[str], bool]) -> StopDecision:
         decision = None
-        while decision is None or not decision.stop or self._journal.overruled:
+        while decision is None or not decision.stop or self._examination.overruled:
             if self._pausing.due:
-                if (reason := self._pausing.until_decided()) is not None:
-                    return ended(reason) if self._pausing.asking.over else paused(reason)
-                self._steps.delivery.watch = self._steps.delivery.watch.seen()
+                if (reason := self._pausing.until_decided(decide)) is not None:
+                    return ended(reason) if self._asking.over else paused(reason)
+                self._steps.seen()
                 continue
             try:
                 decision = self._steps.next()

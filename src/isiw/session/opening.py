@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,22 +12,15 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.log.durable import log_exists
-from isiw.log.reader import read_salvaged
-from isiw.log.salvage import salvage
+from isiw.log.kinds import OWN_LOOP
+from isiw.log.reader import SessionRecord, read_salvaged
+from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import Header
 from isiw.log.writer import LogWriter
-from isiw.session.believed import believed
-from isiw.session.header import OWN_LOOP, header_of, require_parts
+from isiw.session.examination import believed
+from isiw.session.header import header_of, require_parts
 from isiw.session.recorder import Recorder
-from isiw.session.replay import replay
-from isiw.session.resumption import (
-    ages_s,
-    as_resumed,
-    require_same_person,
-    resumption,
-    warn_where_differing,
-    with_lost_pulses,
-)
+from isiw.session.resumption import require_same_person, taken_up
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.strategy import Strategy
 from isiw.visit import Visit, VisitProtocol
@@ -96,14 +89,12 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
             got=f"{strategy.delivered} trials",
             remedy="Make it anew, or give the session strategy.restarted().",
         )
-    header = header_of(
+    header = _header(
         strategy,
         subject=text("subject", subject),
         visit=visit or Visit(),
         protocol=_without_controls(protocol or VisitProtocol()),
         limits=limits or Limits.of_space(strategy.space, min_iti_s=0.0),
-        device=DeviceInfo(OWN_LOOP, strategy.space.reference),
-        signals=SignalLimits(),
         config=dict(config or {}),
     )
     _require_reported(header.limits)
@@ -113,40 +104,41 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     if not (resume and log_exists(path)):
         return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
     given = {"subject": subject, "visit": visit, "protocol": protocol, "limits": limits, "config": config}
-    unsaid = {name for name, value in given.items() if value is None or value == ""}
-    return _resumed(strategy, path, header, unsaid, lost_pulses, clock, on_doubt)
+    changes = {name: getattr(header, name) for name, value in given.items() if value is not None and value != ""}
+    salvaged = salvage(path)
+    return own_loop_resumed(salvaged, read_salvaged(salvaged), strategy, changes, lost_pulses, clock, on_doubt)
 
 
-def _resumed(
-    strategy: Strategy,
-    path: Path,
-    header: Header,
-    unsaid: Iterable[str],
+def own_loop_resumed(
+    salvaged: Salvage,
+    record: SessionRecord,
+    strategy: Strategy | None,
+    changes: Mapping[str, Any],
     lost_pulses: int | None,
     clock: Clock,
     on_doubt: Callable[[str], None] | None,
 ) -> Recorder:
-    """The session of a log, from where it ends; what nobody said anew is as it was logged."""
-    salvaged = salvage(path)
-    record = read_salvaged(salvaged)
+    """The session of a log, from where it ends, with the fields of its header that are said otherwise."""
     record.require_read()
-    require_same_person(header, record.header)
-    record = with_lost_pulses(record, lost_pulses)
-    replayed = replay(record, strategy)
-    warn_where_differing(replayed, record.header)
-    logged = {name: getattr(record.header, name) for name in unsaid}
-    header = as_resumed(header.model_copy(update=logged), record.header, replayed)
-    _require_reported(header.limits)
-    writer = LogWriter.continuing(path, salvaged, record.header, header)
-    ages = ages_s(salvaged, len(replayed.trials))
-    for trial in replayed.unknown:
-        writer.append(trial)
-    writer.append(resumption(record, replayed, header.limits))
+    logged = record.header
+    require_same_person(changes.get("subject", ""), logged)
+    details = {name: getattr(logged, name) for name in ("subject", "visit", "protocol", "limits", "config")}
+    details |= changes
+    _require_reported(details["limits"])
+    strategy, earlier = taken_up(salvaged, record, strategy, details["limits"], lost_pulses)
+    header = _header(strategy, **details).model_copy(update=dict(earlier.kept))
+    writer = earlier.open_log(header)
+    for first in earlier.first_records:
+        writer.append(first)
     if record.is_judged_since:
-        strategy = replayed.strategy
-        writer.append(believed(strategy, len(replayed.trials) - 1, strategy.decision(), None))
+        writer.append(believed(strategy, len(earlier.trials) - 1, strategy.decision(), None))
     writer.sync()
-    return Recorder(replayed.strategy, writer, header, clock, replayed.trials, record.events, ages, on_doubt)
+    return Recorder(strategy, writer, header, clock, earlier, on_doubt)
+
+
+def _header(strategy: Strategy, **details: Any) -> Header:
+    device = DeviceInfo(OWN_LOOP, strategy.space.reference)
+    return header_of(strategy, device=device, signals=SignalLimits(), **details)
 
 
 def _require_reported(limits: Limits) -> None:

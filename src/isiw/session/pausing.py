@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from isiw.findings import Kind
 from isiw.session.asking import Asking
-from isiw.session.journal import Journal
-from isiw.session.operator import goes_on
+from isiw.session.examination import WindowExamination
 from isiw.session.rig import Rig
-from isiw.session.safeguards import Safeguards
 
 __all__ = ["Pause", "Pausing"]
 
@@ -28,17 +27,15 @@ class Pausing:
 
     Args:
         rig: is disarmed, and armed again.
-        journal: where pauses are written.
-        safeguards: `on_pause` decides how a session goes on, or the operator in the terminal.
+        examination: where pauses are logged.
+        asking: the question whether a paused session goes on.
     """
 
-    def __init__(self, rig: Rig, journal: Journal, safeguards: Safeguards) -> None:
-        self._rig, self._journal = rig, journal
-        self.decide = safeguards.on_pause or goes_on
+    def __init__(self, rig: Rig, examination: WindowExamination, asking: Asking) -> None:
+        self._rig, self._examination, self._asking = rig, examination, asking
         self.reason: str | None = None
         self.kind: Kind | None = None
         self.waiting: Pause | None = None
-        self.asking = Asking()
 
     @property
     def due(self) -> bool:
@@ -60,30 +57,32 @@ class Pausing:
         Args:
             reason: why, for the log.
         """
-        self.asking.end()
+        self._asking.end()
         self.now(reason)
 
-    def until_decided(self) -> str | None:
-        """Pause until somebody says that the session goes on; where nobody does, the reason that it ends with.
+    def until_decided(self, decide: Callable[[str], bool]) -> str | None:
+        """Pause until somebody says that the session goes on; if nobody does, the reason that it ends with.
+
+        Args:
+            decide: is called with the reason; whether the session goes on.
 
         Raises:
             KeyboardInterrupt: the operator ends the session.
         """
         rig, interrupts = self._rig, self._rig.interrupts
         rig.disarm()
-        self._journal.faults(rig.faults)
+        self._examination.log_faults()
         interrupts.acknowledge()
         if interrupts.ending:
             raise KeyboardInterrupt
         reason, kind, self.reason, self.kind = self.reason or _INTERRUPTED, self.kind, None, None
-        self._journal.event("pause", reason, finding=kind)
-        self._journal.log.sync()
-        if not self._goes_on(reason):
+        self._examination.event("pause", reason, finding=kind, durable=True)
+        if not self._goes_on(reason, decide):
             if interrupts.heard:
                 raise KeyboardInterrupt
             return self._last(reason)
         interrupts.settle()
-        self._journal.event("pause", "The operator goes on.")
+        self._examination.event("pause", "The operator goes on.")
         if not self.due:
             rig.stage()
         return None
@@ -92,14 +91,14 @@ class Pausing:
         """Why a paused session ends: what it has paused for, or what somebody said meanwhile."""
         if self.reason is not None:
             reason, self.reason = self.reason, None
-            self._journal.event("pause", reason)
+            self._examination.event("pause", reason)
         return reason
 
-    def _goes_on(self, reason: str) -> bool:
-        if self.asking.over:
+    def _goes_on(self, reason: str, decide: Callable[[str], bool]) -> bool:
+        if self._asking.over:
             return False
-        self.waiting = Pause(self.asking.next(), reason)
+        self.waiting = Pause(self._asking.next(), reason)
         try:
-            return self._rig.interrupts.freely(self.decide, reason) is True and not self.asking.over
+            return self._rig.interrupts.freely(decide, reason) is True and not self._asking.over
         finally:
             self.waiting = None

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import itertools
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
 
 from isiw.checks import number
-from isiw.devices.clock import ROUNDING_S, Clock
-from isiw.devices.pacing import Pacing
+from isiw.devices.clock import ROUNDING_S, Clock, Pacing
 from isiw.devices.protocol import Readiness
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, warn
 from isiw.findings import Finding, Kind, Severity
-from isiw.log.schema import Event, Header
+from isiw.log.schema import Event, Header, Intent
 from isiw.log.writer import LogWriter
-from isiw.session.believed import believed
-from isiw.session.journal import Journal, learn, relearned
+from isiw.session.examination import examination_of
+from isiw.session.header import Earlier
 from isiw.session.judging import Judging
+from isiw.session.sink import Sink
 from isiw.signals.checklist import findings
 from isiw.signals.evidence import Evidence, told_of
 from isiw.signals.rig import remedy_for
@@ -41,9 +41,7 @@ class Recorder(Judging):
         log: the open log.
         header: what the session is: its limits and its protocol.
         clock: tells the time, and waits.
-        trials: what was delivered before; the strategy has learned it.
-        events: what happened meanwhile.
-        earlier_s: how long ago each of these was [s].
+        earlier: where the session ended before.
         on_doubt: as for `open_session`.
     """
 
@@ -53,19 +51,18 @@ class Recorder(Judging):
         log: LogWriter,
         header: Header,
         clock: Clock,
-        trials: TrialTable | None = None,
-        events: Sequence[Event] = (),
-        earlier_s: Sequence[float] = (),
+        earlier: Earlier | None = None,
         on_doubt: Callable[[str], None] | None = None,
     ) -> None:
-        self.strategy, self._journal, self._space = strategy, Journal(trials, events), strategy.space
-        self._log, self._clock, self._on_doubt = log, clock, on_doubt
+        self._sink, self._log, self._clock, self._on_doubt = Sink(), log, clock, on_doubt
+        trials, events, ages_s = (earlier.trials, earlier.events, earlier.ages_s()) if earlier else (None, (), ())
+        self._examination = examination_of(strategy, self._sink, trials, events)
         self._limits, self._protocol, self._seed = header.limits, header.protocol, header.seed
         self._open = ExitStack()
-        self._open.enter_context(self._journal.writing(log))
+        self._open.enter_context(self._sink.writing(log))
         self._asked: Stimulus | None = None
         self._lock = threading.RLock()
-        self._pacing = Pacing(header.limits, clock, earlier_s)
+        self._pacing = Pacing(header.limits, clock, ages_s)
         self._detection_limit_mv = header.detection_limit_mv
         self._doubts = Doubts.seen(told_of(self.trials), self._detection_limit_mv)
 
@@ -105,7 +102,7 @@ class Recorder(Judging):
             self._limits.require_state(Readiness())
             if self.wait_s() > ROUNDING_S:
                 return None
-            self._catch_up()
+            self._examination.conclude()
             isi_ms = self.strategy.ask(deadline_s)
             self._limits.require_isi(isi_ms)
             self._begin(isi_ms, self.strategy.fallback_reason)
@@ -114,16 +111,9 @@ class Recorder(Judging):
     def _begin(self, isi_ms: float | None, fallback: str | None = None) -> None:
         """Put on disk what is about to be delivered."""
         stimulus = Stimulus(len(self.trials), isi_ms)
-        self._journal.intent(stimulus, self._clock.now_s(), fallback)
-        self._journal.log.require_in_place()
+        self._examination.intend(Intent.of(stimulus, self._clock.now_s()), fallback)
+        self._sink.log.require_in_place()
         self._asked = stimulus
-
-    def _catch_up(self) -> None:
-        """Learn all trials anew where one was judged since, or learning one was interrupted."""
-        if self._journal.overruled or self.strategy.delivered < len(self.trials):
-            self.strategy, self._journal.overruled = relearned(self.strategy, self.trials), False
-            if self._journal.is_open:
-                self._log_estimate(len(self.trials) - 1)
 
     def tell(
         self,
@@ -156,11 +146,11 @@ class Recorder(Judging):
             self._tell(isi_ms, mep_mv, isi_sd_ms, background_rms_uv)
 
     def _tell(self, isi_ms: float | None, mep_mv: float, isi_sd_ms: float, background_rms_uv: float | None) -> None:
-        self._catch_up()
+        self._examination.conclude()
         if isi_ms is None and self.asked is None:
             self._begin(None)  # given already, and logged whatever the limits allow
             if len(self.trials) >= self._limits.max_pulses:
-                self._journal.event("limit", f"TMS alone was given beyond {self._limits.max_pulses} pulses.")
+                self._examination.event("limit", f"TMS alone was given beyond {self._limits.max_pulses} pulses.")
         mep_mv = number("mep_mv", mep_mv, least=0)
         isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         asked = self._require_asked()
@@ -197,10 +187,10 @@ class Recorder(Judging):
         """
         known = Kind.of_mistrial(reason)
         with self._lock:
-            self._catch_up()
+            self._examination.conclude()
             asked = self._require_asked()
             if known != reason:
-                self._journal.note(str(reason), trial=asked.trial)
+                self._examination.note(str(reason), trial=asked.trial)
             self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known))
         lost = len(list(itertools.takewhile(lambda trial: trial.reason is not None, reversed(self.trials.trials))))
         if lost == self._limits.max_consecutive_mistrials:
@@ -209,19 +199,19 @@ class Recorder(Judging):
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         with self._lock:
-            self._journal.judge(verdict)
-            self._catch_up()
+            self._examination.judge(verdict)
+            self._examination.conclude()
 
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""
         with self._lock:
-            self._catch_up()
+            self._examination.conclude()
             return self.strategy.estimate()
 
     def decision(self) -> StopDecision:
         """Whether to stop now, and why."""
         with self._lock:
-            self._catch_up()
+            self._examination.conclude()
             return self.strategy.decision()
 
     def fail(self, error: BaseException) -> None:
@@ -231,8 +221,8 @@ class Recorder(Judging):
             error: what was raised.
         """
         try:
-            if self._journal.is_open:
-                self._journal.failure(error)
+            if self._sink.is_open:
+                self._examination.log_failure(error)
                 self._log.sync()
         finally:
             self.close()
@@ -261,22 +251,14 @@ class Recorder(Judging):
         return self.asked
 
     def _conclude(self, trial: Trial) -> None:
-        """Put a trial on disk, then learn it, then put on disk what is believed."""
+        """Put a trial on disk, then learn it, then put on disk what is known."""
         self._pacing.came()
-        self._journal.trial(trial)
-        self._log.sync()
-        learn(self.strategy, trial)
-        if trial.told and self.strategy.trouble is not None:
-            self._log.append(Event(kind="fit", trial=trial.index, text=self.strategy.trouble))
-        self._log_estimate(trial.index)
-
-    def _log_estimate(self, trial: int) -> None:
-        self._log.append(believed(self.strategy, trial, self.strategy.decision(), None))
-        self._log.sync()
+        self._examination.came(trial)
+        self._sink.log.sync()
+        self._examination.conclude()
 
     def _warn(self, doubt: Finding) -> None:
-        self._journal.event("doubt", f"{doubt}", finding=doubt.kind)
-        self._log.sync()
+        self._examination.event("doubt", f"{doubt}", finding=doubt.kind, durable=True)
         if self._on_doubt is not None:
             self._on_doubt(f"{doubt}")
         else:

@@ -10,8 +10,8 @@ from isiw.errors import ConfigError, InvalidValueError, OtherVersionsWarning, St
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent, StrategyRecipe
 from isiw.log.verdicts import VERDICTS, under
+from isiw.session.examination import learn, relearned
 from isiw.session.header import versions
-from isiw.session.journal import learn, relearned
 from isiw.strategy.catalogue import remade_strategy, settings_for
 from isiw.strategy.strategy import Strategy
 from isiw.text import plain

@@ -1,41 +1,70 @@
-"""What a session that goes on needs of its log: whether it may, what holds from here on, and what the log says."""
+"""Taking up a session from its log, whoever drives its loop: whether it may go on, and what holds from here on."""
 
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 
 from isiw.checks import whole
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, OtherVersionsWarning, warn
+from isiw.log.kinds import OWN_LOOP
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import Salvage
 from isiw.log.schema import MOST_TRIALS, Event, Header
-from isiw.session.replay import Replayed, versions_text
+from isiw.log.writer import LogWriter
+from isiw.session.header import Earlier
+from isiw.session.replay import Replayed, replay, strategy_of, versions_text
+from isiw.strategy.strategy import Strategy
 
-__all__ = [
-    "ages_s",
-    "as_resumed",
-    "require_as_real",
-    "require_same_person",
-    "resumption",
-    "warn_where_differing",
-    "with_lost_pulses",
-]
+__all__ = ["require_as_real", "require_same_person", "taken_up"]
 
 
-def with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> SessionRecord:
-    """A log with the stimuli that its missing end told of.
+def taken_up(
+    salvaged: Salvage,
+    record: SessionRecord,
+    strategy: Strategy | None,
+    limits: Limits,
+    lost_pulses: int | None,
+    *,
+    verify: bool = True,
+) -> tuple[Strategy, Earlier]:
+    """The strategy that has learnt a log, and where the log ends.
 
     Args:
-        record: the log.
-        lost_pulses: how many stimuli were given that are not in it any more; None where it has its end.
+        salvaged: the log.
+        record: what it holds.
+        strategy: the session's, before its first trial; None to make it as the log says.
+        limits: those that hold from here on.
+        lost_pulses: how many stimuli were given that are not in it any more; None if it has its end.
+        verify: whether to compare what the strategy asks with what it asked then.
 
     Raises:
         DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
         InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there.
+        StrategyError: the strategy cannot be made again, or asks something else with the same versions.
+
+    Warns:
+        OtherVersionsWarning: with other versions than those that were logged it would have asked something else.
     """
+    record = _with_lost_pulses(record, lost_pulses)
+    header, replayed = record.header, replay(record, strategy or strategy_of(record.header), verify=verify)
+    if replayed.differing:
+        warn(_differing_text(replayed, header), OtherVersionsWarning)
+    return replayed.strategy, Earlier(
+        partial(LogWriter.continuing, salvaged.path, salvaged, header),
+        replayed.trials,
+        record.events,
+        {"created": header.created, "asks_from": replayed.asks_from},
+        (*replayed.unknown, _resumption(record, replayed, limits)),
+        partial(_ages_s, salvaged, len(replayed.trials)),
+    )
+
+
+def _with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> SessionRecord:
+    """A log with the stimuli that its missing end told of."""
     if lost_pulses is None:
         record.require_end()
         return record
@@ -75,36 +104,25 @@ def require_as_real(info: DeviceInfo, was: DeviceInfo) -> None:
         )
 
 
-def require_same_person(header: Header, logged: Header) -> None:
-    """Raise where a log's trials are another person's, or nobody's.
+def require_same_person(subject: str, logged: Header) -> None:
+    """Raise where the trials of a log that a loop of the lab's own continues are another person's, or nobody's.
 
     Args:
-        header: of the session that would go on.
-        logged: of the log.
+        subject: the person's code; empty where nobody said it.
+        logged: the header of the log.
 
     Raises:
-        DeviceError: one of them is simulated, and the other is not.
+        DeviceError: the log is of a simulated device.
         InvalidValueError: the log is another person's.
     """
-    require_as_real(header.device, logged.device)
-    if header.subject and logged.subject and header.subject != logged.subject:
+    require_as_real(DeviceInfo(OWN_LOOP, logged.space.reference), logged.device)
+    if subject and logged.subject and subject != logged.subject:
         raise InvalidValueError(
             "the log is another person's",
-            got=header.subject,
+            got=subject,
             expected=logged.subject,
             remedy="Begin a log of its own for each person: isiw.open_session(strategy, log=NEW_PATH, subject=...).",
         )
-
-
-def warn_where_differing(replayed: Replayed, header: Header) -> None:
-    """Warn whoever resumes a session that other versions would have asked something else.
-
-    Args:
-        replayed: the strategy that has learned the log.
-        header: the log's.
-    """
-    if replayed.differing:
-        warn(_differing_text(replayed, header), OtherVersionsWarning)
 
 
 def _differing_text(replayed: Replayed, header: Header) -> str:
@@ -116,25 +134,8 @@ def _differing_text(replayed: Replayed, header: Header) -> str:
     )
 
 
-def as_resumed(header: Header, logged: Header, replayed: Replayed) -> Header:
-    """The header that holds from here on.
-
-    Args:
-        header: of the session that goes on.
-        logged: the one that held so far; what never changes stays as it says.
-        replayed: what the strategy has learned of the log.
-    """
-    return header.model_copy(update={"created": logged.created, "asks_from": replayed.asks_from})
-
-
-def resumption(record: SessionRecord, replayed: Replayed, limits: Limits) -> Event:
-    """What the log says about a resumption.
-
-    Args:
-        record: the log so far.
-        replayed: what the strategy has learned of it.
-        limits: those that hold from here on.
-    """
+def _resumption(record: SessionRecord, replayed: Replayed, limits: Limits) -> Event:
+    """What the log says about a resumption."""
     was_s, now_s = record.header.limits.min_iti_s, limits.min_iti_s
     sentences = [f"Resumed after {len(replayed.trials)} trials."]
     if replayed.differing:
@@ -148,12 +149,7 @@ def resumption(record: SessionRecord, replayed: Replayed, limits: Limits) -> Eve
     return Event(kind="resume", trial=last, text=" ".join((*sentences, *record.losses)))
 
 
-def ages_s(salvaged: Salvage, trials: int) -> list[float]:
-    """How long ago each stimulus of a log was [s]; 0 for those of which nobody knows when they were.
-
-    Args:
-        salvaged: the log.
-        trials: how many stimuli there were.
-    """
+def _ages_s(salvaged: Salvage, trials: int) -> list[float]:
+    """How long ago each stimulus of a log was [s]; 0 for those of which nobody knows when they were."""
     known_s = pulses_s(salvaged)
     return [*known_s, *[0.0] * (trials - len(known_s))]

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Never
 
 from isiw.checks import choice
@@ -17,10 +16,10 @@ from isiw.devices.lock import driven
 from isiw.devices.protocol import Answer, Device, DeviceInfo
 from isiw.errors import DeviceError, StillArmedError, told
 from isiw.log.topics import waveform_topic
-from isiw.log.writer import LogWriter
 from isiw.session.interrupts import Interrupts
 from isiw.session.lastresort import INTERRUPTED, STILL_ARMED, end_process
 from isiw.session.safeguards import Safeguards
+from isiw.session.sink import Sink
 from isiw.signals.units import EMG_UNITS_MV
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus
@@ -38,22 +37,34 @@ class Rig:
         limits: what it may deliver.
         clock: tells the time between stimuli; a virtual one by default where the device is simulated.
         safeguards: deadlines and the dead man's switch.
+        sink: where faults go, and the log that a process that has to end writes to.
+        away: is entered while the process is suspended.
+        waits_for_nobody: whether a real device may have a virtual clock, as one that is checked.
 
     Raises:
         DeviceError: it does not say what it is in time, or is not simulated and has a virtual clock.
     """
 
-    def __init__(self, device: Device, limits: Limits, clock: Clock | None, safeguards: Safeguards) -> None:
-        self.interrupts = Interrupts(self.disarm, self._end_stuck)
-        self.faults: deque[str] = deque()
-        self.log: LogWriter | None = None
+    def __init__(
+        self,
+        device: Device,
+        limits: Limits,
+        clock: Clock | None,
+        safeguards: Safeguards,
+        sink: Sink,
+        *,
+        away: Callable[[], AbstractContextManager[None]] = nullcontext,
+        waits_for_nobody: bool = False,
+    ) -> None:
+        self.interrupts = Interrupts(self.disarm, self._end_stuck, away)
         self.staged_once = False
-        self._raw, self._limits, self._safeguards = device, limits, safeguards
+        self._raw, self._limits, self._safeguards, self._sink = device, limits, safeguards, sink
+        self._waits_for_nobody = waits_for_nobody
         self._punctual = PunctualDevice(
             device,
             safeguards.deadlines,
             given_up=lambda: self.interrupts.insisted,
-            report=self.faults.append,
+            report=sink.faults.append,
             still_armed=self._end_armed,
         )
         self.clock = clock or (VirtualClock() if self.info.simulated else MonotonicClock())
@@ -68,6 +79,7 @@ class Rig:
             delivered=delivered,
             earlier_s=earlier_s,
             dead_man=self._safeguards.dead_man,
+            waits_for_nobody=self._waits_for_nobody,
         )
 
     @property
@@ -158,16 +170,17 @@ class Rig:
         except Exception as another:
             if error is None:
                 raise
-            self.faults.append(f"unstage failed, too: {told(another)}")
-            error.add_note(self.faults[-1])
+            failed = f"unstage failed, too: {told(another)}"
+            self._sink.faults.append(failed)
+            error.add_note(failed)
         finally:
             self._punctual.release_thread()
 
     def _end_armed(self, error: StillArmedError) -> Never:
-        end_process(told(error), self.log, STILL_ARMED)
+        end_process(told(error), self._sink.writer, STILL_ARMED)
 
     def _end_stuck(self) -> None:
-        end_process("The session does not react. The device is disarmed.", self.log, INTERRUPTED)
+        end_process("The session does not react. The device is disarmed.", self._sink.writer, INTERRUPTED)
 
 
 def own_reference(reference: Reference) -> str:

@@ -3,32 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from isiw.checks import number, text
-from isiw.design import VALVE_SPACE
-from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
+from isiw.checks import number, text, whole
+from isiw.devices.clock import Clock, MonotonicClock, Pacing, VirtualClock
 from isiw.devices.limited import require_real_time
 from isiw.devices.limits import Limits
-from isiw.devices.pacing import Pacing
 from isiw.devices.protocol import DeviceInfo
-from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError, told
+from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError
 from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.pulses import pulses_s
-from isiw.log.reader import SessionRecord
+from isiw.log.reader import SessionRecord, read_any
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Header, Intent, PulseOutcome, StrategyRecipe, ThresholdBelief
-from isiw.log.threshold import outcomes, read_threshold_salvaged
+from isiw.log.schema import Event, Intent, PulseOutcome, StrategyRecipe, ThresholdBelief, ThresholdHeader
+from isiw.log.threshold import ThresholdRecord
 from isiw.log.writer import LogWriter
-from isiw.session.header import header_with, require_parts
-from isiw.signals.limits import SignalLimits
+from isiw.session.examination import Examination
+from isiw.session.header import begun, require_parts
+from isiw.session.sink import Sink
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
+from isiw.visit import interval_s
 
-__all__ = ["ThresholdRecorder", "open_threshold", "resume_threshold", "search_of"]
+__all__ = ["ThresholdRecorder", "open_threshold", "read_threshold", "resume_threshold", "search_of"]
 
 UNKNOWN = "outcome unknown"
 BY_HAND = DeviceInfo("a stimulator that is set by hand", "impact")
@@ -65,17 +66,15 @@ def open_threshold(
     path = require_parts(log, search=(search, ThresholdSearch), device=(device, DeviceInfo))
     if search.pulses:
         raise InvalidValueError("the search knows of pulses that are not this log's", got=len(search.pulses))
-    limits = Limits.of_space(VALVE_SPACE, min_iti_s=min_iti_s, max_pulses=max_pulses)
-    limits.require_effect()
-    header = header_with(
-        StrategyRecipe(name=f"threshold/{search.name}", seed=0, settings=search.settings),
+    header = ThresholdHeader(
+        **begun(seed=0),
         subject=text("subject", subject),
-        space=VALVE_SPACE,
-        limits=limits,
-        device=device,
-        signals=SignalLimits(),
-        config=dict(config or {}),
+        search=StrategyRecipe(name=search.name, seed=0, settings=search.settings),
         intensities=search.space,
+        min_iti_s=interval_s("min_iti_s", min_iti_s),
+        max_pulses=whole("max_pulses", max_pulses, least=1),
+        device=device,
+        config=dict(config or {}),
     )
     clock = _clock_for(device, clock)
     return ThresholdRecorder(search, LogWriter.create(path, header), header, clock)
@@ -104,7 +103,7 @@ def resume_threshold(
         LogError: no such log, or one of something else.
     """
     salvaged = salvage(log)
-    record = read_threshold_salvaged(salvaged)
+    record = _threshold_of(read_any(salvaged, LogKind.THRESHOLD))
     record.require_read()
     clock = _clock_for(record.header.device, clock)
     if record.end_lost:
@@ -113,14 +112,33 @@ def resume_threshold(
             got=str(record.path),
             remedy="Begin a new log, with the pulses that the stimulator has counted taken off max_pulses.",
         )
-    search, known = search_of(record, search), outcomes(record)
+    search = search_of(record, search)
     writer = LogWriter.continuing(log, salvaged, record.header)
-    recorder = ThresholdRecorder(search, writer, record.header, clock, known, pulses_s(salvaged))
+    recorder = ThresholdRecorder(search, writer, record.header, clock, record.outcomes, pulses_s(salvaged))
     recorder.conclude_open(record.unknown)
     return recorder
 
 
-def search_of(record: SessionRecord, search: ThresholdSearch | None = None) -> ThresholdSearch:
+def read_threshold(path: str | Path) -> ThresholdRecord:
+    """Read the log of a search for the motor threshold, finished or not, whole or damaged.
+
+    Args:
+        path: the log, with or without `.part`.
+
+    Raises:
+        LogError: no such file, not a log, or one of something else.
+        DamagedLogError: a log of which not even the header can be read.
+    """
+    return _threshold_of(read_any(salvage(path), LogKind.THRESHOLD))
+
+
+def _threshold_of(record: SessionRecord | ThresholdRecord) -> ThresholdRecord:
+    if isinstance(record, ThresholdRecord):
+        return record
+    raise of_another_kind(record.path, LogKind.SEARCH, LogKind.THRESHOLD)
+
+
+def search_of(record: ThresholdRecord, search: ThresholdSearch | None = None) -> ThresholdSearch:
     """The search of a log, which has learnt its pulses.
 
     Args:
@@ -129,17 +147,14 @@ def search_of(record: SessionRecord, search: ThresholdSearch | None = None) -> T
 
     Raises:
         InvalidValueError: as for `resume_threshold`.
-        LogError: the log is of something else.
     """
-    recipe, space = record.header.strategy, record.header.intensities
-    if space is None:
-        raise of_another_kind(record.path, LogKind.SEARCH, LogKind.THRESHOLD)
+    recipe, space = record.header.search, record.header.intensities
     if search is not None and search.space != space:
         raise InvalidValueError(
             "the search has another range of intensities than the log", got=search.space, expected=str(space)
         )
-    search = search or make_threshold_search(recipe.name.removeprefix("threshold/"), space, **recipe.settings)
-    search.pulses = tuple(_pulse(each) for each in outcomes(record) if not each.reason)
+    search = search or make_threshold_search(recipe.name, space, **recipe.settings)
+    search.pulses = _learnable(record.outcomes)
     return search
 
 
@@ -149,8 +164,53 @@ def _a_reason(reason: str) -> str:
     return reason
 
 
-def _pulse(outcome: PulseOutcome) -> Pulse:
-    return Pulse(number("intensity_pct_mso", outcome.intensity_pct_mso), outcome.mep_mv, outcome.response)
+def _learnable(outcomes: Iterable[PulseOutcome]) -> tuple[Pulse, ...]:
+    """What is learnt from some outcomes."""
+    return tuple(
+        Pulse(number("intensity_pct_mso", each.intensity_pct_mso), each.mep_mv, each.response)
+        for each in outcomes
+        if not each.reason
+    )
+
+
+@dataclass(frozen=True)
+class _Pulses:
+    """What came of each pulse, as it counts now, in order; its length is how many were given, or may have been."""
+
+    outcomes: tuple[PulseOutcome, ...] = ()
+
+    def __len__(self) -> int:
+        return max((outcome.trial for outcome in self.outcomes), default=-1) + 1
+
+    def appended(self, outcome: PulseOutcome) -> _Pulses:
+        return _Pulses(tuple(sorted((*self.outcomes, outcome), key=lambda each: each.trial)))
+
+
+class _Search:
+    """A search as an examination sees it."""
+
+    def __init__(self, search: ThresholdSearch, known: int) -> None:
+        self.search, self.known = search, known
+
+    def learn(self, outcome: PulseOutcome) -> None:
+        self.search.pulses = (*self.search.pulses, *_learnable([outcome]))
+        self.known = outcome.trial + 1
+
+    def trouble_with(self, outcome: PulseOutcome) -> None:
+        """Nothing goes wrong when a pulse is learnt."""
+
+    def learn_again(self, trials: _Pulses) -> None:
+        self.search.pulses, self.known = _learnable(trials.outcomes), len(trials)
+
+    def judged(self, trials: _Pulses, verdict: Event) -> _Pulses:
+        reason, number = {"reason": verdict.text}, verdict.trial
+        return _Pulses(tuple(x.model_copy(update=reason) if x.trial == number else x for x in trials.outcomes))
+
+    def decision(self) -> StopDecision:
+        return self.search.decision()
+
+    def belief(self, trial: int, decision: StopDecision, _: float | None) -> ThresholdBelief:
+        return ThresholdBelief(trial=trial, estimate=self.search.estimate(), decision=decision)
 
 
 class ThresholdRecorder:
@@ -169,39 +229,40 @@ class ThresholdRecorder:
         self,
         search: ThresholdSearch,
         log: LogWriter,
-        header: Header,
+        header: ThresholdHeader,
         clock: Clock,
         earlier: Iterable[PulseOutcome] = (),
         ages_s: Sequence[float] = (),
     ) -> None:
-        self.search, self.header, self._log, self._clock = search, header, log, clock
-        self._limits = header.limits
-        self._outcomes = {outcome.trial: outcome for outcome in earlier}
-        self._pacing = Pacing(header.limits, clock, ages_s)
+        self.header, self._log, self._clock = header, log, clock
+        table, self._sink = _Pulses(tuple(earlier)), Sink(log=log)
+        self._examination: Examination[_Search, _Pulses, PulseOutcome] = Examination(
+            _Search(search, len(table)), table, self._sink
+        )
+        self._pacing = Pacing(Limits(0.0, 0.0, header.min_iti_s), clock, ages_s)  # a pulse alone has no ISI
         self._asked: float | None = None
+
+    @property
+    def search(self) -> ThresholdSearch:
+        """What proposes intensities and learns."""
+        return self._examination.learner.search
 
     @property
     def outcomes(self) -> tuple[PulseOutcome, ...]:
         """What came of each pulse so far, as it counts now, in order."""
-        return tuple(self._outcomes[trial] for trial in sorted(self._outcomes))
+        return self._examination.trials.outcomes
 
     @property
     def given(self) -> int:
         """How many pulses were given, or may have been; also the number of the next one."""
-        return max(self._outcomes, default=-1) + 1
+        return len(self._examination.trials)
 
     def conclude_open(self, intents: Sequence[Intent]) -> None:
-        """Log that nobody knows the outcome of pulses that were about to be given.
-
-        Args:
-            intents: what was given by the log, or may have been.
-        """
+        """Log that nobody knows the outcome of pulses that were given by the log, or may have been."""
         for intent in intents:
-            if intent.trial not in self._outcomes:
-                at = intent.intensity_pct_mso
-                self._conclude(PulseOutcome(trial=intent.trial, intensity_pct_mso=at, reason=UNKNOWN))
-        self._log.append(Event(kind="resume", text=f"Went on after {self.given} pulses."))
-        self._log.sync()
+            at = intent.intensity_pct_mso
+            self._conclude(PulseOutcome(trial=intent.trial, intensity_pct_mso=at, reason=UNKNOWN))
+        self._examination.event("resume", f"Went on after {self.given} pulses.", durable=True)
 
     def ask(self) -> float:
         """The next intensity [% MSO], the same until its outcome; on disk as about to be given before this returns.
@@ -215,8 +276,7 @@ class ThresholdRecorder:
             intensity = self.search.ask()
             self._clock.sleep_s(self._pacing.wait_s())
             now_s = self._clock.now_s()
-            self._log.append(Intent(trial=self.given, isi_ms=None, t_s=now_s, intensity_pct_mso=intensity))
-            self._log.sync()
+            self._examination.intend(Intent(trial=self.given, isi_ms=None, t_s=now_s, intensity_pct_mso=intensity))
             self._log.require_in_place()
             self._asked = intensity
         return self._asked
@@ -257,8 +317,7 @@ class ThresholdRecorder:
             LogError: the log cannot be written.
         """
         self._require_asked()
-        self._log.append(Event(kind="refused", trial=self.given, text="not given, said the operator"))
-        self._log.sync()
+        self._examination.event("refused", "not given, said the operator", self.given, durable=True)
         self._asked = None
 
     def exclude(self, trial: int, reason: str) -> None:
@@ -279,9 +338,9 @@ class ThresholdRecorder:
                 got=trial,
                 expected=f"a pulse that counts: {', '.join(map(str, counting)) or 'none'}",
             )
-        self._log.append(Event(kind="exclusion", trial=trial, text=_a_reason(reason)))
-        self._outcomes[trial] = self._outcomes[trial].model_copy(update={"reason": reason})
-        self._learn()
+        text = _a_reason(reason)
+        self._examination.judge(lambda _: Event(kind="exclusion", trial=trial, text=text))
+        self._examination.conclude()
 
     def estimate(self) -> ThresholdEstimate:
         """What is believed about the threshold now."""
@@ -302,15 +361,15 @@ class ThresholdRecorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            if error is not None and self._log.is_open:
-                self._log.append(Event(kind="fault", text=told(error)))
+            if error is not None and self._sink.is_open:
+                self._examination.log_failure(error)
         finally:
             self.close()
 
     def _require_left(self) -> None:
-        if self.given >= self._limits.max_pulses:
+        if self.given >= self.header.max_pulses:
             raise LimitExceededError(
-                f"the limit of {self._limits.max_pulses} pulses is reached, so no further pulse is asked for",
+                f"the limit of {self.header.max_pulses} pulses is reached, so no further pulse is asked for",
                 remedy="For more pulses begin a new log with a larger --max-pulses (max_pulses in Python).",
             )
 
@@ -331,16 +390,9 @@ class ThresholdRecorder:
         )
 
     def _conclude(self, outcome: PulseOutcome) -> None:
-        """Put a pulse on disk, then learn it, then put on disk what is believed."""
-        self._log.append(outcome)
-        self._log.sync()
-        self._outcomes[outcome.trial] = outcome
+        """Put a pulse on disk, then learn it, then put on disk what is known."""
+        self._examination.came(outcome)
+        self._sink.log.sync()
         self._asked = None
         self._pacing.came()
-        self._learn()
-
-    def _learn(self) -> None:
-        self.search.pulses = tuple(_pulse(outcome) for outcome in self.outcomes if not outcome.reason)
-        belief = ThresholdBelief(trial=self.given - 1, estimate=self.estimate(), decision=self.decision())
-        self._log.append(belief)
-        self._log.sync()
+        self._examination.conclude()

@@ -11,7 +11,7 @@ from typing import Any, Final
 from isiw.checks import text
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
-from isiw.log.schema import Header
+from isiw.log.schema import ThresholdHeader
 from isiw.session.threshold import ThresholdRecorder, open_threshold
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.search import ThresholdSearch
@@ -60,7 +60,7 @@ def open_simulated(
     )
 
 
-def simulated_person(header: Header) -> StimulatedPerson | None:
+def simulated_person(header: ThresholdHeader) -> StimulatedPerson | None:
     """The simulated person of a log; None where nobody, or somebody else's person, was simulated.
 
     Args:

@@ -15,6 +15,7 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readine
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered, StillArmedError, told
 from isiw.session.rig import Rig
 from isiw.session.safeguards import Safeguards
+from isiw.session.sink import Sink
 from isiw.testing.requirements import broken, require
 from isiw.trials import Stimulus
 
@@ -51,7 +52,8 @@ class Guarded:
     def __init__(self, device: Device, pace: Pace) -> None:
         self._device, self._pace, self._delivered = device, pace, 0
         self._kept = _KeptDisarmed(device)
-        self._rig = Rig(self._kept, pace.limits, _GivenClock(pace.clock), Safeguards())
+        self._sink = Sink()
+        self._rig = Rig(self._kept, pace.limits, pace.clock, Safeguards(), self._sink, waits_for_nobody=True)
 
     @property
     def info(self) -> DeviceInfo:
@@ -63,7 +65,7 @@ class Guarded:
         """Within, no session drives the device, and every signal disarms it and ends the check."""
         with driven(self._device, self._rig.info), self._rig.interrupts:
             yield
-        faults = "; ".join(self._rig.faults)
+        faults = "; ".join(self._sink.faults)
         require(not faults, "stop and unstage work in any state", faults)
 
     @contextmanager
@@ -184,16 +186,3 @@ class _KeptDisarmed:
 
     def unstage(self) -> None:
         self._device.unstage()
-
-
-class _GivenClock:
-    """The check's clock; a virtual one, which a session refuses for a real device, is up to whoever gives it."""
-
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
-
-    def now_s(self) -> float:
-        return self._clock.now_s()
-
-    def sleep_s(self, duration_s: float) -> None:
-        self._clock.sleep_s(duration_s)

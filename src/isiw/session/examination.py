@@ -1,0 +1,329 @@
+"""The examination: what is known of a person, and the one way in which a trial or a verdict changes it.
+
+Ask, log the intent, log what came of it, learn it, log what is known then: the same for the closed loop, for a loop of
+the lab's own, and for the search for a motor threshold. The intent is on disk before the stimulus is delivered, the
+trial before it is learnt, and it is learnt before the next stimulus. Each step is taken once, even if the next one is
+interrupted. After a verdict all trials are learnt again, as they count from then on.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+from typing import Any, Generic, NamedTuple, ParamSpec, Protocol, TypeAlias, TypeVar
+
+from isiw import checks
+from isiw.errors import LimitExceededError, told
+from isiw.findings import Kind
+from isiw.log.schema import Estimate, Event, EventKind, Intent, Record
+from isiw.log.verdicts import excluded_by, under_all
+from isiw.session.sink import Sink
+from isiw.strategy.choosing import candidate_isis
+from isiw.strategy.stopping import StopDecision
+from isiw.strategy.strategy import Strategy
+from isiw.trials import Trial, TrialTable
+from isiw.types import FloatArray
+
+__all__ = ["WindowExamination", "believed", "learn", "relearned"]
+
+P = ParamSpec("P")
+T = TypeVar("T")
+TrialT = TypeVar("TrialT")
+TrialT_contra = TypeVar("TrialT_contra", contravariant=True)
+
+DIGITS = 4
+"""Significant digits of predicted amplitudes and scores, which are for pictures."""
+
+
+class _Trials(Protocol[TrialT_contra]):
+    """All trials so far, as they count now; its length is how many stimuli were given."""
+
+    def __len__(self) -> int: ...
+    def appended(self, trial: TrialT_contra, /) -> Any: ...
+
+
+TableT = TypeVar("TableT", bound=_Trials[Any])
+LearnerT = TypeVar("LearnerT", bound="_Learner[Any, Any]")
+
+
+class _Learner(Protocol[TableT, TrialT_contra]):
+    """What learns from stimuli, of which it knows `known`: a strategy for a window, or a search for a threshold."""
+
+    @property
+    def known(self) -> int: ...
+    def learn(self, trial: TrialT_contra, /) -> None: ...
+    def trouble_with(self, trial: TrialT_contra, /) -> str | None: ...
+    def learn_again(self, trials: TableT, /) -> None: ...
+    def judged(self, trials: TableT, verdict: Event, /) -> TableT: ...
+    def decision(self) -> StopDecision: ...
+    def belief(self, trial: int, decision: StopDecision, next_isi_ms: float | None, /) -> Record: ...
+
+
+class Known(NamedTuple):
+    """What follows from what is known now: whether to stop, and the next ISI [ms] if it was asked for."""
+
+    decision: StopDecision
+    next_isi_ms: float | None
+
+
+def _directly(call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    return call(*args, **kwargs)
+
+
+class Examination(Generic[LearnerT, TableT, TrialT]):
+    """The trials so far and what was learnt from them, ahead of which is always the log. Safe in several threads.
+
+    Args:
+        learner: proposes stimuli and learns; it has learnt the earlier trials.
+        trials: what was delivered before.
+        sink: where all goes that happens, the log first.
+        events: what happened before.
+        freely: calls what may be interrupted at any time.
+    """
+
+    def __init__(
+        self,
+        learner: LearnerT,
+        trials: TableT,
+        sink: Sink,
+        events: Iterable[Event] = (),
+        freely: Callable[..., Any] = _directly,
+    ) -> None:
+        self.learner, self.trials, self._sink, self._freely = learner, trials, sink, freely
+        self.unconcluded: TrialT | None = None
+        self.overruled = False
+        self._events = list(events)
+        self._keys = {event.key for event in self._events}
+        self._refusal: Exception | None = None
+        self._lock = threading.RLock()
+
+    @property
+    def last(self) -> int | None:
+        """The number of the last trial; None before the first."""
+        return len(self.trials) - 1 if len(self.trials) else None
+
+    @property
+    def last_excluded(self) -> int | None:
+        """The trial that was excluded last, of those that are; None if none is."""
+        excluded = excluded_by(self._events)
+        return excluded[-1] if excluded else None
+
+    def event(
+        self,
+        kind: EventKind,
+        text: str,
+        trial: int | None = None,
+        *,
+        finding: Kind | None = None,
+        durable: bool = False,
+    ) -> None:
+        """Log that something happened, to the last trial if none is said; `durable` returns once it is on the disk."""
+        self._sink.append(Event(kind=kind, finding=finding, trial=self.last if trial is None else trial, text=text))
+        if durable:
+            self._sink.log.sync()
+
+    def note(self, text: str, trial: int | None = None, key: str | None = None) -> None:
+        """Put a remark on disk; with a key that a note has already, nothing."""
+        checks.text("a note", text)
+        checks.text("the key of a note", key or "")
+        with self._lock:
+            if key is None or key not in self._keys:
+                self._sink.append(Event(kind="note", trial=self.last if trial is None else trial, text=text, key=key))
+                self._keys.add(key)
+        self._sink.log.sync()
+
+    def log_faults(self) -> None:
+        """Log what went wrong and was overcome, in whichever thread."""
+        while self._sink.faults:
+            self.event("fault", self._sink.faults.popleft())
+
+    def log_refusal(self, kind: EventKind, error: Exception, trial: int | None = None) -> None:
+        """Log that a stimulus was refused; if that ends the session, it is not logged again."""
+        self.event(kind, told(error), trial)
+        self._refusal = error
+
+    def log_failure(self, error: BaseException) -> None:
+        """Log what ends a session before its time."""
+        if error is self._refusal:
+            return
+        kind: EventKind = "limit" if isinstance(error, LimitExceededError) else "fault"
+        self.event(kind, "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else told(error))
+
+    def intend(self, intent: Intent, fallback: str | None = None) -> bool:
+        """Put on disk what is about to be delivered; False, and nothing is, if a trial was judged since the ask."""
+        with self._lock:
+            if self.overruled:
+                return False
+            if fallback is not None:
+                self._sink.append(Event(kind="fallback", trial=intent.trial, text=fallback))
+            self._sink.append(intent)
+        self._sink.log.sync()
+        return True
+
+    def came(self, trial: TrialT) -> None:
+        """Log what came of a stimulus; it stays unconcluded until it is learnt and what is known then is logged."""
+        with self._lock:
+            self._sink.append(trial)  # type: ignore[arg-type]  # a Trial or a PulseOutcome
+            self.trials = self.trials.appended(trial)
+            self.unconcluded = trial
+
+    def judge(self, verdict: Callable[[TableT], Event]) -> None:
+        """Put on disk what an operator says about a trial; from then on all trials have to be learnt again."""
+        with self._lock:
+            event = verdict(self.trials)
+            self._sink.append(event)
+            self.trials = self.learner.judged(self.trials, event)
+            self._events.append(event)
+            self.overruled = True
+        self._sink.log.sync()
+
+    def conclude(
+        self,
+        decide: Callable[[], StopDecision] | None = None,
+        ask_next: Callable[[], float | None] = lambda: None,
+    ) -> Known | None:
+        """Learn what is not learnt yet, and log what is known then, as `log_belief` does; None if all was learnt."""
+        trial = self.unconcluded
+        if not self.overruled and trial is None:
+            return None
+        if self.overruled:
+            self._learn_again()
+        if trial is not None:
+            self._learn(trial)
+        known = self.log_belief(decide, ask_next) if len(self.trials) else None
+        if trial is not None:
+            self.unconcluded = None
+        return known
+
+    def _learn_again(self) -> None:
+        self.overruled = False
+        try:
+            self._freely(self.learner.learn_again, self.trials)
+        except BaseException:
+            self.overruled = True
+            raise
+
+    def _learn(self, trial: TrialT) -> None:
+        if self.learner.known < len(self.trials):
+            self._freely(self.learner.learn, trial)
+        trouble = self.learner.trouble_with(trial)
+        if trouble is not None and self._sink.is_open:
+            self.event("fit", trouble)
+
+    def log_belief(
+        self,
+        decide: Callable[[], StopDecision] | None = None,
+        ask_next: Callable[[], float | None] = lambda: None,
+    ) -> Known:
+        """Log, if the log is open, what is known after the last trial, whether to stop, and else what is asked next."""
+        decision = self._freely(decide or self.learner.decision)
+        known = Known(decision, None if decision.stop else ask_next())
+        if self._sink.is_open:
+            self._sink.append(self._freely(self.learner.belief, len(self.trials) - 1, *known))
+            self._sink.log.sync()
+        return known
+
+
+class _Window:
+    """A strategy as an examination sees it; another one once all trials were learnt again."""
+
+    def __init__(self, strategy: Strategy) -> None:
+        self.strategy = strategy
+
+    @property
+    def known(self) -> int:
+        return self.strategy.delivered
+
+    def learn(self, trial: Trial) -> None:
+        learn(self.strategy, trial)
+
+    def trouble_with(self, trial: Trial) -> str | None:
+        return self.strategy.trouble if trial.told else None
+
+    def learn_again(self, trials: TrialTable) -> None:
+        self.strategy = relearned(self.strategy, trials)
+
+    def judged(self, trials: TrialTable, verdict: Event) -> TrialTable:
+        return under_all(trials, [verdict])
+
+    def decision(self) -> StopDecision:
+        return self.strategy.decision()
+
+    def belief(self, trial: int, decision: StopDecision, next_isi_ms: float | None) -> Estimate:
+        return believed(self.strategy, trial, decision, next_isi_ms)
+
+
+WindowExamination: TypeAlias = Examination[_Window, TrialTable, Trial]
+
+
+def examination_of(
+    strategy: Strategy,
+    sink: Sink,
+    trials: TrialTable | None = None,
+    events: Iterable[Event] = (),
+    freely: Callable[..., Any] = _directly,
+) -> WindowExamination:
+    """The examination in which a strategy looks for a window; it has learnt the earlier trials."""
+    return Examination(_Window(strategy), trials or TrialTable(), sink, events, freely)
+
+
+def learn(strategy: Strategy, trial: Trial) -> None:
+    """Tell a strategy one trial, or count it if there is nothing to tell.
+
+    Args:
+        strategy: the strategy.
+        trial: the trial.
+    """
+    if trial.told:
+        strategy.learn(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
+    elif trial.is_control:
+        strategy.count_control()
+    elif trial.excluded and trial.reason is None:
+        strategy.count_excluded()
+    else:
+        strategy.count_mistrial()
+
+
+def relearned(strategy: Strategy, trials: Iterable[Trial]) -> Strategy:
+    """The same strategy, which has learnt all trials from the beginning.
+
+    Args:
+        strategy: the strategy.
+        trials: what it learns.
+    """
+    again = strategy.restarted()
+    for trial in trials:
+        learn(again, trial)
+    return again
+
+
+def believed(strategy: Strategy, trial: int, decision: StopDecision, next_isi_ms: float | None) -> Estimate:
+    """The record of what a strategy knows after a trial; scores are those that it has worked out anyway.
+
+    Args:
+        strategy: the strategy.
+        trial: the number of the trial.
+        decision: whether to stop, and why.
+        next_isi_ms: what is asked next [ms]; None if nothing was asked.
+    """
+    record = Estimate.of(trial, strategy.estimate(), decision, next_isi_ms)
+    predicted = _predicted(strategy) if record.grid_ms else {}
+    return record.model_copy(update=predicted | ({} if next_isi_ms is None else _chosen(strategy)))
+
+
+def _predicted(strategy: Strategy) -> dict[str, Any]:
+    band = strategy.prediction_mv()
+    return {} if band is None else {"predicted_low_mv": _rounded(band[0]), "predicted_high_mv": _rounded(band[1])}
+
+
+def _chosen(strategy: Strategy) -> dict[str, Any]:
+    choice = strategy.choice
+    if choice is None or choice.scores is None:
+        return {} if choice is None else {"chosen_by": choice.by}
+    isis_ms = tuple(candidate_isis(strategy.space).tolist())
+    scores = _rounded(choice.scores.detach().double().numpy())
+    return {"chosen_by": choice.by, "scored_ms": isis_ms, "scores": scores}
+
+
+def _rounded(values: FloatArray) -> tuple[float, ...]:
+    return tuple(float(f"{value:.{DIGITS}g}") for value in values)

@@ -1,0 +1,146 @@
+"""The sink of a session: what happens goes to its log first, then to all who look on, the screen, and the caller."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Protocol
+
+from isiw.errors import InvalidValueError, told
+from isiw.log.schema import Record
+from isiw.log.writer import LogWriter
+from isiw.session.updates import SessionUpdate
+
+__all__ = ["Follower"]
+
+
+class Follower(Protocol):
+    """Somebody who looks on. Each call has to return at once; `logged` comes from several threads."""
+
+    def logged(self, record: Record, channel_name: str | None) -> None:
+        """A record was appended to the log.
+
+        Args:
+            record: the record.
+            channel_name: the channel, of a waveform.
+        """
+
+    def updated(self, update: SessionUpdate) -> None:
+        """A trial is concluded.
+
+        Args:
+            update: what is known after it.
+        """
+
+    def ended(self) -> None:
+        """The session has ended, and its log is closed."""
+
+    def is_attended(self) -> bool:
+        """Whether somebody is there who can say how a pause ends."""
+
+
+class _Screen(Protocol):
+    """What the operator sees while a session runs."""
+
+    def updated(self, update: SessionUpdate) -> None: ...
+    def waiting(self, left_s: float, text: str) -> None: ...
+    def waited(self) -> None: ...
+
+
+class Sink:
+    """Takes all that happens. A follower whose call fails gets nothing more, and the session goes on.
+
+    Args:
+        on_trial: called after every trial; what it raises ends the session.
+        log: where it is open already.
+    """
+
+    def __init__(self, on_trial: Callable[[SessionUpdate], None] | None = None, log: LogWriter | None = None) -> None:
+        self.on_trial = on_trial
+        self.followers: list[Follower] = []
+        self.writer = log
+        self._screen: _Screen | None = None
+        self.faults: deque[str] = deque()
+        """What went wrong and was overcome, in whichever thread, and is not in the log yet."""
+
+    @contextmanager
+    def writing(self, log: LogWriter, screen: _Screen | None = None) -> Iterator[None]:
+        """Within, the log is open, and the operator sees what happens.
+
+        Args:
+            log: the log.
+            screen: what the operator sees.
+        """
+        self.writer, self._screen = log, screen
+        try:
+            yield
+        finally:
+            self.writer = self._screen = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the log is open."""
+        return self.writer is not None and self.writer.is_open
+
+    @property
+    def log(self) -> LogWriter:
+        """The open log.
+
+        Raises:
+            InvalidValueError: there is none.
+        """
+        if self.writer is None:
+            raise InvalidValueError(
+                "the session is not running, so nothing can be added to its log",
+                remedy="Do it while run() is busy, from on_trial or another thread. When no session is writing the "
+                "log, use isiw.exclude and isiw.include.",
+            )
+        return self.writer
+
+    def append(self, record: Record, channel_name: str | None = None) -> None:
+        """Log a record; it is durable after the next `sync`.
+
+        Args:
+            record: the record.
+            channel_name: the channel, of a waveform.
+        """
+        self.log.append(record, channel_name)
+        self._each(lambda follower: follower.logged(record, channel_name))
+
+    def updated(self, update: SessionUpdate) -> None:
+        """A trial is concluded."""
+        self._each(lambda follower: follower.updated(update))
+        if self._screen is not None:
+            self._screen.updated(update)
+        if self.on_trial is not None:
+            self.on_trial(update)
+
+    def waiting(self, left_s: float, text: str) -> None:
+        """The next stimulus is waited for."""
+        if self._screen is not None:
+            self._screen.waiting(left_s, text)
+
+    def waited(self) -> None:
+        """The wait is over."""
+        if self._screen is not None:
+            self._screen.waited()
+
+    def ended(self) -> None:
+        """The session has ended, and its log is closed."""
+        self._each(lambda follower: follower.ended())
+
+    def nobody(self) -> bool:
+        """Whether none of the followers is attended."""
+        attended: list[bool] = []
+        self._each(lambda follower: attended.append(follower.is_attended()))
+        return not any(attended)
+
+    def _each(self, tell: Callable[[Follower], None]) -> None:
+        for follower in tuple(self.followers):
+            try:
+                tell(follower)
+            except Exception as error:  # noqa: BLE001 - who looks on must not stop a session
+                with suppress(ValueError):  # another thread, in which it failed as well, was first
+                    self.followers.remove(follower)
+                    self.faults.append(f"A viewer failed and gets no further updates: {told(error)}")
