@@ -240,7 +240,7 @@ def test_a_key_that_an_older_log_has_in_the_notes_text_is_still_recognised(
     done(client.post(f"{session}/resume"))
     for key in ("n1", "n2"):
         done(client.post(f"{session}/note", json={"text": "again", "key": key}))
-    assert notes_in(tmp_path / "P07.mcap") == [("coil moved (key n1)", None), ("again", "n2")]
+    assert notes_in(tmp_path / "P07.mcap") == [("coil moved (key n1)", "n1"), ("again", "n2")]
 
 
 def test_the_same_creation_once_more_is_answered_as_at_first_until_something_was_asked(client: httpx.Client) -> None:
