@@ -25,6 +25,13 @@ def test_without_tms_alone_the_floor_is_the_median_of_all_meps() -> None:
     assert FloorTreatment().level_mv(trials([])) == 0.0
 
 
+def test_the_lowest_tenth_is_no_higher_where_most_trials_lie_inside_the_window() -> None:
+    inside = [0.01, 0.012, 0.2, 0.25, 0.3, 0.22, 0.28, 0.31, 0.26, 0.24, 0.27]
+    assert FloorTreatment("lowest").level_mv(trials(inside)) == pytest.approx(0.012)
+    assert FloorTreatment("subtracted").level_mv(trials(inside)) > 0.2
+    assert FloorTreatment("lowest").level_mv(trials(inside, [0.02])) == 0.02
+
+
 @pytest.mark.parametrize("kind", ["zeroed", "raw"])
 def test_only_a_subtracted_floor_is_above_zero(kind: FloorKind) -> None:
     assert FloorTreatment(kind).level_mv(trials([0.1, 0.2], [0.01])) == 0.0

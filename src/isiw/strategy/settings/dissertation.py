@@ -18,6 +18,7 @@ from isiw.models.dissertation.incremental import SweepModel
 from isiw.models.dissertation.nonlinear import NonlinearRegression
 from isiw.models.dissertation.regression import RegressionModel
 from isiw.models.dissertation.svr import SupportVectorRegression
+from isiw.models.shared.floor import FloorTreatment
 from isiw.strategy.settling import EdgeVariance, ParticleSpread, SweptPast
 from isiw.strategy.stopping import AnyOf, Budget, StoppingRule
 
@@ -164,7 +165,9 @@ class NRSettings:
         stopping: when to stop.
     """
 
-    model: RegressionModel = field(default_factory=lambda: RegressionModel(NonlinearRegression()))
+    model: RegressionModel = field(
+        default_factory=lambda: RegressionModel(NonlinearRegression(), FloorTreatment("lowest"))
+    )
     asking: EvenStart = field(default_factory=lambda: EvenStart(initial=6))
     stopping: Settling = field(default_factory=Settling)
 
