@@ -6,6 +6,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from isiw.cli import app
+from isiw.session import read_threshold, search_of
 
 
 def run(*arguments: object, typed: str | None = None) -> Result:
@@ -106,3 +107,16 @@ def test_the_log_of_a_threshold_is_not_shown_as_a_session(finished: Path) -> Non
     result = CliRunner().invoke(app, ["show", str(finished)])
     assert result.exit_code == 1
     assert "isiw threshold" in result.output
+
+
+def test_more_than_five_of_ten_is_an_option_that_its_log_keeps(tmp_path: Path) -> None:
+    log = tmp_path / "t.mcap"
+    result = run(log, "--method", "five-of-ten", "--enough", 6, "--seed", 3)
+    assert result.exit_code == 0, result.output
+    assert search_of(read_threshold(log)).settings["enough"] == 6
+
+
+def test_only_five_of_ten_counts_responses(tmp_path: Path) -> None:
+    result = run(tmp_path / "t.mcap", "--enough", 6)
+    assert result.exit_code == 1
+    assert "enough" in result.output

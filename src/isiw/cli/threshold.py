@@ -37,6 +37,10 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
     method: Annotated[
         str | None, typer.Option(help="bayes, maximum-likelihood or five-of-ten; default bayes.", **NO_DEFAULT)
     ] = None,
+    enough: Annotated[
+        int | None,
+        typer.Option(help="five-of-ten: how many of ten suffice; default 5, and 6 for more than five.", **NO_DEFAULT),
+    ] = None,
     max_pulses: Annotated[
         int | None, typer.Option(help="Largest number of pulses, including lost ones; default 100.", **NO_DEFAULT)
     ] = None,
@@ -55,6 +59,7 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
     """Find the resting motor threshold of a simulated person, or of a person whose stimulator you set by hand."""
     settings: dict[str, Any] = {
         "method": method,
+        "enough": enough,
         "high": high,
         "low": low,
         "step": step,
@@ -78,11 +83,12 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
         _say_what_is_there(log)
 
 
-def _begun(
+def _begun(  # noqa: PLR0913 - an option each
     log: Path,
     *,
     by_hand: bool,
     method: str = "bayes",
+    enough: int | None = None,
     high: float | None = None,
     low: float = 20.0,
     step: float = 1.0,
@@ -95,7 +101,8 @@ def _begun(
             "the highest intensity is missing", remedy="Say with --high how far you may go with this person."
         )
     space = isiw.strategy.threshold.IntensityRange(low, 100.0 if high is None else high, step)
-    search = isiw.strategy.threshold.make_threshold_search(method, space)
+    own = {} if enough is None else {"enough": enough}
+    search = isiw.strategy.threshold.make_threshold_search(method, space, **own)
     if by_hand:
         return isiw.session.open_threshold(search, log, **options)
     return isiw.session.open_simulated(search, log, cohort=cohort, seed=seed, **options)
