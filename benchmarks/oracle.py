@@ -4,6 +4,9 @@ It knows the profile's family, the response and its noise, the baseline and the 
 width is the cohort's. It designs by greedy mutual information on a 5 ms grid and reports the window of largest
 posterior expected F1, or "no window" if that has more. Outcomes are exact bin probabilities of the log MEP. Of what
 varies from trial to trial besides (drift and start-up, hit delay, untold jitter) it knows nothing.
+
+The second oracle knows all of this but that there is a window: it gives "no window" the share that the default does.
+The first knows more than anybody can who has not seen the person's MEPs.
 """
 
 from __future__ import annotations
@@ -25,6 +28,9 @@ from isiw.subjects.responses import GainResponse, RecruitmentResponse, ResponseC
 from isiw.subjects.subject import OUTLIERS_MV, SimulatedSubject
 from isiw.types import BoolArray, FloatArray
 from isiw.window import Window, least_excess_mv
+
+P_WINDOW: Final = 0.72
+"""How probable a window is to the second oracle, where the cohort itself does not say: all have one."""
 
 LEVELS = np.linspace(0.0, 1.0, 61) ** 2
 BINS = 72
@@ -166,11 +172,13 @@ class Oracle:
         subject: the person, with a profile of one symmetric peak.
         space: the design space.
         spans: the windows of the cohort that the person is of.
+        p_window: how probable a window is before the first trial.
     """
 
     subject: SimulatedSubject
     space: DesignSpace
     spans: Spans
+    p_window: float = 1.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.subject.profile, PeakProfile):
@@ -185,6 +193,14 @@ class Oracle:
         self._level_at = self._levels(self.candidates_ms)
         self._masks = self._windows(self._facilitation(grid))
         self._log_weights = np.log(self.spans.shares)
+        if self.p_window < 1.0:
+            self._doubt()
+
+    def _doubt(self) -> None:
+        """Add the hypothesis that there is no window: no ISI facilitates anything."""
+        self._level_at = np.vstack((self._level_at, np.zeros_like(self._level_at[:1])))
+        self._masks = np.vstack((self._masks, np.zeros_like(self._masks[:1])))
+        self._log_weights = np.append(self._log_weights + np.log(self.p_window), np.log1p(-self.p_window))
 
     def _windows(self, facilitation: FloatArray) -> BoolArray:
         """Windows by the 0.135 rule, empty where the range reaches too little, shape of `facilitation`."""
@@ -215,7 +231,10 @@ class Oracle:
         if isi_ms is None or mep_mv is None:
             raise ValueError("the oracle is told amplitudes at ISIs only")
         outcome = np.searchsorted(self._edges_mv, mep_mv / self.subject.scale)
-        self._log_weights += np.log(self._mass[self._levels(np.array([isi_ms]))[:, 0], outcome])
+        levels = self._levels(np.array([isi_ms]))[:, 0]
+        if self.p_window < 1.0:
+            levels = np.append(levels, 0)
+        self._log_weights += np.log(self._mass[levels, outcome])
         self._log_weights -= np.logaddexp.reduce(self._log_weights)
 
     def estimate(self) -> Window | None:
@@ -235,3 +254,9 @@ class Oracle:
 def simulate_oracle(session: SimulatedSession) -> pd.DataFrame:
     """Run one session of a study with the oracle."""
     return play(session, Oracle(session.subject(), session.space, spans_of(session.cohort, session.seed)))
+
+
+def simulate_second_oracle(session: SimulatedSession) -> pd.DataFrame:
+    """Run one session of a study with the oracle that does not know that there is a window."""
+    spans = spans_of(session.cohort, session.seed)
+    return play(session, Oracle(session.subject(), session.space, spans, P_WINDOW))

@@ -36,6 +36,19 @@ def test_without_a_window_it_says_so() -> None:
     assert Oracle(nonresponder, VALVE_SPACE, spans_of("recruitment", 1)).estimate() is None
 
 
+def test_the_second_oracle_says_no_window_only_where_that_is_likelier_than_any_is_good() -> None:
+    person = cohort("recruitment", 1, seed=1)[0]
+    assert isinstance(person.profile, PeakProfile)
+    spans = spans_of("recruitment", 1)
+    sure, unsure = Oracle(person, VALVE_SPACE, spans), Oracle(person, VALVE_SPACE, spans, p_window=0.3)
+    middle_ms = person.hit_delay_ms + person.profile.start_ms + 0.5 * person.profile.width_ms
+    assert sure.estimate() is not None
+    assert unsure.estimate() is None
+    for _ in range(8):  # an MEP far above the floor at the peak: there is a window
+        unsure.tell(middle_ms, 0.4)
+    assert unsure.estimate() is not None
+
+
 @pytest.mark.parametrize("name", [*SPANS, *LABS])
 def test_its_spans_are_those_of_the_cohort(name: str) -> None:
     # Shares of 3,000 people have standard errors below .01; what is left is the distance of the values.
