@@ -10,6 +10,7 @@ come from seed 10,000 on; seeds below 1,000 are for work.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -21,12 +22,22 @@ from rich.progress import Progress
 
 from benchmarks.oracle import SPANS, simulate_oracle
 from benchmarks.provenance import facts_of
+from benchmarks.quick import understood
 from benchmarks.tables import write_tables
 from benchmarks.zero_trials import fixed_windows
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.metrics import trials_to_criterion
 from isiw.plots.study import save_study_plot
-from isiw.studies import Processes, Study, StudyStrategy, conduct, paired_sessions, run_study, summarise
+from isiw.studies import (
+    Processes,
+    SimulatedSession,
+    Study,
+    StudyStrategy,
+    conduct,
+    paired_sessions,
+    run_study,
+    summarise,
+)
 from isiw.subjects.cohorts import COHORTS
 
 MARKS = (0, 5, 10, 12, 15, 20, 25, 30, 40, 60, 80)
@@ -154,15 +165,20 @@ def run(study: Study, folder: Path, workers: int, progress: Progress) -> pd.Data
     return store.rows()
 
 
-def run_oracle(study: Study, workers: int, progress: Progress) -> pd.DataFrame:
-    """The oracle on the same people, in those cohorts whose profiles it knows; their amplitudes as they are."""
+def run_oracle(
+    study: Study,
+    workers: int,
+    progress: Progress,
+    simulate: Callable[[SimulatedSession], pd.DataFrame] = simulate_oracle,
+) -> pd.DataFrame:
+    """An oracle on the same people, in those cohorts whose profiles it knows; their amplitudes as they are."""
     cohorts = [name for name in study.cohorts if name in SPANS]
     plan = {"seed": study.seed, "trials": study.trials, "marks": study.marks, "space": study.space}
     sessions = paired_sessions(["oracle"], cohorts, study.people, **plan)
     if not sessions:
         return pd.DataFrame()
     bar = progress.add_task("oracle", total=len(sessions))
-    return run_study(sessions, workers=workers, run=simulate_oracle, on_done=lambda _s, _r: progress.advance(bar))
+    return run_study(sessions, workers=workers, run=simulate, on_done=lambda _s, _r: progress.advance(bar))
 
 
 def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
@@ -184,7 +200,6 @@ def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("acquisition"),
     *,
     stopping: Annotated[bool, typer.Option(help="Note when the stopping rule fires: an estimate a trial.")] = True,
-    quick: Annotated[bool, typer.Option(help="Three cohorts, few people: under two minutes.")] = False,
     only_draw: Annotated[bool, typer.Option(help="Draw the results again that are there; run nothing.")] = False,
 ) -> None:
     """Compare strategies on paired simulated people."""
@@ -192,8 +207,6 @@ def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
         redraw(out)
         return
     names = cohorts.split(",")
-    if quick:
-        names, people, other_people, trials = ["gaussian", "recruitment", "nonresponder"], 10, 10, 20
     study = Study(
         strategies=tuple(strategy_of(text) for text in strategies.split(",")),
         cohorts=tuple(names),
@@ -222,4 +235,5 @@ def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
 
 
 if __name__ == "__main__":
+    understood("acquisition")
     typer.run(main)

@@ -20,6 +20,7 @@ import typer
 import isiw
 from benchmarks.earlier import logged_session, measured
 from benchmarks.provenance import facts_of
+from benchmarks.quick import understood
 from benchmarks.tables import write_table
 from isiw.models.particles.prior import Prior
 from isiw.studies import SimulatedSession, simulate
@@ -91,4 +92,5 @@ def main(
 
 
 if __name__ == "__main__":
+    understood("another_day")
     typer.run(main)

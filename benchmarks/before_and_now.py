@@ -30,6 +30,7 @@ import torch
 import typer
 
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from isiw.studies import Processes, Study, StudyStrategy, conduct, run_unit
 
 MARKS = (5, 10, 15, 20, 25, 30, 40)
@@ -210,4 +211,5 @@ def _ends(path: Path) -> pd.DataFrame:
 
 
 if __name__ == "__main__":
+    understood("before_and_now")
     app()

@@ -33,6 +33,7 @@ from rich.progress import track
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from isiw.metrics import covers, edge_ranks, f1
 from isiw.models.parametric import ParametricModel
 from isiw.models.protocol import Observation, Posterior, PriorPerson, ResponseModel
@@ -184,4 +185,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("calibration")
     main()

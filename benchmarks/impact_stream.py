@@ -15,6 +15,7 @@ import numpy as np
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 
 PRESETS = ("bench", "subject1", "subject2", "subject3", "subject4", "cushion")
 SWEEPS, PIECE = 2500, 5
@@ -79,4 +80,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("impact_stream")
     main()

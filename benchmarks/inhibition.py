@@ -26,6 +26,7 @@ import typer
 from benchmarks.inhibition_claims import all_claims, choices_of_curves
 from benchmarks.opposed_oracle import OpposedOracle
 from benchmarks.provenance import facts_of
+from benchmarks.quick import understood
 from benchmarks.tables import write_tables
 from isiw import DesignSpace, VisitProtocol, make_strategy
 from isiw.metrics import f1
@@ -184,4 +185,5 @@ def main(
 
 
 if __name__ == "__main__":
+    understood("inhibition")
     typer.run(main)

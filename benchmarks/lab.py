@@ -29,6 +29,7 @@ import typer
 import isiw
 from benchmarks.earlier import logged_session, measured
 from benchmarks.provenance import facts_of
+from benchmarks.quick import understood
 from benchmarks.tables import write_table
 from isiw.checks import choice
 from isiw.design import VALVE_SPACE
@@ -198,4 +199,5 @@ def main(  # noqa: PLR0913, PLR0917 - the options of the command line
 
 
 if __name__ == "__main__":
+    understood("lab")
     typer.run(main)

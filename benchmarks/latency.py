@@ -32,6 +32,7 @@ from rich.progress import track
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from isiw.subjects.cohorts import cohort
 
 TIMED_TRIALS = range(46, 56)
@@ -134,4 +135,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("latency")
     main()

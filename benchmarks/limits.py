@@ -20,6 +20,7 @@ from rich.progress import Progress
 
 from benchmarks.acquisition import MARKS, run, run_oracle, write
 from benchmarks.provenance import facts_of
+from benchmarks.quick import understood
 from isiw.studies import Study, StudyStrategy
 
 # The laws of the cohorts, as one component a block; a number that is the same in everybody has a small SD.
@@ -101,4 +102,5 @@ def main(
 
 
 if __name__ == "__main__":
+    understood("limits")
     typer.run(main)

@@ -26,6 +26,7 @@ from rich.progress import track
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from benchmarks.remembering import SPACE, answer, strategy
 from isiw.testing import PEER_COMMANDS, Lie, PulsePeer, check_ledger
 
@@ -135,4 +136,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("line_peer")
     main()

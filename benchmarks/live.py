@@ -30,6 +30,7 @@ from playwright.sync_api import sync_playwright
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 
 SPACE = isiw.DesignSpace(0, 320, reference="impact")
 
@@ -220,4 +221,5 @@ def _say_how(load: float) -> None:
 
 
 if __name__ == "__main__":
+    understood("live")
     main()

@@ -22,6 +22,7 @@ import numpy as np
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 
 TRIALS = 20
 ALLOWED_S = 2.0
@@ -141,4 +142,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("log_damage")
     main()

@@ -19,6 +19,7 @@ import torch
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from isiw.strategy.stopping import Budget
 
 SPACE = isiw.DesignSpace(0, 200, reference="valve")
@@ -112,4 +113,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("long_sessions")
     main()

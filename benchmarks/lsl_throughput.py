@@ -23,6 +23,7 @@ import pylsl
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 
 CHUNK_S = 0.01
 UNITS = {"emg": "mV"} | {f"channel{number}": "V" for number in range(2, 9)}
@@ -128,4 +129,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("lsl_throughput")
     main()

@@ -17,6 +17,7 @@ import typer
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from benchmarks.reduction.readings import PEOPLE
 from benchmarks.reduction.recorded import RecordedSweep, record
 from isiw.design import VALVE_SPACE
@@ -117,4 +118,5 @@ def main(
 
 
 if __name__ == "__main__":
+    understood("measured_windows")
     typer.run(main)

@@ -17,13 +17,15 @@ from pathlib import Path
 from typing import Final
 
 import isiw
+from benchmarks.provenance import command_of
+from benchmarks.quick import understood
 from isiw.errors import ImplausibleDataWarning, InvalidValueError
 
-RESULTS = Path(__file__).parent / "results" / "plausibility.md"
+RESULTS = Path(__file__).parent / "results" / "plausibility"
 SEED = 10_000
 RIG: Final = isiw.TapperSettings(accelerometer=True, rate_hz=3000.0)
 IN_TIME = 4
-RIG_SESSIONS, RIG_TRIALS = 200, 12
+RIG_TRIALS = 12
 
 Slip = Callable[[float, float], tuple[float, float]]
 
@@ -162,14 +164,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--people", type=int, default=30, help="people of each kind of right data")
     parser.add_argument("--trials", type=int, default=40, help="trials of each session of right data")
+    parser.add_argument("--rigs", type=int, default=200, help="sessions of the right robot")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="path of the report, without suffix")
     given = parser.parse_args()
-    command = f"python -m benchmarks.plausibility --people {given.people} --trials {given.trials}"
-    accused = right_rig(RIG_SESSIONS, RIG_TRIALS)
-    rigs = f"The right robot, {RIG_TRIALS} trials with raw sweeps: paused or doubted in {accused} of {RIG_SESSIONS}.\n"
-    text = "\n".join((report(slips(12), right(given.people, given.trials), given.trials, command), rigs))
-    RESULTS.write_text(text, encoding="utf-8")
+    accused = right_rig(given.rigs, RIG_TRIALS)
+    rigs = f"The right robot, {RIG_TRIALS} trials with raw sweeps: paused or doubted in {accused} of {given.rigs}.\n"
+    told = report(slips(12), right(given.people, given.trials), given.trials, command_of("plausibility"))
+    text = f"{told}\n{rigs}"
+    given.out.with_suffix(".md").write_text(text, encoding="utf-8")
     print(text)
 
 
 if __name__ == "__main__":
+    understood("plausibility")
     main()

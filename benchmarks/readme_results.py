@@ -12,11 +12,15 @@ import json
 import re
 from pathlib import Path
 from textwrap import fill
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
+import typer
 from matplotlib.figure import Figure
 
+from benchmarks.quick import understood
+from benchmarks.reduction.look import NAMES
 from isiw.plots.study import draw_curve
 from isiw.plots.style import INK, explain, save_figure, strategy_colours, tidied
 
@@ -24,9 +28,16 @@ ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 MARKS = (10, 20, 40)
 COHORTS = {"recruitment": "noise as near threshold (`recruitment`)", "gaussian": "constant-CV noise (`gaussian`)"}
-METHODS = {"gpr": "the dissertation's Gaussian process", "default": "**isiw's default**", "oracle": "oracle"}
+METHODS = {
+    "nr": "the dissertation's nonlinear regression",
+    "gpr": "the dissertation's Gaussian process",
+    "default": "**isiw's default**",
+    "second": "oracle that is not told that there is a window",
+    "oracle": "oracle",
+}
 PICTURED = {
     "default": "isiw's default",
+    "second": "oracle, not told that there is a window",
     "oracle": "oracle",
     "gpr": "dissertation: Gaussian process (gpr)",
     "nr": "dissertation: nonlinear regression (nr)",
@@ -39,11 +50,7 @@ GUESS = "guess without any trial"
 
 def f1_by_trial(cohort: str) -> pd.DataFrame:
     """Mean F1 after each marked trial (rows) of each method (columns)."""
-    default = _table("people.json", "By trial").assign(strategy="default")
-    oracle = default.assign(strategy="oracle", f1=default["f1"] + default["behind_oracle"])
-    others = _table("acquisition.json").query("strategy == 'gpr'")
-    rows = pd.concat([default, oracle, others])
-    return rows[rows["cohort"] == cohort].pivot_table(index="trial", columns="strategy", values="f1")[list(METHODS)]
+    return curves_of(cohort).pivot_table(index="trial", columns="strategy", values="f1")[list(METHODS)]
 
 
 def guess(cohort: str) -> float:
@@ -73,15 +80,32 @@ def reproduction() -> str:
 def curves_of(cohort: str) -> pd.DataFrame:
     """What the picture shows of a cohort: trial, F1 and its standard error of each method, a row a marked trial.
 
-    The oracle has no standard error of its own: it is the default's F1 and how much that is behind it.
+    The oracles have no standard error of their own: what is known is by how much the default is behind them.
     """
     default = (
         _table("people.json", "By trial").assign(strategy="default").rename(columns={"start_covered": "start_coverage"})
     )
     oracle = default.assign(strategy="oracle", f1=default["f1"] + default["behind_oracle"], f1_se=0.0)
-    others = _table("acquisition.json").query("strategy in ['gpr', 'nr', 'svmr', 'pf']")
-    rows = pd.concat([default, oracle, others])
+    both = _table("two_oracles.json", "Both oracles").assign(strategy="second", f1_se=0.0)
+    second = both.drop(columns="f1").rename(columns={"second": "f1"})
+    rows = pd.concat([default, oracle, second[["cohort", "trial", "strategy", "f1", "f1_se"]], opponents()])
     return rows[(rows["cohort"] == cohort) & (rows["trial"] <= LAST)]
+
+
+def opponents() -> pd.DataFrame:
+    """The dissertation's methods, as the reproduction ran them without TMS alone: a row a marked trial."""
+    sections = json.loads((RESULTS / "trial_reduction.json").read_text(encoding="utf-8"))["sections"]
+    tables = [table for section in sections for table in section["tables"]]
+    equal = pd.DataFrame(next(table["rows"] for table in tables if table["caption"].startswith("Equal trials")))
+    names = {NAMES[method]: method for method in ("nr", "svmr", "gpr", "pf")}
+    own = equal[(equal["TMS alone"] == 0) & equal["method"].isin(names)]
+    marks = [column for column in own if column.isdigit()]
+    long = own.melt(["cohort", "method"], marks, var_name="trial", value_name="f1")
+    errors = own.melt(["cohort", "method"], [f"SE {mark}" for mark in marks], value_name="f1_se")
+    # Before its first generation of particles ends, the filter has no answer.
+    answered = long["f1"] > 0
+    long, errors = long[answered], errors[answered]
+    return long.assign(f1_se=errors["f1_se"], trial=long["trial"].astype(int), strategy=long["method"].map(names))
 
 
 def before_any_trial(cohort: str) -> float:
@@ -97,7 +121,7 @@ def picture() -> Figure:
     for axes, (cohort, people) in zip(panels, COHORTS.items(), strict=True):
         tidied(axes)
         rows = curves_of(cohort)
-        for (method, name), marker in zip(PICTURED.items(), "oPsD^v", strict=True):
+        for (method, name), marker in zip(PICTURED.items(), "oXPsD^v", strict=True):
             curve = rows[rows["strategy"] == method].sort_values("trial")
             reach = 1.96 * curve["f1_se"]
             band = curve.assign(f1_low=curve["f1"] - reach, f1_high=curve["f1"] + reach)
@@ -128,6 +152,14 @@ def _short(value: float) -> str:
     return f"{value:.2f}".removeprefix("0")
 
 
-if __name__ == "__main__":
+def main(
+    out: Annotated[Path, typer.Option(help="Path of the picture, without suffix.")] = ROOT / "docs/images/results",
+) -> None:
+    """Print the table and the paragraph, and draw the picture."""
     print(table(), reproduction(), sep="\n\n")
-    save_figure(picture(), ROOT / "docs" / "images" / "results.svg", overwrite=True)
+    save_figure(picture(), out.with_suffix(".svg"), overwrite=True)
+
+
+if __name__ == "__main__":
+    understood("readme_results")
+    typer.run(main)

@@ -17,6 +17,7 @@ from rich.progress import Progress
 
 from benchmarks.acquisition import MARKS, write
 from benchmarks.provenance import facts_of
+from benchmarks.quick import understood
 from benchmarks.recorded_people import FOLDER, PEOPLE, RecordedSession
 from isiw.studies import Failure, Processes, SimulatedSession
 from isiw.studies.batch import simulate_batch
@@ -60,4 +61,5 @@ def main(
 
 
 if __name__ == "__main__":
+    understood("recorded")
     typer.run(main)

@@ -23,6 +23,7 @@ import numpy as np
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from benchmarks.server_strangers import operated_meanwhile, served_meanwhile
 from benchmarks.server_tries import Served, fuzzed, killed, tried
 
@@ -207,4 +208,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("server")
     main()

@@ -20,6 +20,7 @@ import numpy as np
 
 import isiw
 from benchmarks.provenance import made_with
+from benchmarks.quick import understood
 
 SWEEPS, REPEATS = 1000, 7
 RATE_HZ, ISI_MS = 5000.0, 60.0
@@ -78,4 +79,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("signals")
     main()

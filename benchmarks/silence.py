@@ -12,22 +12,24 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal, get_args
+from typing import Annotated, Final, Literal, get_args
 
 import numpy as np
 import pandas as pd
+import typer
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from isiw.design import VALVE_SPACE
 from isiw.signals.amplitudes import stopped_after
 from isiw.types import FloatArray
 
-RESULTS = Path(__file__).parent / "results" / "silence.md"
+RESULTS = Path(__file__).parent / "results" / "silence"
 SEED: Final = 10_000
 COHORTS: Final = ("recruitment", "weak", "gaussian", "drift")
 LIMITS_MV: Final = (0.015, 0.03, 0.05)
-PEOPLE, TRIALS, FIRED = 100, 60, 15
+TRIALS, FIRED = 60, 15
 NEAR_MS, SHARE_NEAR = 25.0, 2 / 3
 
 Asked = Literal["anywhere", "near the edges"]
@@ -72,9 +74,9 @@ def noticed_at(person: isiw.subjects.SimulatedSubject, number: int, kind: Kind, 
     return np.nan
 
 
-def measured(kind: Kind) -> dict[str, object]:
+def measured(kind: Kind, number: int) -> dict[str, object]:
     """One row: false alarms in right sessions, and what is noticed where the stimulator stops."""
-    people = isiw.subjects.cohort(kind.cohort, PEOPLE, SEED)
+    people = isiw.subjects.cohort(kind.cohort, number, SEED)
     right = np.array([noticed_at(person, number, kind, TRIALS) for number, person in enumerate(people)])
     stopped = np.array([noticed_at(person, number, kind, FIRED) for number, person in enumerate(people)])
     in_time = stopped[np.isfinite(stopped)]
@@ -82,25 +84,29 @@ def measured(kind: Kind) -> dict[str, object]:
         "cohort": kind.cohort,
         "asked": kind.asked,
         "detection limit [mV]": kind.limit_mv,
-        f"right sessions doubted, of {PEOPLE}": int(np.isfinite(right).sum()),
-        f"stops noticed, of {PEOPLE}": len(in_time),
+        f"right sessions doubted, of {number}": int(np.isfinite(right).sum()),
+        f"stops noticed, of {number}": len(in_time),
         "pulses after the stop until then (median)": float(np.median(in_time) - FIRED) if len(in_time) else np.nan,
     }
 
 
-def main() -> None:
+def main(
+    people: Annotated[int, typer.Option(help="People of each kind.")] = 100,
+    out: Annotated[Path, typer.Option(help="Path of the result, without suffix.")] = RESULTS,
+) -> None:
     """Run all kinds of session, and write the table."""
     kinds = (Kind(*values) for values in itertools.product(COHORTS, get_args(Asked), LIMITS_MV))
-    table = pd.DataFrame([measured(kind) for kind in kinds])
+    table = pd.DataFrame([measured(kind, people) for kind in kinds])
     intro = (
         f"# A stimulator that stops firing\n\n`{command_of('silence')}`, seed {SEED}, {made_with()}\n\n"
-        f"{PEOPLE} people of each kind, {TRIALS} trials; in the sessions that stop, "
+        f"{people} people of each kind, {TRIALS} trials; in the sessions that stop, "
         f"no pulse comes after the first {FIRED}.\nWhere few pulses are answered, silence may be chance.\n\n"
     )
     text = f"{intro}{table.to_markdown(index=False)}\n"
-    RESULTS.write_text(text, encoding="utf-8")
+    out.with_suffix(".md").write_text(text, encoding="utf-8")
     print(text)
 
 
 if __name__ == "__main__":
-    main()
+    understood("silence")
+    typer.run(main)

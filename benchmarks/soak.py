@@ -29,6 +29,7 @@ from rich.progress import track
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from benchmarks.remembering import SPACE, answer, strategy
 from isiw.testing import Fault, FaultyDevice, check_ledger
 
@@ -209,4 +210,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("soak")
     main()

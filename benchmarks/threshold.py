@@ -19,6 +19,7 @@ import typer
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from isiw.strategy.threshold import IntensityRange, ThresholdSearch, make_threshold_search
 from isiw.strategy.threshold.hotspot import BayesHotSpot, CoilPulse, WalkedHotSpot
 from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
@@ -45,17 +46,19 @@ class Way:
     seen_only: bool = False
 
 
-def _made(method: str, **settings: float) -> Callable[[], ThresholdSearch]:
+def made(method: str, **settings: float) -> Callable[[], ThresholdSearch]:
+    """What makes a search by a named method."""
     return partial(make_threshold_search, method, SPACE, **settings)
 
 
 WAYS = (
-    Way("bayes, until ± 2 % MSO", _made("bayes")),
-    Way("bayes, 12 pulses", _made("bayes", stop_sd_pct_mso=0.01, max_pulses=12)),
-    Way("bayes, until ± 2 % MSO, yes or no only", _made("bayes"), seen_only=True),
-    Way("maximum likelihood, 12 pulses", _made("maximum-likelihood", pulses=12)),
-    Way("maximum likelihood, 17 pulses", _made("maximum-likelihood")),
-    Way("five of ten", _made("five-of-ten")),
+    Way("bayes, until ± 2 % MSO", made("bayes")),
+    Way("bayes, 12 pulses", made("bayes", stop_sd_pct_mso=0.01, max_pulses=12)),
+    Way("bayes, until ± 2 % MSO, yes or no only", made("bayes"), seen_only=True),
+    Way("maximum likelihood, 12 pulses", made("maximum-likelihood", pulses=12)),
+    Way("maximum likelihood, 17 pulses", made("maximum-likelihood")),
+    Way("five of ten", made("five-of-ten")),
+    Way("more than five of ten [Kim2020]", made("five-of-ten", enough=6)),
 )
 
 
@@ -181,4 +184,5 @@ believes.
 
 
 if __name__ == "__main__":
+    understood("threshold")
     typer.run(main)

@@ -24,6 +24,7 @@ import pandas as pd
 import torch
 
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from isiw.studies import Failure, Processes, Study, StudyStrategy, run_unit
 
 TRIALS = 30
@@ -109,4 +110,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("throughput")
     main()

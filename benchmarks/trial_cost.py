@@ -19,6 +19,7 @@ import torch
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from benchmarks.remembering import SPACE, answer, strategy
 
 
@@ -55,4 +56,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("trial_cost")
     main()

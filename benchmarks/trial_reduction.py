@@ -24,6 +24,7 @@ import typer
 
 from benchmarks.dissertation.claims import claims_as_json
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from benchmarks.reduction import (
     before,
     comparison,
@@ -36,17 +37,18 @@ from benchmarks.reduction import (
     pf_readings,
     reading_table,
     verdicts,
+    wrong,
 )
 from benchmarks.reduction.document import write
 from benchmarks.reduction.parallel import Workers, frame, in_parallel, run_sessions
-from benchmarks.reduction.size import FULL, QUICK, Size
+from benchmarks.reduction.size import FEW, FULL, Size
 
 Rows = dict[ModuleType, pd.DataFrame]
 Measured = tuple[dict[str, pd.DataFrame], list[Any]]
 """The sessions' rows by part, and the sessions on waveforms."""
 
 RESULTS = Path("benchmarks/results/trial_reduction")
-PARTS = (comparison, reading_table, pf_readings, headline, initial, particles, gaussians)
+PARTS = (comparison, reading_table, pf_readings, headline, initial, particles, gaussians, wrong)
 VERSIONS = ("numpy", "scipy", "torch", "scikit-learn", "statsmodels")
 
 
@@ -99,14 +101,14 @@ def main(
     processes: Annotated[int, typer.Option(help="Processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = RESULTS,
     *,
-    quick: Annotated[bool, typer.Option(help="Few people: under three minutes on two cores.")] = False,
+    few: Annotated[bool, typer.Option(help="Hardly any people.")] = False,
     go_on: Annotated[bool, typer.Option(help="Go on with a run that was interrupted, with the same code.")] = False,
     again: Annotated[bool, typer.Option(help="Tell once more what the last run measured.")] = False,
 ) -> None:
     """Reproduce the dissertation's reduction of trials."""
     kept = out.with_suffix(".parts")
     if not again:
-        run(QUICK if quick else FULL, seed, processes, kept, go_on=go_on)
+        run(FEW if few else FULL, seed, processes, kept, go_on=go_on)
     if not kept.exists():
         raise typer.BadParameter(f"{kept} is not there: run without --again first")
     found, facts = joblib.load(kept)
@@ -127,4 +129,5 @@ def run(size: Size, seed: int, processes: int, kept: Path, *, go_on: bool) -> No
 
 
 if __name__ == "__main__":
+    understood("trial_reduction")
     typer.run(main)

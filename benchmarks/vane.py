@@ -21,6 +21,7 @@ import typer
 from matplotlib.figure import Figure
 
 from benchmarks.provenance import facts_of
+from benchmarks.quick import understood
 from benchmarks.tables import write_tables
 from benchmarks.vane_claims import FULL, claims_of
 from isiw import Rotor, Vane, repeatability
@@ -227,4 +228,5 @@ def main(out: Annotated[Path, typer.Option(help="Path of the results, without su
 
 
 if __name__ == "__main__":
+    understood("vane")
     typer.run(main)

@@ -30,6 +30,7 @@ from rich.progress import track
 
 import isiw
 from benchmarks.provenance import made_with
+from benchmarks.quick import understood
 from isiw.devices.robot.mechanism import Event, Geometry, SensorNoise
 from isiw.devices.robot.tapper import Trigger
 from isiw.subjects.cohorts import cohort
@@ -190,4 +191,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("waveform_loop")
     main()

@@ -17,6 +17,7 @@ import typer
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1, f1_of_masks
 from isiw.subjects.cohorts import COHORTS
@@ -117,4 +118,5 @@ def main(
 
 
 if __name__ == "__main__":
+    understood("zero_trials")
     typer.run(main)

@@ -23,7 +23,8 @@ from rich.progress import track
 from benchmarks.dissertation import counts, events, examples, excitability, precision, traces
 from benchmarks.dissertation.page import read_sources, write_page
 from benchmarks.dissertation.parts import keep, kept
-from benchmarks.dissertation.size import FULL, QUICK
+from benchmarks.dissertation.size import FEW, FULL
+from benchmarks.quick import understood
 
 PARTS: Final = {
     "events": events.tell,
@@ -33,28 +34,28 @@ PARTS: Final = {
     "examples": examples.tell,
     "excitability": excitability.tell,
 }
-RESULTS: Final = Path("benchmarks/results")
+RESULTS: Final = Path("benchmarks/results/dissertation")
 
 
 def main(
     seed: Annotated[int, typer.Option(help="First seed of people and taps.")] = 10_000,
-    out: Annotated[Path | None, typer.Option(help="Folder inside that of the results.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder inside that of the results.")] = RESULTS,
     *,
-    quick: Annotated[bool, typer.Option(help="Few taps and people: under five minutes.")] = False,
+    few: Annotated[bool, typer.Option(help="Few taps and people.")] = False,
     again: Annotated[bool, typer.Option(help="Compute every part again, also those that are done.")] = False,
 ) -> None:
     """Make the gallery."""
-    size = QUICK if quick else FULL
-    folder = out or RESULTS / ("dissertation_quick" if quick else "dissertation")
+    size = FEW if few else FULL
     for name in track(PARTS, "parts", console=Console(stderr=True)):
-        path = folder / f"{name}.json"
+        path = out / f"{name}.json"
         if again or not kept(path, size, seed):
             keep(PARTS[name], path, size, seed)
-    sources, missing = read_sources(folder, list(PARTS))
-    for verdict, count in write_page(folder, sources, missing).most_common():
+    sources, missing = read_sources(out, list(PARTS))
+    for verdict, count in write_page(out, sources, missing).most_common():
         print(f"{verdict}: {count}")
-    print(folder / "README.md")
+    print(out / "README.md")
 
 
 if __name__ == "__main__":
+    understood("dissertation")
     typer.run(main)

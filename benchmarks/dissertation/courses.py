@@ -9,6 +9,8 @@ from typing import Final
 import numpy as np
 
 import isiw
+from benchmarks.reduction.guess import UNRELATED, unrelated
+from benchmarks.reduction.wrong import MISREAD, MISREAD_SETTINGS
 from benchmarks.waveform_loop import Pair, by_waveform
 from isiw.design import IMPACT_SPACE, DesignSpace
 from isiw.subjects import SimulatedSubject
@@ -53,7 +55,7 @@ class Course:
         return len(self.told) - INITIAL + 1
 
 
-def live(method: str, people: Sequence[SimulatedSubject], person: int, seed: int) -> Course:
+def live(method: str, people: Sequence[SimulatedSubject], person: int, seed: int, wrong: str = "") -> Course:
     """One session of a method, ISIs from the valve command.
 
     Args:
@@ -61,15 +63,17 @@ def live(method: str, people: Sequence[SimulatedSubject], person: int, seed: int
         people: of a cohort.
         person: which of them.
         seed: of the session; the person's number is added.
+        wrong: which model that is wrong on purpose, `UNRELATED` or `MISREAD`; empty: none.
     """
     responder = people[person].begin(seed + person)
-    strategy = isiw.make_strategy(method, SPACE, seed + person)
+    settings = dict(MISREAD_SETTINGS["nr" if method == "nr2" else method]) if wrong == MISREAD else {}
+    strategy = isiw.make_strategy(method, SPACE, seed + person, **settings)
 
     def answer(isi_ms: float) -> tuple[float, float]:
         response = responder.respond(isi_ms, "valve")
         return isi_ms if response.isi_ms is None else response.isi_ms, response.mep_mv
 
-    return _followed(strategy, answer, person)
+    return _followed(strategy, unrelated(answer, SPACE, seed + person) if wrong == UNRELATED else answer, person)
 
 
 def _followed(strategy: isiw.Strategy, answer: Answer, person: int) -> Course:

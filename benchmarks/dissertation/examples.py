@@ -9,11 +9,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.signal import find_peaks
 
-from benchmarks.dissertation.claims import Claim
+from benchmarks.dissertation.claims import Claim, put_to_test
 from benchmarks.dissertation.courses import INITIAL, SPACE, Course, live, online
 from benchmarks.dissertation.parts import Told, verdict
 from benchmarks.dissertation.size import Size
+from benchmarks.reduction.guess import UNRELATED
 from benchmarks.reduction.look import OURS, THEIRS, panels
+from benchmarks.reduction.wrong import MISREAD
 from isiw.design import IMPACT_SPACE
 from isiw.subjects import SimulatedSubject, cohort
 from isiw.types import FloatArray, IntArray
@@ -43,17 +45,14 @@ NOTE: Final = (
 def tell(size: Size, seed: int) -> Told:
     """This part of the gallery."""
     people = cohort(COHORT, 11, seed)
-    courses = {
-        method: [live(method, people, person, seed + 100 * run) for run in range(size.runs) for person in range(11)]
-        for method in (*EXAMPLES, "pf", "nr2")
-    }
+    courses = _courses(people, size.runs, seed)
     robot = {
         figure: [online(people, person, seed + 100 * run) for run in range(10 * size.runs)]
         for figure, (person, _) in ONLINE.items()
     }
-    claims = [_iterations(method, courses[method]) for method in EXAMPLES]
-    claims += [_gpr(courses["gpr"]), *_filter(people, courses["pf"]), *_two(courses["nr2"])]
-    claims += [_in_range(figure, _ONLINE_SAYS, ONLINE[figure][1], robot[figure]) for figure in ONLINE]
+    wrong = {name: _claims(people, _courses(people, 1, seed, name)) for name in (UNRELATED, MISREAD)}
+    online_claims = [_in_range(figure, _ONLINE_SAYS, ONLINE[figure][1], robot[figure]) for figure in ONLINE]
+    claims = put_to_test([*_claims(people, courses), *online_claims], wrong)
     pictures = {EXAMPLES[method][0]: _panels(courses[method][0]) for method in EXAMPLES}
     pictures |= {figure: _panels(courses[0], IMPACT_SPACE.grid_ms) for figure, courses in robot.items()}
     pictures |= {
@@ -63,6 +62,20 @@ def tell(size: Size, seed: int) -> Told:
         "Fig. 4.35": _panels(_most_equal(courses["nr2"])),
     }
     return Told(NOTE, claims, pictures)
+
+
+def _courses(people: Sequence[SimulatedSubject], runs: int, seed: int, wrong: str = "") -> dict[str, list[Course]]:
+    """Sessions of each method with all people, so many each."""
+    return {
+        method: [live(method, people, person, seed + 100 * run, wrong) for run in range(runs) for person in range(11)]
+        for method in (*EXAMPLES, "pf", "nr2")
+    }
+
+
+def _claims(people: Sequence[SimulatedSubject], courses: dict[str, list[Course]]) -> list[Claim]:
+    """What is claimed of the methods on amplitudes."""
+    claims = [_iterations(method, courses[method]) for method in EXAMPLES]
+    return [*claims, _gpr(courses["gpr"]), *_filter(people, courses["pf"]), *_two(courses["nr2"])]
 
 
 def _iterations(method: str, courses: list[Course]) -> Claim:

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from jinja2 import Environment, FileSystemLoader, select_autoescape
 
-from benchmarks.dissertation.claims import REPRODUCED, UNDER, Claim, places, read_claims
+from benchmarks.dissertation.claims import KINDS, NOT, REPRODUCED, Claim, by_kind, kind_of, places, read_claims
 from benchmarks.dissertation.contents import CHAPTERS, Chapter, Item
 
 __all__ = ["OTHERS", "Source", "read_sources", "write_page"]
@@ -102,7 +102,7 @@ def _source(name: str, path: Path) -> Source:
 
 def _of_a_drawing(claim: Claim) -> bool:
     """Whether a claim says no more than that a drawing or a photograph has no counterpart, as its item does."""
-    return _kind(claim) == "not" and set(places(claim.where)[:1]) <= _DRAWN and bool(places(claim.where))
+    return kind_of(claim) == NOT and set(places(claim.where)[:1]) <= _DRAWN and bool(places(claim.where))
 
 
 def write_page(folder: Path, sources: Sequence[Source], missing: Sequence[str]) -> Counter[str]:
@@ -124,11 +124,19 @@ def write_page(folder: Path, sources: Sequence[Source], missing: Sequence[str]) 
         )
         for chapter in CHAPTERS
     ]
-    counts = Counter(_kind(claim) for source in sources for claim in source.claims)
+    counts = Counter(by_kind(claim for source in sources for claim in source.claims))
     lines = [entry.line for _, entries, _ in chapters for entry in entries]
     counts["without counterpart"] = sum(line.startswith("No counterpart") for line in lines)
     counts["not yet"] = sum(line.startswith("Not yet") for line in lines)
-    told = {"chapters": chapters, "counts": counts, "sources": sources, "missing": missing}
+    caught = Counter(
+        (name, source.name)
+        for source in sources
+        for claim in source.claims
+        if claim.verdict == REPRODUCED
+        for name in claim.fails_for.split("; ")
+    )
+    told: dict[str, Any] = {"chapters": chapters, "counts": counts, "sources": sources, "missing": missing}
+    told |= {"kinds": [counts[kind] for kind in KINDS], "caught": caught.most_common(), "kind_of": kind_of}
     for suffix, name in (("md", "README.md"), ("html", "index.html")):
         (folder / name).write_text(_templates().get_template(f"gallery.{suffix}.jinja").render(told))
     return counts
@@ -152,12 +160,6 @@ def _fact(fact: Any) -> str:
     if isinstance(fact, Mapping):
         return ", ".join(f"{name} {value}" for name, value in fact.items())
     return str(fact).replace("`", "")
-
-
-def _kind(claim: Claim) -> str:
-    if claim.verdict == REPRODUCED:
-        return REPRODUCED
-    return UNDER if claim.verdict.startswith(UNDER) else "not"
 
 
 def _entry(item: Item, chapter: Chapter, sources: Sequence[Source], missing: Sequence[str], folder: Path) -> Entry:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["FULL", "QUICK", "Size"]
+__all__ = ["FEW", "FULL", "Size"]
 
 
 @dataclass(frozen=True)
@@ -25,4 +25,4 @@ class Size:
 
 
 FULL = Size(taps=100, sweeps=40, runs=3, people=20)
-QUICK = Size(taps=30, sweeps=5, runs=1, people=2)
+FEW = Size(taps=30, sweeps=5, runs=1, people=2)

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import isiw
-from benchmarks.dissertation.claims import Claim
+from benchmarks.dissertation.claims import Claim, put_to_test
 from benchmarks.dissertation.parts import Told, verdict
 from benchmarks.dissertation.size import Size
 from benchmarks.reduction.look import OURS, panels
@@ -26,6 +26,8 @@ COHORT: Final = "kim11-measured"
 RESPONSES_MS: Final = (245.0, 305.0)
 """Fig. 4.21: between which ISIs from the valve command there were responses."""
 
+PUT_IN: Final = {"Subject 4": "fitted: the person was made so that the measured width is Table 4.1's"}
+
 NOTE: Final = (
     f"Simulated people of the cohort `{COHORT}`: subject 1, with the window moved to where the figure has it, on the "
     "robot's waveforms, and subject 4."
@@ -36,7 +38,8 @@ def tell(size: Size, seed: int) -> Told:  # noqa: ARG001 - one person each, howe
     """This part of the gallery."""
     people = cohort(COHORT, 4, seed)
     pictures = {"Fig. 4.21": _stack(people[0], seed), "Fig. 4.22": _means(people[3], seed)}
-    return Told(NOTE, [_traces(people[0], seed), _fourth(people[3], seed)], pictures)
+    claims = put_to_test([_traces(people[0], seed), _fourth(people[3], seed)], {}, PUT_IN)
+    return Told(NOTE, claims, pictures)
 
 
 def _traced(person: SimulatedSubject, seed: int) -> dict[str, tuple[float, isiw.Sweep]]:

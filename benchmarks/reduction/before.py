@@ -34,7 +34,7 @@ def table(rows: pd.DataFrame, seed: int) -> pd.DataFrame:
         rows: the headline's sessions.
         seed: of its people.
     """
-    rows = judged(rows)
+    rows = judged(rows[rows["alone"] == 0])
     others = [name for name in NOISE if name != PEOPLE]
     fixed = fixed_windows(others, rows["person"].nunique(), seed, VALVE_SPACE).set_index("cohort")
     guesses = {PEOPLE: of_the_other_ten(seed)} | {name: float(fixed.loc[name, "f1"]) for name in others}

@@ -9,13 +9,16 @@ from typing import Final, Generic, NamedTuple, TypeVar
 
 from benchmarks.dissertation.claims import Claim
 
-__all__ = ["SHARE", "UNIT", "Found", "Statement", "about", "number", "share", "told"]
+__all__ = ["ERRORS", "SHARE", "UNIT", "Found", "Statement", "about", "between", "number", "share", "told"]
 
-SHARE: Final = 0.3
-"""Numbers of trials are reproduced within 30 %,"""
+ERRORS: Final = 2.0
+"""Where both sides have a standard error, a number is reproduced within two of the difference,"""
 
 UNIT: Final = 0.1
-"""and F1, correlation and convergence within 0.1."""
+"""F1 and correlation, of which the text's is not known, within 0.1,"""
+
+SHARE: Final = 0.3
+"""and numbers of trials of which it is not known within 30 %."""
 
 SHOWN: Final = 3
 """Readings that a verdict names."""
@@ -88,6 +91,20 @@ def share(ours: float, theirs: float) -> Found:
     """Whether a number is within 30 % of the text's."""
     off = ours / theirs - 1.0
     return Found(abs(off) <= SHARE + 1e-9, f"{ours:.1f}", off, f"{ours - theirs:+.1f} ({100 * off:+.0f} %)")
+
+
+def between(ours: float, theirs: float, error: float, digits: int = 1) -> Found:
+    """Whether a number is the text's within two standard errors of the difference.
+
+    Args:
+        ours: ours.
+        theirs: the text's.
+        error: the standard error of their difference.
+        digits: of our words.
+    """
+    off = (ours - theirs) / error
+    difference = f"{ours - theirs:+.{digits}f}, {off:+.1f} standard errors"
+    return Found(abs(off) <= ERRORS, f"{ours:.{digits}f}", off, difference)
 
 
 def number(ours: float, theirs: float, within: float = UNIT) -> Found:

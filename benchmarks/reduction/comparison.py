@@ -39,7 +39,14 @@ def sessions(size: Size, seed: int) -> list[Session]:
         "recruitment": (size.people, size.people_default),
     }
     return [
-        Session(method, cohort, person, seed, accelerometer=accelerometer)
+        Session(
+            method,
+            cohort,
+            person,
+            seed,
+            accelerometer=accelerometer,
+            settings=size.default if method == "default" else (),
+        )
         for cohort, (usual, slow) in people.items()
         for method, accelerometer in itertools.product((*METHODS, "incremental"), WORDS)
         for person in range(slow if method == "default" else usual)
@@ -61,7 +68,9 @@ def _means(group: pd.DataFrame) -> dict[str, float]:
         "sessions": len(group),
         "trials": group["trials"].mean(),
         "SD": group["trials"].std(),
+        "SE": error_of_mean(group, "trials"),
         "F1: measured": group["f1, measured"].mean(),
+        "F1 SE": error_of_mean(group, "f1, measured"),
         "F1: measured, 90 %": group["f1, measured, 90 % RMT"].mean(),
         "F1: measured, .135": group["f1, measured, .135"].mean(),
         "F1: true": group["f1, true"].mean(),
@@ -69,6 +78,13 @@ def _means(group: pd.DataFrame) -> dict[str, float]:
         "r: true": group["correlation, true"].mean(),
         "converged %": 100 * group["converged"].mean(),
     }
+
+
+def error_of_mean(group: pd.DataFrame, value: str) -> float:
+    """Standard error of a mean; sessions of one of the eleven people of `kim11` count as one person's."""
+    eleven = group["cohort"].str.startswith("kim11")
+    person = group["person"].where(~eleven, group["person"] % PEOPLE_OF_KIM)
+    return float(group.groupby(person)[value].mean().sem())
 
 
 def _theirs(method: str, word: str) -> dict[str, float]:
@@ -88,14 +104,15 @@ def by_person(rows: pd.DataFrame, value: str) -> pd.DataFrame:
 
 def significance(rows: pd.DataFrame) -> list[Table]:
     """Paired tests between methods, and of the accelerometer, on the eleven people."""
-    rows = rows[rows["method"].isin(METHODS)]
+    methods = [method for method in METHODS if (rows["method"] == method).any()]
+    rows = rows[rows["method"].isin(methods)]
     bare = rows[~rows["accelerometer"]]
     titles = {
         "correlation, measured": "Correlation with the measured profile (Fig. 4.23)",
         "trials": "Trials (Fig. 4.24)",
         "f1, measured": "F1 by the measured window (Fig. 4.25)",
     }
-    tests = {value: paired_tests(by_person(bare, value)[list(METHODS)]) for value in titles}
+    tests = {value: paired_tests(by_person(bare, value)[methods]) for value in titles}
     claimed = set(map(frozenset, text.SIGNIFICANT_CORRELATIONS))
     pairs = tests["correlation, measured"][["first", "second"]].to_numpy()
     tests["correlation, measured"]["text"] = ["*" if frozenset(pair) in claimed else "" for pair in pairs]
@@ -110,7 +127,7 @@ def _change(rows: pd.DataFrame, value: str) -> pd.DataFrame:
         {word: by_person(rows[rows["accelerometer"] == flag], value) for flag, word in WORDS.items()}, axis=1
     )
     values.columns = [f"{method} {word}" for word, method in values.columns]
-    return paired_tests(values, [(f"{method} with", f"{method} without") for method in METHODS])
+    return paired_tests(values, [(f"{method} with", f"{method} without") for method in rows["method"].unique()])
 
 
 def figure(table: pd.DataFrame) -> Figure:

@@ -17,7 +17,7 @@ from benchmarks.reduction.size import Size
 ZERO = 0.01
 """A component has converged to zero where it has less than this share of the person's largest amplitude."""
 
-TRIED = ("base", "outside the window: zero", "mean of ten, zero outside")
+TRIED = ("base", "outside the window: zero")
 STARTS = ("even", "unequal", "random")
 
 PROSE = """\

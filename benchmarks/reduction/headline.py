@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from scipy.stats import sem
 
 from benchmarks.reduction import dissertation as text
 from benchmarks.reduction.document import Section, Table
@@ -20,11 +21,16 @@ from isiw.metrics import trials_to_criterion
 from isiw.plots.style import explain
 from isiw.types import FloatArray
 
-NOISE = {PEOPLE: "little", "recruitment": "realistic", "gaussian": "constant-CV"}
+NOISE = {PEOPLE: "little", "recruitment": "near-threshold", "gaussian": "constant-CV"}
 
 JUDGED: Final[dict[str, tuple[str, str]]] = {PEOPLE: ("f1, measured", "f1_measured_by_trial")}
 """By which F1 a cohort is judged: where the measured windows are the text's, as there; else by the true window."""
 BY_TRUTH: Final = ("f1, true", "f1_by_trial")
+ALONE: Final = (0, 10)
+"""Trials of TMS alone that every method is told before its first pair."""
+LOW_NOISE: Final = (PEOPLE, "gaussian")
+EARLY, LATE = 10, 40
+"""Between these trials no regression may get worse by more than two standard errors where there is little noise."""
 MARGIN = 0.15
 MARKS = (5, 10, 15, 20, 30, 40)
 LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9)
@@ -36,14 +42,25 @@ HALF = 0.5
 def sessions(size: Size, seed: int) -> list[Session]:
     """Trials counted from the valve command: of `kim11-measured` as recorded, since they are judged so; else live."""
     return [
-        Session(method, cohort, person, seed, _reading(cohort), horizon=PF_HORIZON if method == "pf" else size.horizon)
+        Session(
+            method,
+            cohort,
+            person,
+            seed,
+            reading_of(cohort),
+            horizon=PF_HORIZON if method == "pf" else size.horizon,
+            alone=alone,
+            settings=size.default if method == "default" else (),
+        )
+        for alone in ALONE
         for cohort in NOISE
         for method in (*text.METHODS, "default")
-        for person in range(size.headline)
+        for person in range(size.headline_default if method == "default" else size.headline)
     ]
 
 
-def _reading(cohort: str) -> Reading:
+def reading_of(cohort: str) -> Reading:
+    """How the trials of a cohort are observed."""
     return BASE if cohort in JUDGED else LIVE
 
 
@@ -66,12 +83,30 @@ def curve(rows: pd.DataFrame, method: str) -> FloatArray:
 
 
 def equal_trials(rows: pd.DataFrame) -> pd.DataFrame:
-    """Mean F1 of each method after as many trials, on each cohort."""
+    """Mean F1 of each method after as many trials, on each cohort, without and with TMS alone; the last with its SE."""
     table = []
-    for (cohort, method), group in rows.groupby(["cohort", "method"], sort=False):
-        mean = curve(group, str(method)).mean(axis=0)
-        f1 = {str(mark): float(mean[mark - 1]) for mark in MARKS if mark <= len(mean)}
-        table.append({"cohort": cohort, "method": NAMES[str(method)]} | f1)
+    for (cohort, alone, method), group in rows.groupby(["cohort", "alone", "method"], sort=False):
+        curves = curve(group, str(method))
+        marks = [mark for mark in MARKS if mark <= curves.shape[1]]
+        f1 = {str(mark): float(curves[:, mark - 1].mean()) for mark in marks}
+        errors = {f"SE {mark}": float(sem(curves[:, mark - 1])) for mark in marks}
+        row = {"cohort": cohort, "TMS alone": alone, "method": NAMES[str(method)], "n": len(curves)}
+        table.append(row | f1 | errors)
+    return pd.DataFrame(table)
+
+
+def changes(rows: pd.DataFrame) -> pd.DataFrame:
+    """By how much a regression's F1 changes from an early to a late trial where there is little noise, with its SE."""
+    table = []
+    chosen = rows[rows["cohort"].isin(LOW_NOISE) & rows["method"].isin(("nr", "svmr", "gpr"))]
+    for (cohort, alone, method), group in chosen.groupby(["cohort", "alone", "method"], sort=False):
+        curves = curve(group, str(method))
+        if curves.shape[1] < LATE:
+            continue
+        change = curves[:, LATE - 1] - curves[:, EARLY - 1]
+        found = {"change": float(change.mean()), "SE": float(sem(change))}
+        worse = {"worse by more than 2 SE": "yes" if found["change"] < -2 * found["SE"] else "no"}
+        table.append({"cohort": cohort, "TMS alone": alone, "method": NAMES[str(method)]} | found | worse)
     return pd.DataFrame(table)
 
 
@@ -93,9 +128,10 @@ def duel(rows: pd.DataFrame, method: str) -> dict[str, float | str | None]:
     """The default against one method on one cohort.
 
     Args:
-        rows: sessions of the cohort, in the same order of people.
+        rows: sessions of the cohort, in the same order of people; those whom the default has not seen are left out.
         method: the other method.
     """
+    rows = rows[rows["person"].isin(rows.loc[rows["method"] == "default", "person"])]
     own = rows[rows["method"] == method]
     trials, f1 = own["trials"].to_numpy(), own["f1"].to_numpy()
     curves = curve(rows, "default")
@@ -139,7 +175,7 @@ def verdicts(table: pd.DataFrame, noise: str) -> list[str]:
         f"{needed:.0f} on, {100 * share:.0f} % of GPR's {row['its trials']:.1f} (at most half)."
     )
     better = f"on {noise} noise its F1 at GPR's trials is better by {gain:+.2f} ± {row['± 95 %']:.2f}"
-    if noise == "realistic":
+    if noise == "near-threshold":
         return [f"{_word(share <= HALF)}: {half}", f"{_word(gain >= MARGIN)}: {better} (at least {MARGIN})."]
     return [f"{_word(share <= HALF)}: {half}", f"{better}."]
 
@@ -175,23 +211,32 @@ def figure(equal: pd.DataFrame, duels: Mapping[str, pd.DataFrame]) -> Figure:
 
 def section(rows: pd.DataFrame) -> Section:
     """This part of the report."""
-    rows = judged(rows)
+    every = judged(rows)
+    rows, told = (every[every["alone"] == alone] for alone in ALONE)
     tables = duels(rows)
+    seen = rows.loc[rows["method"] == "default", "person"].nunique()
     gpr = tables[PEOPLE].set_index("against").loc["GPR", "its F1"]
     shown = [
         Table(f"`{cohort}`, {noise} noise: at each method's stop.", tables[cohort]) for cohort, noise in NOISE.items()
     ]
-    equal = equal_trials(rows)
     shown += [
-        Table("Equal trials: mean F1 after so many, whatever the stopping rule says.", equal),
+        Table(f"`{cohort}`, {NOISE[cohort]} noise, ten TMS alone told to every method: at each method's stop.", table)
+        for cohort, table in duels(told).items()
+    ]
+    equal = equal_trials(every)
+    shown += [
+        Table("Equal trials: mean F1 after so many, whatever the stopping rule says, and its standard error.", equal),
+        Table(f"From {EARLY} to {LATE} trials, where there is little noise.", changes(every)),
         Table("Equal F1: trials from which on a mean F1 is kept, of so many that were played.", equal_f1(rows)),
     ]
     prose = f"""\
-{rows["person"].nunique()} people of each cohort, 500 ms from the valve command. `{PEOPLE}`: recorded trials, F1 by the
+{rows["person"].nunique()} people of each cohort, the default {seen} of them, 500 ms from the valve command, without TMS
+alone and with ten trials of it told to every method before the first pair. `{PEOPLE}`: recorded trials, F1 by the
 measured window, as in the text, of sweeps that show one; GPR's F1 is {gpr:.2f} there (text .81). The others: live
 trials, F1 by the true window. The default looks for the true window, by 0.135, as NR, SVMR and GPR do. At equal
 trials: the default's F1 after as many trials as each session of the other method took (at most
 {curve(rows, "default").shape[1]}), paired by person. At equal F1: from which trial on the default's mean F1 stays at or
 above the other method's mean at its stop. A trial is one pair of stimuli."""
     said = [sentence for cohort, noise in NOISE.items() for sentence in verdicts(tables[cohort], noise)]
-    return Section("The headline: equal trials, equal F1", prose, shown, ("headline", figure(equal, tables)), said)
+    picture = ("headline", figure(equal[equal["TMS alone"] == 0], tables))
+    return Section("The headline: equal trials, equal F1", prose, shown, picture, said)

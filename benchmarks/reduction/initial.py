@@ -8,20 +8,20 @@ from typing import Final
 import pandas as pd
 from matplotlib.figure import Figure
 
-from benchmarks.reduction.comparison import PEOPLE_OF_KIM, WORDS
+from benchmarks.reduction.comparison import PEOPLE_OF_KIM, WORDS, error_of_mean
 from benchmarks.reduction.document import Section, Table
 from benchmarks.reduction.look import COLOURS, NAMES, panels
 from benchmarks.reduction.readings import PEOPLE
 from benchmarks.reduction.sessions import Session
 from benchmarks.reduction.significance import paired_tests
 from benchmarks.reduction.size import Size
-from isiw.plots.style import FAINT, explain
+from isiw.plots.style import explain
 
 COUNTS: Final = tuple(range(2, 10))
 FEWEST: Final = {"nr": 4, "svmr": 2, "gpr": 2}
 """A Gaussian has three parameters: no fit, and no noise, from two or three trials."""
 
-COHORTS: Final = (PEOPLE, "gaussian")
+COHORTS: Final = (PEOPLE,)
 KEYS: Final = ["cohort", "method", "accelerometer", "initial"]
 
 PROSE = """\
@@ -46,8 +46,10 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
     table = rows.groupby(KEYS).agg(
         F1=("f1, measured", "mean"), trials=("trials", "mean"), converged=("converged", "mean")
     )
-    for value, name in (("f1, measured", "F1 *"), ("trials", "trials *")):
-        table[name] = _stars(rows, value).reindex(table.index).fillna("")
+    for value, name in (("f1, measured", "F1"), ("trials", "trials")):
+        errors = {key: error_of_mean(group, value) for key, group in rows.groupby(KEYS)}
+        table[f"{name} SE"] = pd.Series(errors).reindex(table.index)
+        table[f"{name} *"] = _stars(rows, value).reindex(table.index).fillna("")
     return table.reset_index().assign(accelerometer=lambda t: t["accelerometer"].map(WORDS))
 
 
@@ -66,13 +68,11 @@ def figure(table: pd.DataFrame) -> Figure:
     """Fig. 4.31–4.33."""
     picture, axes = panels(2, 3, sharex=True)
     for column, (method, number) in enumerate(zip(FEWEST, ("4.31", "4.32", "4.33"), strict=True)):
-        for (word, style), (cohort, colour) in itertools.product(
-            (("without", "-"), ("with", "--")), ((PEOPLE, COLOURS[method]), ("gaussian", FAINT))
-        ):
-            chosen = (table["cohort"] == cohort) & (table["method"] == method) & (table["accelerometer"] == word)
+        for word, style in (("without", "-"), ("with", "--")):
+            chosen = (table["method"] == method) & (table["accelerometer"] == word)
             for line, value in enumerate(("F1", "trials")):
                 rows = table[chosen]
-                label = f"{'gaussian' if cohort == 'gaussian' else f'{PEOPLE}, {NAMES[method]}'}, {word} acc."
+                label, colour = f"{NAMES[method]}, {word} acc.", COLOURS[method]
                 axes[line, column].plot(
                     rows["initial"], rows[value], style, marker="o", ms=3, color=colour, label=label
                 )

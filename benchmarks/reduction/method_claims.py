@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping
 from typing import Final
 
@@ -10,8 +11,8 @@ import pandas as pd
 
 from benchmarks.dissertation.claims import Claim
 from benchmarks.reduction import dissertation as text
-from benchmarks.reduction.claims import Found, Statement, about, number, share, told
-from benchmarks.reduction.comparison import METHODS, WORDS, by_person
+from benchmarks.reduction.claims import ERRORS, Found, Statement, about, between, number, share, told
+from benchmarks.reduction.comparison import METHODS, WORDS, by_person, error_of_mean
 from benchmarks.reduction.look import NAMES
 from benchmarks.reduction.significance import paired_tests
 
@@ -55,10 +56,10 @@ def numbers() -> Iterator[Statement[Table]]:
         name = f"{NAMES[method]} {word} accelerometer"
         n, f1, c = text.TRIALS[word][method], text.F1[word][method], text.CONVERGED[word][method]
         yield Statement(
-            "Fig. 4.24",
+            "Fig. 4.24, Fig. 4.14" if (method, word) == ("pf", "without") else "Fig. 4.24",
             f"{name} needs {n} trials.",
             str(n),
-            lambda t, m=method, w=word, n=n: share(cell(t, "trials", m, w), n),
+            lambda t, m=method, w=word, n=n: between(cell(t, "trials", m, w), n, _error(t, m, w)),
         )
         yield Statement(
             "Fig. 4.25",
@@ -70,11 +71,45 @@ def numbers() -> Iterator[Statement[Table]]:
             "Fig. 4.26",
             f"{100 * c:.2f} % of the runs of {name} converge.",
             f"{c:.2f}",
-            lambda t, m=method, w=word, c=c: number(cell(t, "converged %", m, w) / 100, c),
+            lambda t, m=method, w=word, c=c: _converged(t, m, w, c),
         )
     for method, r in text.CORRELATION.items():
         what = f"{NAMES[method]}'s profile correlates with the measured one by {r}."
         yield Statement("Fig. 4.23", what, str(r), lambda t, m=method, r=r: number(cell(t, "r: measured", m), r))
+
+
+def their_error(method: str, word: str = "without") -> float:
+    """The standard error of the text's mean trials, from the SD of Fig. 4.14–4.18 and its number of people."""
+    return text.TRIALS_SEVEN[method][1] / math.sqrt(text.PEOPLE[word])
+
+
+def _error(table: Table, method: str, word: str) -> float:
+    """Of the difference between our mean trials and the text's."""
+    return math.hypot(cell(table, "SE", method, word), their_error(method, word))
+
+
+def _converged(table: Table, method: str, word: str, theirs: float) -> Found:
+    """Shares of runs, each with the error of a share that is never quite 0 or 1."""
+    ours, runs = cell(table, "converged %", method, word) / 100, cell(table, "sessions", method, word)
+    error = math.hypot(_share_error(ours, runs), _share_error(theirs, text.RUNS[word]))
+    return between(ours, theirs, error, 2)
+
+
+def _share_error(share: float, runs: float) -> float:
+    near = (share * runs + 1.0) / (runs + 2.0)
+    return math.sqrt(near * (1.0 - near) / runs)
+
+
+def _ratio(table: Table, first: str, second: str) -> Found:
+    """How many times as many trials one method needs, with the errors of four means."""
+    ours, theirs = cell(table, "trials", first) / cell(table, "trials", second), _texts_ratio(first, second)
+    of_ours = [cell(table, "SE", m) / cell(table, "trials", m) for m in (first, second)]
+    of_theirs = [their_error(m) / text.TRIALS["without"][m] for m in (first, second)]
+    return between(ours, theirs, theirs * math.hypot(*of_ours, *of_theirs), 2)
+
+
+def _texts_ratio(first: str, second: str) -> float:
+    return text.TRIALS["without"][first] / text.TRIALS["without"][second]
 
 
 def orders() -> Iterator[Statement[Table]]:
@@ -98,12 +133,12 @@ def orders() -> Iterator[Statement[Table]]:
     )
     n = text.TRIALS["without"]
     for first, second in (("pf", "svmr"), ("svmr", "gpr"), ("gpr", "nr")):
-        ratio = n[first] / n[second]
+        ratio = _texts_ratio(first, second)
         yield Statement(
             "Fig. 4.24",
             f"{NAMES[first]} needs {ratio:.2f} times as many trials as {NAMES[second]}.",
             f"{ratio:.2f}",
-            lambda t, a=first, b=second, ratio=ratio: share(cell(t, "trials", a) / cell(t, "trials", b), ratio),
+            lambda t, a=first, b=second: _ratio(t, a, b),
         )
     for method in text.METHODS:
         yield Statement(
@@ -122,7 +157,12 @@ def _best_and_worst(r: Mapping[str, float]) -> bool:
 def _helped(table: Table, method: str) -> Found:
     trials, f1 = ([cell(table, c, method, w) for w in WORDS.values()] for c in ("trials", "F1: measured"))
     numbers = f"trials {trials[0]:.1f} → {trials[1]:.1f}, F1 {f1[0]:.2f} → {f1[1]:.2f}"
-    return about(trials[1] <= trials[0] and f1[1] >= f1[0], numbers)
+    # A wrong model may do the same with everybody: then it has no error at all.
+    of_trials, of_f1 = ([max(cell(table, c, method, w), 1e-9) for w in WORDS.values()] for c in ("SE", "F1 SE"))
+    fewer = (trials[0] - trials[1]) / math.hypot(*of_trials)
+    better = (f1[1] - f1[0]) / math.hypot(*of_f1)
+    numbers = f"{numbers} ({fewer:+.1f} and {better:+.1f} standard errors better)"
+    return about(max(fewer, better) >= ERRORS and min(fewer, better) >= 0.0, numbers)
 
 
 def method_claims(contexts: Mapping[str, Table]) -> list[Claim]:
@@ -136,21 +176,25 @@ def sweep_claims(rows: pd.DataFrame) -> list[Claim]:
     """What is claimed of the conventional sweep, from the sessions of the base cohort."""
     sweep = rows[(rows["method"] == "incremental") & ~rows["accelerometer"]]
     pf = rows[(rows["method"] == "pf") & ~rows["accelerometer"]]["trials"].mean()
-    inside, ratio = (
-        sweep["inside measured"].mean(),
-        text.TRIALS["without"]["incremental"] / text.TRIALS["without"]["pf"],
-    )
-    readings = {
-        "a sweep until the window was passed": sweep["trials"].mean(),
-        "stops inside the measured window alone": inside,
+    ratio = _texts_ratio("incremental", "pf")
+    columns = {
+        "a sweep until the window was passed": "trials",
+        "stops inside the measured window alone": "inside measured",
     }
-    statements: list[Statement[float]] = [
-        Statement("Fig. 4.24, 4.18", "The conventional sweep needs 272 trials.", "272", lambda n: share(n, 272)),
+    readings = {name: (sweep[column].mean(), error_of_mean(sweep, column)) for name, column in columns.items()}
+    theirs = their_error("incremental")
+    statements: list[Statement[tuple[float, float]]] = [
+        Statement(
+            "Fig. 4.24, 4.18",
+            "The conventional sweep needs 272 trials.",
+            "272",
+            lambda n: between(n[0], 272, math.hypot(n[1], theirs)),
+        ),
         Statement(
             "Fig. 4.24",
             "The conventional sweep needs 1.37 times as many trials as PF.",
             f"{ratio:.2f}",
-            lambda n: share(n / pf, ratio),
+            lambda n: share(n[0] / pf, ratio),
         ),
     ]
     return [told(one, readings) for one in statements]
@@ -208,4 +252,4 @@ def _unreadable(where: str, values: pd.DataFrame) -> Claim:
     return told(look, {"base": None})
 
 
-__all__ = ["Table", "cell", "method_claims", "star_claims", "sweep_claims"]
+__all__ = ["Table", "cell", "method_claims", "star_claims", "sweep_claims", "their_error"]

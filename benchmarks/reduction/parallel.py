@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -54,23 +53,13 @@ def in_parallel(
 
 
 def run_sessions(sessions: Iterable[Session], workers: Workers) -> Outcomes:
-    """Run each different session once; those of one person share the recorded sweep."""
-    unique = sorted(dict.fromkeys(sessions), key=_of_person)  # in one order, by which results are kept
-    people = [list(group) for _, group in groupby(unique, key=_of_person)]
-    results = in_parallel(_run_person, people, workers, "people's sessions")
-    return {
-        session: result
-        for group, rows in zip(people, results, strict=True)
-        for session, result in zip(group, rows, strict=True)
-    }
+    """Run each different session once; those of one person follow each other, and share the recorded sweep."""
+    unique = sorted(dict.fromkeys(sessions), key=_of_person)
+    return dict(zip(unique, in_parallel(run, unique, workers, "sessions"), strict=True))
 
 
 def _of_person(session: Session) -> tuple[str, int, int]:
     return session.cohort, session.person, session.seed
-
-
-def _run_person(sessions: list[Session]) -> list[dict[str, Any]]:
-    return [run(session) for session in sessions]
 
 
 def frame(sessions: Iterable[Session], outcomes: Outcomes) -> pd.DataFrame:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Hashable, Mapping
 from typing import Final
 
+import numpy as np
 import pandas as pd
 
 from benchmarks.dissertation.claims import Claim
 from benchmarks.reduction import dissertation as text
-from benchmarks.reduction.claims import Found, Statement, about, number, share, told
+from benchmarks.reduction.claims import ERRORS, Found, Statement, about, between, number, share, told
 from benchmarks.reduction.comparison import PEOPLE_OF_KIM
 from benchmarks.reduction.look import NAMES
+from benchmarks.reduction.method_claims import their_error
 from benchmarks.reduction.particles import RANGES
 from benchmarks.reduction.readings import PEOPLE
 from benchmarks.reduction.significance import paired_tests
@@ -68,12 +71,22 @@ def _trials(table: Table) -> Found:
 
 
 def _rising(table: Table) -> Found:
-    return about(table["trials"].is_monotonic_increasing, ", ".join(f"{value:.0f}" for value in table["trials"]))
+    trials, errors = table["trials"], table["trials SE"]
+    apart = (trials.iloc[-1] - trials.iloc[0]) / math.hypot(errors.iloc[-1], errors.iloc[0])
+    return about(trials.is_monotonic_increasing and apart >= ERRORS, ", ".join(f"{value:.0f}" for value in trials))
 
 
 def _lower(table: Table) -> Found:
-    f1 = table["F1: measured"]
-    return about(f1.loc[[10, 20]].max() < f1.loc[[30, 40, 50]].min(), ", ".join(f"{value:.2f}" for value in f1))
+    f1, few, many = table["F1: measured"], [10, 20], [30, 40, 50]
+    low, high = f1.loc[few].idxmax(), f1.loc[many].idxmin()
+    holds = _larger(table, "F1: measured", "F1 SE", high, low)
+    return about(holds, ", ".join(f"{value:.2f}" for value in f1))
+
+
+def _larger(table: Table, value: str, error: str, first: Hashable, second: Hashable) -> bool:
+    """Whether one row's value is larger than another's by two standard errors."""
+    apart = table.loc[first, value] - table.loc[second, value]
+    return bool(apart >= ERRORS * math.hypot(table.loc[first, error], table.loc[second, error]))
 
 
 def _ratio(spread: Table, name: str) -> pd.Series:
@@ -105,7 +118,7 @@ def initial_claims(table: Table) -> list[Claim]:
     return [
         told(
             Statement(where, f"{NAMES[method]} {word} accelerometer: {what}", theirs, look),
-            {_people(cohort): _curve(table, cohort, method, word) for cohort in (PEOPLE, "gaussian")},
+            {_people(cohort): _curve(table, cohort, method, word) for cohort in table["cohort"].unique()},
         )
         for where, method, word, what, theirs, look in _INITIAL
     ]
@@ -123,15 +136,18 @@ def _curve(table: Table, cohort: str, method: str, word: str) -> Curve:
 def _rises(low: int, high: int) -> Callable[[Curve], Found]:
     def look(curve: Curve) -> Found:
         f1 = curve["F1"]
-        return about(f1[high] > f1[low], f"{f1[low]:.2f} → {f1[high]:.2f}")
+        return about(_larger(curve, "F1", "F1 SE", high, low), f"{f1[low]:.2f} → {f1[high]:.2f}")
 
     return look
 
 
 def _best(least: int, most: int) -> Callable[[Curve], Found]:
     def look(curve: Curve) -> Found:
-        at = int(curve["F1"].idxmax())
-        return about(least <= at <= most, f"best at {at} ({curve['F1'].max():.2f})")
+        inside = (curve.index >= least) & (curve.index <= most)
+        at, other = curve["F1"].idxmax(), curve.loc[~inside, "F1"].idxmax()
+        holds = inside[curve.index.get_loc(at)] and _larger(curve, "F1", "F1 SE", at, other)
+        shown = f"best at {at} ({curve['F1'].max():.2f}); {curve.loc[inside, 'F1'].max():.2f} where the text has it"
+        return about(holds, shown)
 
     return look
 
@@ -139,10 +155,15 @@ def _best(least: int, most: int) -> Callable[[Curve], Found]:
 def _low(least: int, most: int) -> Callable[[Curve], Found]:
     def look(curve: Curve) -> Found:
         inside = (curve.index >= least) & (curve.index <= most)
-        few, many = curve.loc[inside, "trials"].mean(), curve.loc[~inside, "trials"].mean()
-        return about(few < many, f"{few:.1f} against {many:.1f}")
+        (few, few_error), (many, many_error) = (_mean_trials(curve[rows]) for rows in (inside, ~inside))
+        return about(many - few >= ERRORS * math.hypot(few_error, many_error), f"{few:.1f} against {many:.1f}")
 
     return look
+
+
+def _mean_trials(rows: Curve) -> tuple[float, float]:
+    """Mean trials of some numbers of initial observations, and its standard error."""
+    return float(rows["trials"].mean()), float(np.sqrt((rows["trials SE"] ** 2).sum()) / len(rows))
 
 
 _INITIAL: Final = (
@@ -185,26 +206,25 @@ def step_claims(table: Table) -> list[Claim]:
     return claims
 
 
-def seven_claims(table: Table, pf_trials: float) -> list[Claim]:
-    """Trials with seven initial observations (Fig. 4.14–4.18).
+def seven_claims(table: Table) -> list[Claim]:
+    """Trials with seven initial observations (Fig. 4.15–4.17); PF has none, and its Fig. 4.14 the number of Fig. 4.24.
 
     Args:
         table: as from `initial.summary`.
-        pf_trials: mean trials of PF, which has none.
     """
-    figures = {"pf": "Fig. 4.14", "nr": "Fig. 4.15", "svmr": "Fig. 4.16", "gpr": "Fig. 4.17"}
+    figures = {"nr": "Fig. 4.15", "svmr": "Fig. 4.16", "gpr": "Fig. 4.17"}
     claims = []
     for method, where in figures.items():
         mean, sd = text.TRIALS_SEVEN[method]
-        contexts = {PEOPLE: pf_trials}
-        if method != "pf":
-            curves = {cohort: _curve(table, cohort, method, "without") for cohort in (PEOPLE, "gaussian")}
-            contexts = {_people(cohort): float(curve.loc[7, "trials"]) for cohort, curve in curves.items()}
-        initial = "" if method == "pf" else " with seven initial observations"
-        what = f"{NAMES[method]} needs {mean} trials{initial}."
-        look: Callable[[float], Found] = lambda n, mean=mean: share(n, mean)  # noqa: E731 - one of several, in a loop
-        claims.append(told(Statement(where, what, f"{mean}, SD {sd}", look), contexts))
+        curves = {cohort: _curve(table, cohort, method, "without") for cohort in table["cohort"].unique()}
+        contexts = {_people(str(cohort)): curve.loc[7] for cohort, curve in curves.items()}
+        what = f"{NAMES[method]} needs {mean} trials with seven initial observations."
+        claims.append(told(Statement(where, what, f"{mean}, SD {sd}", _seven(mean, their_error(method))), contexts))
     return claims
+
+
+def _seven(theirs: float, error: float) -> Callable[[pd.Series], Found]:
+    return lambda row: between(row["trials"], theirs, math.hypot(row["trials SE"], error))
 
 
 def gaussian_claims(components: Table) -> list[Claim]:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from benchmarks.reduction.comparison import PEOPLE_OF_KIM
+from benchmarks.reduction.comparison import PEOPLE_OF_KIM, error_of_mean
 from benchmarks.reduction.document import Section, Table
 from benchmarks.reduction.look import COLOURS, panels
 from benchmarks.reduction.readings import BASE, PEOPLE, READINGS, Reading
@@ -41,7 +41,16 @@ window lies nearer to an end. A range that is really narrower is given beside it
 def sessions(size: Size, seed: int) -> list[Session]:
     """Every number with the same people, for as many generations at least as are shown."""
     return [
-        Session("pf", PEOPLE, person, seed, reading, accelerometer, GENERATIONS * count, (("particles", count),))
+        Session(
+            "pf",
+            PEOPLE,
+            person,
+            seed,
+            reading,
+            accelerometer=accelerometer,
+            horizon=GENERATIONS * count,
+            settings=(("particles", count),),
+        )
         for count, (reading, accelerometer) in itertools.product(COUNTS, RANGES.values())
         for person in range(size.sweep)
     ]
@@ -65,7 +74,12 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
         "F1: measured": ("f1, measured", "mean"),
         "F1: true": ("f1, true", "mean"),
     }
-    return rows.groupby(["range", "particles"], sort=False).agg(**columns).reset_index()
+    grouped = rows.groupby(["range", "particles"], sort=False)
+    errors = {
+        f"{name} SE": pd.Series({key: error_of_mean(group, value) for key, group in grouped})
+        for name, value in (("trials", "trials"), ("F1", "f1, measured"))
+    }
+    return grouped.agg(**columns).assign(**errors).reset_index()
 
 
 def variances(rows: pd.DataFrame) -> pd.DataFrame:

@@ -24,7 +24,8 @@ class Reading:
             of the same person.
         outside: whether ISIs outside the measured window answer as they were "recorded", or with "zero", as the text's
             figures have it.
-        floor: what becomes of the floor; None is each method's own default (PF: raw, the others: subtracted).
+        floor: what becomes of the floor; None is each method's own default (NR: the lowest tenth is subtracted, SVMR
+            and GPR: the median, PF: raw).
         edges: whether both edges must settle, or either.
         last: of how many values.
         acquisition: what chooses the next ISI of a regression.
@@ -85,37 +86,16 @@ _ALONE: Final[dict[str, dict[str, Any]]] = {
     "base": {},
     "TMS alone at 90 %, zero outside": {"baseline": BASELINES[1], "outside": "zero"},
     "observation: mean of ten": {"observation": "mean"},
-    "observation: live trial": {"observation": "live"},
     "outside the window: zero": {"outside": "zero"},
-    "floor: zeroed": {"floor": "zeroed"},
     "floor: raw": {"floor": "raw"},
-    "edges: either": {"edges": "either"},
-    "last: six values": {"last": 6},
+    "floor: median of all MEPs": {"floor": "subtracted"},
     "pseudo-code: either edge, six": {"edges": "either", "last": 6},
-    "acquisition: edge variance": {"acquisition": "edge-variance"},
-    "acquisition: straddle": {"acquisition": "straddle"},
-    "acquisition: upper bound": {"acquisition": "ucb"},
-    "acquisition: expected improvement": {"acquisition": "log-ei"},
     "range end: hit + 500": {"range_end": "hit"},
-    "mean of ten, zero outside": {"observation": "mean", "outside": "zero"},
-    "mean of ten, six": {"observation": "mean", "last": 6},
-    "zero outside, edge variance": {"outside": "zero", "acquisition": "edge-variance"},
-    "raw, mean of ten": {"floor": "raw", "observation": "mean"},
-    "raw, zero outside": {"floor": "raw", "outside": "zero"},
-}
-
-_ON_CONSTANT_CV: Final[dict[str, dict[str, Any]]] = {
-    "constant-CV noise": {},
-    "constant-CV noise, mean of ten": {"observation": "mean"},
-    "constant-CV noise, zero outside": {"outside": "zero"},
-    "constant-CV noise, raw": {"floor": "raw"},
-    "constant-CV noise, six": {"last": 6},
 }
 
 READINGS: Final[dict[str, tuple[Reading, str]]] = {
     **{name: (replace(BASE, **changes), PEOPLE) for name, changes in _ALONE.items()},
-    **{name: (replace(BASE, **changes), "gaussian") for name, changes in _ON_CONSTANT_CV.items()},
-    "kim11 (input noise of people at large)": (BASE, "kim11"),
+    "constant-CV noise": (BASE, "gaussian"),
 }
-"""Readings and the cohort they are tried on: one factor at a time around the base, combinations, and other people. The
+"""Readings and the cohort they are tried on: one factor at a time around the base, and other people. The
 noise of the people is no reading of the text, but it is as little known."""

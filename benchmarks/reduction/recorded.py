@@ -85,14 +85,17 @@ class RecordedSweep:
             **{f"measured, {baseline}": self._measured(*whole, baseline).window for baseline in BASELINES},
         }
 
-    def sweep(self, low_ms: float = 0.0, baseline: str = BASELINES[0]) -> ConventionalSweep:
+    def sweep(
+        self, low_ms: float = 0.0, baseline: str = BASELINES[0], last_ms: float = SWEPT.high_ms
+    ) -> ConventionalSweep:
         """The conventional sweep from an ISI on, as the strategy `incremental` judges it.
 
         Args:
             low_ms: the ISI [ms].
             baseline: one of `BASELINES`.
+            last_ms: the last ISI [ms].
         """
-        first, last = self.index(low_ms), len(SWEPT.grid_ms)
+        first, last = self.index(low_ms), self.index(last_ms) + 1
         passed = (stop for stop in range(first + 1, last + 1) if self._has_passed(first, stop, baseline))
         terminated = next(passed, last)
         return ConventionalSweep(

@@ -13,8 +13,9 @@ import torch
 from scipy.stats import shapiro
 
 import isiw
+from benchmarks.reduction.guess import FIXED, UNRELATED, guessing, unrelated
 from benchmarks.reduction.readings import BASE, Reading
-from benchmarks.reduction.recorded import STEP_MS, SWEPT, TRIALS_PER_ISI, RecordedSweep, record, stops_inside
+from benchmarks.reduction.recorded import BASELINES, STEP_MS, SWEPT, TRIALS_PER_ISI, RecordedSweep, record, stops_inside
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.signals import wrong_isi
 from isiw.strategy.stopping import stimuli_left
@@ -24,6 +25,9 @@ from isiw.window import Window, WindowEstimate
 
 NEAR_MS = 25.0
 """How far before the true window an experimenter begins who expects it [ms]."""
+
+ALONE = 1
+"""Sets the draw of TMS alone apart from that of the pairs."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,10 @@ class Session:
         reading: how the text is read.
         accelerometer: whether ISIs count from the impact.
         horizon: trials that are played at least, whatever the stopping rule says.
+        alone: trials of TMS alone at the pairs' intensity that the strategy is told before the first pair; they are no
+            trials of the session.
         settings: settings of the strategy beyond the reading's, as (name, value) pairs.
+        wrong: which model that is wrong on purpose, one of those of `wrong`; empty: none.
     """
 
     method: str
@@ -48,7 +55,9 @@ class Session:
     reading: Reading = BASE
     accelerometer: bool = False
     horizon: int = 0
+    alone: int = 0
     settings: tuple[tuple[str, Any], ...] = field(default=())
+    wrong: str = ""
 
 
 @dataclass(frozen=True)
@@ -110,6 +119,13 @@ def answers(session: Session, swept: RecordedSweep, offset_ms: float) -> Callabl
     return recorded
 
 
+def alone_mv(session: Session, swept: RecordedSweep) -> list[float]:
+    """MEPs of TMS alone [mV] that a strategy is told first, drawn from those of the record."""
+    recorded_mv = swept.alone_mv[BASELINES[1]]
+    rng = np.random.default_rng([session.seed, session.person, ALONE])
+    return rng.choice(recorded_mv, session.alone, replace=False).tolist()
+
+
 def known(reading: Reading, swept: RecordedSweep) -> BoolArray:
     """At which ISIs of `SWEPT` a reading has MEPs other than zero, shape (t,)."""
     window = swept.windows[reading.truth]
@@ -133,16 +149,30 @@ def correlation(a: FloatArray | None, b: FloatArray) -> float:
     return float(np.corrcoef(a, b)[0, 1])
 
 
-def play(session: Session, swept: RecordedSweep) -> dict[str, Any]:
-    """Run a session until its stopping rule, and to its horizon where that is later; see `run`."""
+def strategy_of(session: Session, where: Range) -> isiw.Strategy:
+    """The strategy of a session before its first trial."""
+    settings = session.reading.settings(session.method) | dict(session.settings)
+    usual = isiw.make_strategy(session.method, where.space, session.seed + session.person, **settings)
+    return guessing(usual, where.offset_ms) if session.wrong == FIXED else usual
+
+
+def play(
+    session: Session, swept: RecordedSweep, change: Callable[[isiw.Strategy], isiw.Strategy] = lambda usual: usual
+) -> dict[str, Any]:
+    """Run a session until its stopping rule, and to its horizon where that is later; see `run`.
+
+    Args:
+        session: the session.
+        swept: the person's recorded sweep.
+        change: makes another strategy of the session's own.
+    """
     where = searched(session, swept.subject.hit_delay_ms)
-    strategy = isiw.make_strategy(
-        session.method,
-        where.space,
-        session.seed + session.person,
-        **session.reading.settings(session.method) | dict(session.settings),
-    )
+    strategy = change(strategy_of(session, where))
     answer = answers(session, swept, where.offset_ms)
+    if session.wrong == UNRELATED:
+        answer = unrelated(answer, where.space, session.seed + session.person)
+    for mep_mv in alone_mv(session, swept):
+        strategy.tell(None, mep_mv)
     by_trial: dict[str, list[float]] = {f"f1, {session.reading.truth}": [], "f1, true": []}
     before = f1_by_truth(where.from_valve(strategy.estimate().window), swept)
     trials, stopped, spread_ms = 0, None, []

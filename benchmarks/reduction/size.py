@@ -1,11 +1,11 @@
-"""How much is run: the whole report, or a quick look at all of it."""
+"""How much is run: the whole report, or little of all of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final
 
-__all__ = ["FULL", "QUICK", "Size"]
+__all__ = ["FEW", "FULL", "Size"]
 
 
 @dataclass(frozen=True)
@@ -17,11 +17,13 @@ class Size:
         kim_default: how many of those of `kim11-measured` the default plays too, which takes longer than all others.
         people: people of `recruitment` in the main comparison.
         people_default: how many of them, and of `kim11`, the default plays too.
-        headline: people of each cohort of the headline, with every method.
+        headline: people of each cohort of the headline.
+        headline_default: how many of those the default plays too.
         sweep: sessions for each number of initial observations or particles.
         readings: sessions for each reading.
         horizon: trials of the default's learning curve in the headline.
         online: sessions on waveforms with each of two people.
+        default: settings of the default; none of its own where everything is run.
     """
 
     kim: int
@@ -29,31 +31,37 @@ class Size:
     people: int
     people_default: int
     headline: int
+    headline_default: int
     sweep: int
     readings: int
     horizon: int
     online: int
+    default: tuple[tuple[str, int], ...] = ()
 
 
 FULL: Final = Size(
-    kim=33,
-    kim_default=11,
-    people=66,
-    people_default=11,
-    headline=44,
-    sweep=11,
+    kim=11,
+    kim_default=0,
+    people=11,
+    people_default=0,
+    headline=22,
+    headline_default=11,
+    sweep=6,
     readings=11,
     horizon=40,
-    online=3,
-)
-QUICK: Final = Size(
-    kim=11,
-    kim_default=2,
-    people=4,
-    people_default=1,
-    headline=4,
-    sweep=3,
-    readings=3,
-    horizon=12,
     online=1,
 )
+FEW: Final = Size(
+    kim=2,
+    kim_default=2,
+    people=2,
+    people_default=2,
+    headline=2,
+    headline_default=2,
+    sweep=2,
+    readings=1,
+    horizon=8,
+    online=1,
+    default=(("max_trials", 6),),
+)
+"""So few that little can be concluded."""

@@ -1,11 +1,12 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from benchmarks.dissertation.claims import Claim, claims_as_json, places, read_claims
+from benchmarks.dissertation.claims import Claim, by_kind, claims_as_json, places, put_to_test, read_claims
 
 from isiw.errors import InvalidValueError
 
@@ -34,6 +35,31 @@ def test_a_verdict_of_another_form_is_an_error(verdict: str) -> None:
 @pytest.mark.parametrize("verdict", ["under reading open loop", "not, because the text gives no number"])
 def test_a_verdict_may_name_a_reading_or_a_reason(verdict: str) -> None:
     assert Claim(**CLAIM | {"verdict": verdict}).verdict == verdict
+
+
+@pytest.mark.parametrize("verdict", ["by construction: it was put in", "fitted", "cannot fail here: no model was run"])
+def test_what_holds_without_saying_anything_is_a_verdict_of_its_own(verdict: str) -> None:
+    counts = by_kind([Claim(**CLAIM), Claim(**CLAIM | {"verdict": verdict})])
+    assert counts == {"reproduced": 1, "under reading": 0, "not, because": 0, "holds, and could not fail": 1}
+
+
+def test_a_claim_is_reproduced_only_if_it_fails_for_a_wrong_model() -> None:
+    fails, holds = Claim(**CLAIM), Claim(**CLAIM | {"what": "Intervals are positive."})
+    wrong = {"a fixed guess": [replace(fails, verdict="not, because it is off"), holds], "other noise": [fails, holds]}
+    first, second = put_to_test([fails, holds], wrong)
+    assert (first.verdict, first.fails_for) == ("reproduced", "a fixed guess")
+    assert second.verdict == "cannot fail here: it holds as well for a fixed guess; other noise"
+
+
+def test_a_claim_for_which_no_wrong_model_was_run_cannot_fail() -> None:
+    (claim,) = put_to_test([Claim(**CLAIM)], {})
+    assert claim.verdict == "cannot fail here: no wrong model was run for it"
+
+
+def test_what_was_put_in_and_what_did_not_come_out_is_put_to_no_test() -> None:
+    failed = Claim(**CLAIM | {"what": "It is 2.", "verdict": "not, because it is 1"})
+    put_in = {"Intervals of 300": "fitted"}
+    assert [claim.verdict for claim in put_to_test([Claim(**CLAIM), failed], {}, put_in)] == ["fitted", failed.verdict]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.dissertation.claims import Claim, places, read_claims
 from benchmarks.dissertation.contents import CHAPTERS
 from benchmarks.dissertation.parts import Told, keep, kept, verdict
-from benchmarks.dissertation.size import FULL, QUICK, Size
+from benchmarks.dissertation.size import FEW, FULL, Size
 from matplotlib.figure import Figure
 
 from benchmarks.dissertation import events, excitability, precision, traces
@@ -23,7 +23,7 @@ def told(_size: Size, seed: int) -> Told:
 
 def test_a_part_is_kept_with_its_claims_pictures_and_command(tmp_path: Path) -> None:
     path = tmp_path / "gallery" / "events.json"
-    keep(told, path, QUICK, 7)
+    keep(told, path, FEW, 7)
     assert [claim.ours for claim in read_claims(path)] == ["7"]
     content = json.loads(path.read_text())
     assert (path.parent / content["pictures"]["Fig. 3.8"]).exists()
@@ -33,10 +33,10 @@ def test_a_part_is_kept_with_its_claims_pictures_and_command(tmp_path: Path) -> 
 
 def test_only_a_part_of_the_same_size_and_seed_is_done(tmp_path: Path) -> None:
     path = tmp_path / "events.json"
-    assert not kept(path, QUICK, 7)
-    keep(told, path, QUICK, 7)
-    assert kept(path, QUICK, 7)
-    assert not kept(path, QUICK, 8)
+    assert not kept(path, FEW, 7)
+    keep(told, path, FEW, 7)
+    assert kept(path, FEW, 7)
+    assert not kept(path, FEW, 8)
     assert not kept(path, FULL, 7)
 
 
@@ -54,7 +54,7 @@ def check(part: Told) -> None:
 
 
 def test_one_persons_traces_are_told() -> None:
-    check(traces.tell(QUICK, 5))
+    check(traces.tell(FEW, 5))
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from dataclasses import asdict
 import numpy as np
 import pandas as pd
 import pytest
-from benchmarks.reduction.claims import Statement, about, number, share, told
+from benchmarks.reduction.claims import Statement, about, between, number, share, told
 from benchmarks.reduction.comparison import WORDS
 from benchmarks.reduction.look import NAMES
 from benchmarks.reduction.method_claims import method_claims, star_claims
@@ -26,7 +26,10 @@ def dissertations_own() -> pd.DataFrame:
             {
                 "method": NAMES[method],
                 "accelerometer": word,
+                "sessions": 300,
                 "trials": float(text.TRIALS[word][method]),
+                "SE": 0.1,
+                "F1 SE": 0.001,
                 "F1: measured": text.F1[word][method],
                 "r: measured": text.CORRELATION[method],
                 "converged %": 100 * text.CONVERGED[word][method],
@@ -60,13 +63,26 @@ def test_a_verdict_is_that_of_the_base_or_names_the_readings(trials: dict[str, f
 
 def test_a_claim_is_a_flat_record_of_strings() -> None:
     claim = told(TRIALS, {"base": 20.0})
-    assert list(asdict(claim)) == ["where", "what", "theirs", "ours", "difference", "verdict"]
+    assert list(asdict(claim)) == ["where", "what", "theirs", "ours", "difference", "verdict", "fails_for"]
     assert (claim.theirs, claim.difference) == ("16", "+4.0 (+25 %)")
 
 
 def test_a_reason_that_is_known_is_given() -> None:
     silent = Statement[None]("Fig. 1", "Marks.", "*", lambda _: about(holds=False, ours="n.s."), "they cannot be read")
     assert told(silent, {"base": None}).verdict == "not, because they cannot be read"
+
+
+def test_a_number_with_errors_on_both_sides_holds_within_two_of_the_difference() -> None:
+    assert [between(n, 16.0, 1.5).holds for n in (12.9, 13.1, 18.9, 19.1)] == [False, True, True, False]
+    assert between(17.0, 16.0, 2.0).difference == "+1.0, +0.5 standard errors"
+
+
+def test_a_direction_that_is_smaller_than_its_errors_is_no_improvement() -> None:
+    what = "The accelerometer improves SVMR: no more trials, and no lower F1."
+    clear, vague = dissertations_own(), dissertations_own().assign(**{"SE": 20.0, "F1 SE": 0.2})
+    verdicts = [{c.what: c.verdict for c in method_claims({"own": table})}[what] for table in (clear, vague)]
+    assert verdicts[0] == "reproduced"
+    assert verdicts[1].startswith("not, because")
 
 
 def test_trials_hold_within_thirty_percent_and_shares_within_a_tenth() -> None:
@@ -99,8 +115,9 @@ def test_readings_of_the_particle_filter_say_nothing_about_others() -> None:
 
 
 def test_initial_observations_are_judged_on_either_kind_of_people() -> None:
+    errors = {"F1 SE": 0.01, "trials SE": 0.1}
     rows = [
-        {"cohort": cohort, "method": method, "accelerometer": word, "initial": n, "F1": f1, "trials": 20.0}
+        {"cohort": cohort, "method": method, "accelerometer": word, "initial": n, "F1": f1, "trials": 20.0, **errors}
         for cohort, peak in ((PEOPLE, 3), ("gaussian", 6))
         for method in ("nr", "svmr", "gpr")
         for word in WORDS.values()
@@ -110,7 +127,10 @@ def test_initial_observations_are_judged_on_either_kind_of_people() -> None:
     verdict = {claim.what: claim for claim in initial_claims(pd.DataFrame(rows))}
     assert verdict["SVMR with accelerometer: F1 is best at 3."].verdict == "reproduced"
     best = verdict["GPR without accelerometer: F1 is best at 6."]
-    assert (best.ours, best.verdict) == ("best at 3 (1.00)", "under reading constant-CV noise")
+    assert (best.ours, best.verdict) == (
+        "best at 3 (1.00); 0.70 where the text has it",
+        "under reading constant-CV noise",
+    )
 
 
 def test_the_marks_of_significance_are_of_paired_tests_over_people() -> None:

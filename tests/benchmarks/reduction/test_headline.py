@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from benchmarks.reduction.comparison import WORDS
-from benchmarks.reduction.headline import duel, equal_f1, equal_trials, judged
+from benchmarks.reduction.headline import changes, duel, equal_f1, equal_trials, judged
 from benchmarks.reduction.reading_table import distance
 
 from benchmarks.reduction import dissertation as text
@@ -32,6 +32,7 @@ def test_a_duel_compares_at_each_sessions_own_trials_and_finds_where_it_stays_ah
     rows = pd.DataFrame(
         {
             "method": ["gpr", "gpr", "default", "default"],
+            "person": [0, 1, 0, 1],
             "trials": [2, 3, 80, 80],
             "f1": [0.3, 0.5, 0.9, 0.9],
             "f1_by_trial": [[0.0] * 4, [0.0] * 4, *curves],
@@ -44,9 +45,24 @@ def test_a_duel_compares_at_each_sessions_own_trials_and_finds_where_it_stays_ah
     assert row["share of its trials"] == pytest.approx(2 / 2.5)
 
 
+def test_a_duel_leaves_out_whom_the_default_has_not_seen() -> None:
+    methods, persons = ["nr"] * 3 + ["default"] * 2, [0, 1, 2, 0, 1]
+    rows = pd.DataFrame({"method": methods, "person": persons, "trials": 4, "f1": [0.2, 0.4, 0.9, 0.5, 0.5]})
+    rows = rows.assign(f1_by_trial=pd.Series([[0.5] * 4] * 5))
+    assert duel(rows, "nr")["its F1"] == pytest.approx(0.3)
+
+
+def test_a_method_that_loses_what_it_had_is_said_to_get_worse() -> None:
+    falling = [[0.9] * 10 + [low] * 30 for low in (0.3, 0.4, 0.35)]
+    rows = pd.DataFrame({"cohort": "gaussian", "alone": 0, "method": "nr", "f1_by_trial": falling})
+    assert changes(rows)["worse by more than 2 SE"].tolist() == ["yes"]
+    steady = rows.assign(f1_by_trial=pd.Series([[0.9] * 40] * 3))
+    assert changes(steady)["worse by more than 2 SE"].tolist() == ["no"]
+
+
 def test_curves_are_read_both_ways() -> None:
     curves = [[0.1, 0.3, 0.7, 0.6, 0.9], [0.3, 0.5, 0.7, 0.6, 0.9]]
-    rows = pd.DataFrame({"cohort": "gaussian", "method": "nr", "f1_by_trial": curves})
+    rows = pd.DataFrame({"cohort": "gaussian", "alone": 0, "method": "nr", "f1_by_trial": curves})
     assert equal_trials(rows).iloc[0]["5"] == pytest.approx(0.9)
     reached = equal_f1(rows).iloc[0]
     # The mean touches .7 at the third trial, and leaves it again.

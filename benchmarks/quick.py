@@ -1,0 +1,112 @@
+"""A quick look at a benchmark: what `--quick` stands for, at most two minutes of processor time.
+
+    python -m benchmarks.people --quick
+    python -m benchmarks.before_and_now run --quick
+
+Every benchmark understands it by the same rule. `--quick` stands for the options of `QUICK`; one that the command gives
+itself stays as given. What a quick run writes goes into a folder of its own, `FOLDER`, unless `--out` says otherwise,
+so that no committed result is lost.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from threadpoolctl import threadpool_limits
+
+__all__ = ["FOLDER", "QUICK", "expanded", "understood"]
+
+FOLDER: Final = Path("benchmarks/results/quick")
+
+QUICK: Final[Mapping[str, str]] = {
+    "acquisition": "--cohorts gaussian,recruitment --people 4 --other-people 2 --oracle-people 2 --trials 10 --out OUT",
+    "another_day": "--people 4 --earlier-trials 8 --trials 8 --out OUT",
+    "before_and_now compare": "--out OUT",
+    "before_and_now run": "--cohorts gaussian --people 4 --out OUT",
+    "before_and_now speed": "--laps 1",
+    "before_and_now stops": "--out OUT",
+    "calibration": "--replications 4 --trials 5 --people 1 --out OUT",
+    "dissertation": "--few --out OUT",
+    "fair_opponent": "--people 3 --trials 12 --out OUT",
+    "impact_stream": "--sweeps 100",
+    "inhibition": "--people 1 --out OUT",
+    "interval": "--out OUT",
+    "lab": "--labs 1 --people 2 --misfits 1 --trials 8 --out OUT",
+    "latency": "--people 1 --through 20 --long-people 1 --strategies default,nr,random",
+    "limits": "--cohorts late --people 2 --trials 8 --out OUT",
+    "line_peer": "--sessions 20",
+    "live": "--trials 20 --pairs 2 --paced 0 --drawn 5",
+    "log_damage": "--cases 500",
+    "long_sessions": "--most 100",
+    "lsl_throughput": "--seconds 5",
+    "measured_windows": "--sweeps 2",
+    "people": "--cohorts gaussian,recruitment --people 3 --trials 10 --out OUT",
+    "plausibility": "--people 2 --trials 20 --rigs 5 --out OUT",
+    "readme_results": "--out OUT",
+    "recorded": "--strategies default,nr --people 1 --trials 8 --out OUT",
+    "reduction.redraw": "--out OUT",
+    "rules_as_printed": "--people 20 --out OUT",
+    "server": "--number 10",
+    "signals": "",
+    "silence": "--people 3 --out OUT",
+    "soak": "--sessions 10",
+    "threshold": "--n 4 --spots 1",
+    "throughput": "--single 1 --batches 1 --batch 4 --gpu-batch 4",
+    "trial_cost": "--trials 60",
+    "trial_reduction": "--few --processes 1 --out OUT",
+    "two_oracles": "--people 4 --trials 10 --out OUT",
+    "vane": "--out OUT",
+    "waveform_loop": "--people 2 --sessions 1 --trials 15",
+    "zero_trials": "--people 20",
+}
+"""What `--quick` stands for, by benchmark and command; OUT is the benchmark's name in `FOLDER`."""
+
+
+def understood(benchmark: str) -> None:
+    """Put what `--quick` stands for in the place of it, before the command line is read.
+
+    Args:
+        benchmark: its module in this folder.
+    """
+    given = sys.argv[1:]
+    if "--help" in given:
+        print(f"--quick stands for: {_meant(benchmark, given)}\n")
+    if "--quick" in given:
+        threadpool_limits(1)  # small matrices gain nothing from several threads, which cost processor time
+        sys.argv[1:] = expanded(benchmark, given)
+
+
+def expanded(benchmark: str, given: Sequence[str]) -> list[str]:
+    """A command line without `--quick`, and with what it stands for.
+
+    Args:
+        benchmark: its module in this folder.
+        given: the command line.
+    """
+    kept = [word for word in given if word != "--quick"]
+    if len(kept) == len(given):
+        return kept
+    named = {word.partition("=")[0] for word in kept}
+    (Path.cwd() / FOLDER).mkdir(parents=True, exist_ok=True)
+    return [*kept, *(word for option in _options(_meant(benchmark, kept)) if option[0] not in named for word in option)]
+
+
+def _meant(benchmark: str, given: Sequence[str]) -> str:
+    """What `--quick` stands for, of a command of the benchmark where it has several."""
+    command = f"{benchmark} {given[0]}" if given else benchmark
+    return QUICK.get(command, QUICK.get(benchmark, "")).replace("OUT", str(FOLDER / benchmark))
+
+
+def _options(words: str) -> list[list[str]]:
+    """Options with their values."""
+    found: list[list[str]] = []
+    for word in shlex.split(words):
+        if word.startswith("--"):
+            found.append([word])
+        else:
+            found[-1].append(word)
+    return found
