@@ -14,6 +14,8 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from benchmarks.quick import understood
+
 WORDS = 6
 ROOT = Path(__file__).parents[1]
 
@@ -66,4 +68,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("house")
     main()

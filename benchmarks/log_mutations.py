@@ -32,6 +32,7 @@ from typer.main import get_command
 
 import isiw
 from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
 from isiw.cli import app
 
 ABSURD: Final[tuple[Any, ...]] = (
@@ -263,4 +264,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("log_mutations")
     main()

@@ -25,6 +25,7 @@ import torch
 from rich.console import Console
 
 import isiw
+from benchmarks.quick import understood
 from isiw.subjects.cohorts import cohort
 
 SPACE = isiw.VALVE_SPACE
@@ -82,4 +83,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("same_asks")
     main()

@@ -25,6 +25,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 import isiw
+from benchmarks.quick import understood
 from isiw.models.protocol import Observation
 from isiw.strategy.course import Course
 
@@ -134,4 +135,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    understood("trial_way")
     main()
