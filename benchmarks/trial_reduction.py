@@ -57,7 +57,7 @@ def measured(size: Size, seed: int, workers: Workers) -> Measured:
     plans = {part: part.sessions(size, seed) for part in PARTS}
     outcomes = run_sessions((session for plan in plans.values() for session in plan), workers)
     rows = {part.__name__: frame(plan, outcomes) for part, plan in plans.items()}
-    waveforms = in_parallel(online.examine, online.plan(size.online, seed), workers, "online")
+    waveforms = in_parallel(online.examine, online.plan(size.online, seed, size.default), workers, "online")
     return rows, waveforms
 
 

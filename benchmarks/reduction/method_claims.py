@@ -245,6 +245,7 @@ def _unreadable(where: str, values: pd.DataFrame) -> Claim:
     """The other marks, of which the text's words do not say to which pair they belong."""
     tests = paired_tests(values[[m for m in METHODS[:-1] if m in values]])
     ours = ", ".join(f"{NAMES[t.first]}–{NAMES[t.second]} {t.stars or 'n.s.'}" for t in tests.itertuples())
+    ours = ours or "too few can be compared"
     reason = "the marks' pairs cannot be read in the copy that was used; ours stand for themselves"
     look: Statement[None] = Statement(
         where, "Marks of significance between the methods.", "* to ***", lambda _: Found(holds=False, ours=ours), reason

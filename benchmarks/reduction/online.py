@@ -36,18 +36,22 @@ waveforms as well, until the window was passed. Means over sessions; the figure 
 
 @dataclass(frozen=True)
 class Online:
-    """One strategy with one person on the robot; `session` differs in trial noise."""
+    """One strategy with one person on the robot; `session` differs in trial noise, `settings` in all else."""
 
     person: int
     session: int
     method: str
     seed: int
+    settings: tuple[tuple[str, Any], ...] = ()
 
 
-def plan(sessions: int, seed: int) -> list[Online]:
-    """Both people with every strategy, so many sessions each."""
+def plan(sessions: int, seed: int, default: tuple[tuple[str, Any], ...] = ()) -> list[Online]:
+    """Both people with every strategy, so many sessions each; the default with these settings."""
     return [
-        Online(person, session, method, seed) for person in PEOPLE for session in range(sessions) for method in SETTINGS
+        Online(person, session, method, seed, default if method == "default" else tuple(settings.items()))
+        for person in PEOPLE
+        for session in range(sessions)
+        for method, settings in SETTINGS.items()
     ]
 
 
@@ -56,7 +60,7 @@ def examine(online: Online) -> dict[str, Any]:
     torch.set_num_threads(1)
     subject = cohort(COHORT, online.person + 1, online.seed)[online.person]
     seed = online.seed + 11 * online.session + online.person
-    strategy = isiw.make_strategy(online.method, IMPACT_SPACE, seed, **SETTINGS[online.method])
+    strategy = isiw.make_strategy(online.method, IMPACT_SPACE, seed, **dict(online.settings))
     # The robot of the waveform loop takes what it needs from a pair of sessions.
     deliver = by_waveform(subject, IMPACT_SPACE, Pair("impact", "open-loop", online.seed, online.person, seed, 0))
     told: list[tuple[float, float]] = []

@@ -29,7 +29,9 @@ def paired_tests(values: pd.DataFrame, pairs: list[tuple[str, str]] | None = Non
         p = 1.0 if same else float(ttest_rel(both[first], both[second]).pvalue)
         difference = float((both[first] - both[second]).mean())
         rows.append({"first": first, "second": second, "difference": difference, "people": len(both), "p": p})
-    table = pd.DataFrame(rows)
+    table = pd.DataFrame(rows, columns=["first", "second", "difference", "people", "p"])
+    if table.empty:
+        return table.assign(stars=[])
     table["p"] = multipletests(table["p"], method="holm")[1]
     return table.assign(stars=[stars(p) for p in table["p"]])
 

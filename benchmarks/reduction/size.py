@@ -60,7 +60,7 @@ FEW: Final = Size(
     headline_default=2,
     sweep=2,
     readings=1,
-    horizon=8,
+    horizon=6,
     online=1,
     default=(("max_trials", 6),),
 )

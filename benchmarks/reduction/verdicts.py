@@ -118,8 +118,9 @@ def wrong_claims(rows: Mapping[ModuleType, pd.DataFrame]) -> dict[str, list[Clai
         same = base[~base["method"].isin((*table["method"].unique(), "default"))]  # what the model leaves as it is
         table = pd.concat((table, same))
         found[name] = [*method_claims({name: comparison.summary(table)}), *_side_by_side(table)]
-    found[wrong.UNRELATED] += _of_initial(wrong.of_part(rows[wrong], wrong.UNRELATED, "initial"))
-    found[wrong.UNRELATED] += _of_particles(wrong.of_part(rows[wrong], wrong.UNRELATED, "particles"))
+    for part, claims_of in (("initial", _of_initial), ("particles", _of_particles)):
+        if len(chosen := wrong.of_part(rows[wrong], wrong.UNRELATED, part)):
+            found[wrong.UNRELATED] += claims_of(chosen)
     of_others = [*method_claims({"": comparison.summary(others)}), *_side_by_side(others), *sweep_facts(others)]
     return found | {wrong.OTHER_NOISE: of_others}
 

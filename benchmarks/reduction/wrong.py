@@ -37,6 +37,10 @@ MISREAD_SETTINGS: Final[Mapping[str, tuple[tuple[str, Any], ...]]] = {
 }
 
 
+FEWEST: Final = 2
+"""Where so few people have each number of initial ISIs and particles, none has it under a wrong model."""
+
+
 def sessions(size: Size, seed: int) -> list[Session]:
     """The methods side by side under each wrong model, and the numbers of initial ISIs and particles under one."""
     people = range(min(size.kim, PEOPLE_OF_KIM))
@@ -46,7 +50,7 @@ def sessions(size: Size, seed: int) -> list[Session]:
         for person in people
         for session in _wrong(Session(method, PEOPLE, person, seed, accelerometer=accelerometer))
     ]
-    others = (*initial.sessions(size, seed), *particles.sessions(size, seed))
+    others = (*initial.sessions(size, seed), *particles.sessions(size, seed)) if size.sweep > FEWEST else ()
     return [*side_by_side, *(replace(one, wrong=UNRELATED) for one in others if one.cohort == PEOPLE)]
 
 
@@ -71,7 +75,7 @@ def of_part(rows: pd.DataFrame, wrong: str, part: str) -> pd.DataFrame:
         part: "comparison", "initial" or "particles".
     """
     chosen = rows[rows["wrong"] == wrong]
-    counted = {"initial": chosen.get("initial"), "particles": chosen.get("particles")}
-    if part in counted:
-        return chosen[counted[part].notna()]
-    return chosen[counted["initial"].isna() & counted["particles"].isna()]
+    chosen = chosen.reindex(columns=list(dict.fromkeys((*chosen.columns, "initial", "particles"))))
+    if part in chosen:
+        return chosen[chosen[part].notna()]
+    return chosen[chosen["initial"].isna() & chosen["particles"].isna()]

@@ -28,7 +28,7 @@ from benchmarks.reduction import (
 
 pytestmark = pytest.mark.slow  # forty comparisons are summed up: seconds
 
-SIZE = replace(FEW, readings=1, sweep=2)
+SIZE = replace(FEW, readings=1, sweep=3)
 PARTS = (comparison, reading_table, pf_readings, initial, particles, gaussians, wrong)
 SCORES = (
     *("f1, true", "f1, measured", "f1, measured, .135", "f1, measured, 100 % RMT", "f1, measured, 90 % RMT"),
