@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import get_args
 
 import torch
 
-from isiw.checks import MOST_OF_A_KIND, check_numbers, check_probabilities, check_wholes
+from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.models.particles.engine import EngineName, engine_for
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import levels
@@ -46,6 +48,8 @@ class ParticleModel:
         unusual_kept: the part of their probability that unusual starts and widths of the window keep where the next ISI
             is chosen; what is believed and reported keeps all of it.
         device: torch device.
+        engine: `"compiled"` loops on the CPU, or `"torch"`, which stands in where there are none; the same seed asks
+            other ISIs with each.
 
     Raises:
         InvalidValueError: fewer than two particles or more than a memory holds, or an invalid number.
@@ -59,12 +63,14 @@ class ParticleModel:
     response_threshold_mv: float = 0.02
     unusual_kept: float = 1 / 3
     device: str = "cpu"
+    engine: EngineName = "compiled"
 
     def __post_init__(self) -> None:
         check_wholes(self, "particles", least=2, most=MOST_OF_A_KIND)  # half of them move at a time
         check_wholes(self, "thinned", least=1, most=MOST_OF_A_KIND)
         check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
         check_probabilities(self, "unusual_kept")
+        check_choice(self, "engine", get_args(EngineName))
         _require_device(self.device)
 
     @cached_property
@@ -85,14 +91,14 @@ class ParticleModel:
         """
         self.prior.profile.require_space(space)
         latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0), space)
-        return ParticlePosterior(self, space, seed, Swarm.of(latents))
+        engine = engine_for(self.engine, WindowTarget(self.prior, space), self.device)
+        return ParticlePosterior(self, space, seed, Swarm.of(latents), engine)
 
     def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The posterior after one more trial."""
         after = posterior.told(observation)
         generator = step_generator(self.device, posterior.seed, after.trials)
-        target = WindowTarget(self.prior, posterior.space)
-        return replace(after, swarm=after.swarm.moved(target, self.moves, generator))
+        return replace(after, swarm=after.swarm.moved(posterior.engine, self.moves, generator))
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> PriorPerson:
         """Draw one person from the prior, and an MEP at each ISI; see `SimulatesPeople`."""
@@ -116,6 +122,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
         space: the design space.
         seed: seed of all randomness.
         swarm: the particles.
+        engine: what computes with them.
     """
 
     @cached_property

@@ -99,6 +99,7 @@ class Response(NamedTuple):
         rest_probability: probability of a response without a tap (all or none).
         drift: by how much the log of evoked MEPs will have changed after many trials.
         startup: how strongly the first trials startle; 1 is `STARTUP`.
+        slope: of the drive by intensity, in logits per % RMT (recruitment).
     """
 
     kind: Tensor
@@ -114,6 +115,7 @@ class Response(NamedTuple):
     rest_probability: Tensor
     drift: Tensor
     startup: Tensor
+    slope: Tensor
 
 
 def log_gain(response: Response, order: Tensor) -> Tensor:

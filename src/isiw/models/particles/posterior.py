@@ -10,6 +10,7 @@ from typing import Any, Generic, Protocol, Self, TypeVar
 import torch
 
 from isiw.design import DesignSpace
+from isiw.models.particles.engine import Engine
 from isiw.models.particles.moves import L
 from isiw.models.particles.prior import Person
 from isiw.models.particles.swarm import Swarm
@@ -57,12 +58,14 @@ class SwarmPosterior(ABC, Generic[M, L]):
         space: the design space.
         seed: seed of all randomness.
         swarm: the particles.
+        engine: what computes with them.
     """
 
     model: M
     space: DesignSpace
     seed: int
     swarm: Swarm[L]
+    engine: Engine[L]
 
     @cached_property
     def person(self) -> Person:
@@ -102,7 +105,7 @@ class SwarmPosterior(ABC, Generic[M, L]):
         """
         known = self.model.detection_limit_mv, self.model.response_threshold_mv
         trial = observed(observation, *known, order=self.trials).to(self.device, DTYPE)
-        return replace(self, swarm=self.swarm.told(trial, self.person))
+        return replace(self, swarm=self.swarm.told(trial, self.engine))
 
     def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> Self:
         """The same particles, weighted by an imagined trial; see `Conditions`."""

@@ -294,6 +294,7 @@ class Prior:
             rest_probability=torch.sigmoid(z["switched_off"]),
             drift=z["drift"],
             startup=z["startup"],
+            slope=slope,
         )
 
 

@@ -114,6 +114,15 @@ class StartPrior:
         law = _law(space, self, quantile.dtype, quantile.device)
         return law.start_ms.at(quantile)
 
+    def knots(self, space: DesignSpace) -> tuple[Tensor, Tensor, Tensor]:
+        """Evenly spaced starts in a space [ms], the density there, and the probability of an earlier one; shape (k,).
+
+        Args:
+            space: the design space.
+        """
+        law = _law(space, self, DTYPE, torch.device("cpu"))
+        return law.density.x, law.density.y, law.start_ms.x
+
     def log_density(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
         """Log density at some starts, same shape; -inf where no start can be.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import torch
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.metrics import f1
-from isiw.models.particles.moves import Mover
+from isiw.models.particles.engine import EngineName, engine_for
 from isiw.models.particles.supra import SupraModel
 from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.model import SupraPosterior
@@ -89,11 +90,12 @@ def test_what_is_sampled_has_both_kinds_of_segment() -> None:
     assert mean_mv[0] < posterior.baselines_mv().mean() < mean_mv[1]
 
 
-def test_moves_leave_the_prior_as_it_is() -> None:
+@pytest.mark.parametrize("engine", get_args(EngineName))
+def test_moves_leave_the_prior_as_it_is(engine: EngineName) -> None:
     prior, generator = SupraPrior(), torch.Generator().manual_seed(2)
     drawn = prior.sample(1, 4000, generator, SPACE)
-    mover = Mover(SupraTarget(prior, SPACE), History.empty(1, torch.device("cpu")), generator)
-    moved = mover.sweeps(8, drawn, torch.zeros(1, 4000))
+    moves = engine_for(engine, SupraTarget(prior, SPACE))
+    moved = moves.sweeps(8, drawn, torch.zeros(1, 4000), History.empty(1, torch.device("cpu")), generator)
     assert (moved.latents.values != drawn.values).any(-1).double().mean() > 0.9
     assert moved.shifts.item() > 0.1
     fresh = prior.sample(1, 4000, generator, SPACE)

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import get_args
 
 import torch
 
-from isiw.checks import MOST_OF_A_KIND, check_numbers, check_wholes
+from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.models.particles.engine import EngineName, engine_for
 from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
@@ -37,6 +39,7 @@ class SupraModel:
         moves: how often particles move, and when they are resampled.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a told response is known to be above [mV].
+        engine: `"compiled"` loops, or `"torch"`, which stands in where there are none.
 
     Raises:
         InvalidValueError: fewer than two particles or more than a memory holds, or an invalid number.
@@ -48,11 +51,13 @@ class SupraModel:
     moves: Moving = field(default_factory=Moving)
     detection_limit_mv: float = 0.005
     response_threshold_mv: float = 0.02
+    engine: EngineName = "compiled"
 
     def __post_init__(self) -> None:
         check_wholes(self, "particles", least=2, most=MOST_OF_A_KIND)  # half of them move at a time
         check_wholes(self, "thinned", least=1, most=MOST_OF_A_KIND)
         check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
+        check_choice(self, "engine", get_args(EngineName))
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> SupraPosterior:
         """The posterior before the first trial.
@@ -63,14 +68,14 @@ class SupraModel:
             people: how many people.
         """
         latents = self.prior.sample(people, self.particles, step_generator("cpu", seed, 0), space)
-        return SupraPosterior(self, space, seed, Swarm.of(latents))
+        engine = engine_for(self.engine, SupraTarget(self.prior, space))
+        return SupraPosterior(self, space, seed, Swarm.of(latents), engine)
 
     def update(self, posterior: SupraPosterior, observation: Observation) -> SupraPosterior:
         """The posterior after one more trial."""
         after = posterior.told(observation)
         generator = step_generator("cpu", posterior.seed, after.trials)
-        target = SupraTarget(self.prior, posterior.space)
-        return replace(after, swarm=after.swarm.moved(target, self.moves, generator))
+        return replace(after, swarm=after.swarm.moved(posterior.engine, self.moves, generator))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +87,7 @@ class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
         space: the design space.
         seed: seed of all randomness.
         swarm: the particles.
+        engine: what computes with them.
     """
 
     @cached_property

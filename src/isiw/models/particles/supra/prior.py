@@ -168,7 +168,7 @@ class SupraPrior:
         check_laws(self, "curves", "floors")
 
     @cached_property
-    def _mixtures(self) -> tuple[Mixture, ...]:
+    def mixtures(self) -> tuple[Mixture, ...]:
         """What is believed of each latent but the starts, in the order of `LATENTS`."""
         startup = self.session.startup
         session = [(0.0, self.session.drift_sd), (startup.median, startup.sd)]
@@ -181,14 +181,14 @@ class SupraPrior:
 
     @cached_property
     def _joint(self) -> JointMixture:
-        return JointMixture(list(self._mixtures))
+        return JointMixture(list(self.mixtures))
 
     @cached_property
     def spreads(self) -> Tensor:
         """Usual SD of each latent, shape (d,)."""
         first = self.start.spans[0]
         starts = torch.full((2,), (first.high_ms - first.low_ms) / math.sqrt(12.0), dtype=DTYPE)
-        return torch.cat([starts, *(mixture.sds[0] for mixture in self._mixtures)])
+        return torch.cat([starts, *(mixture.sds[0] for mixture in self.mixtures)])
 
     def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> SupraLatents:
         """Particles of the prior.
@@ -279,4 +279,5 @@ def _response(z: dict[str, Tensor]) -> Response:
         rest_probability=nothing,
         drift=z["drift"],
         startup=z["startup"],
+        slope=slope,
     )

@@ -1,0 +1,143 @@
+"""Who computes with particles: torch, or compiled loops on one processor; both have the same law.
+
+The same seed leads to other draws with each, so that a log states which it was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Generic, Literal, Protocol, TypeAlias
+
+import torch
+
+from isiw.compiled import AVAILABLE, says_if_compiling
+from isiw.models.particles.kernels import likelihood as compiled
+from isiw.models.particles.kernels.moves import OWN_DRAWS, move, records
+from isiw.models.particles.kernels.records import columns_of
+from isiw.models.particles.kernels.target import Tables
+from isiw.models.particles.likelihood import total_log_likelihood
+from isiw.models.particles.moves import L, Moved, Mover, Target
+from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.shared.history import History
+from isiw.types import FloatArray, IntArray
+
+__all__ = ["Compiled", "Engine", "EngineName", "TabledTarget", "TorchEngine", "engine_for"]
+
+EngineName: TypeAlias = Literal["compiled", "torch"]
+
+
+class Engine(Protocol[L]):
+    """What particles are weighed and moved by."""
+
+    def log_likelihood(self, latents: L, history: History) -> Tensor:
+        """Log likelihood of a history under each particle, shape (b, p).
+
+        Args:
+            latents: the particles, fields of shape (b, p).
+            history: trials of b people.
+        """
+
+    def sweeps(
+        self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
+    ) -> Moved[L]:
+        """Move every particle some times under the posterior of a history.
+
+        Args:
+            number: how often.
+            latents: particles, fields of shape (b, p); whatever weights they have, they keep.
+            log_likelihood: of the history under each of them, shape (b, p).
+            history: trials of b people.
+            generator: source of randomness.
+        """
+
+
+class TabledTarget(Target[L], Protocol):
+    """A target that kernels know, too: its prior as tables, and its particles as plain arrays."""
+
+    def tables(self) -> Tables:
+        """What kernels know of the prior and of what moves may do."""
+
+    def kinds(self, latents: L) -> Tensor:
+        """The kinds of particles, integers of shape (b, p, k)."""
+
+    def latents(self, values: Tensor, kinds: Tensor) -> L:
+        """Particles from their latents (b, p, d) and kinds (b, p, k)."""
+
+
+def engine_for(name: EngineName, target: TabledTarget[L], device: str = "cpu") -> Engine[L]:
+    """The engine that is wanted, where it can be had; else torch.
+
+    Args:
+        name: which is wanted.
+        target: whose posterior particles move under.
+        device: torch device; kernels compute on the CPU alone.
+    """
+    if name == "torch" or not AVAILABLE or device != "cpu":
+        return TorchEngine(target)
+    return Compiled(target, target.tables())
+
+
+@dataclass(frozen=True)
+class TorchEngine(Generic[L]):
+    """Torch, on any device: what the kernels are tested against.
+
+    Args:
+        target: whose posterior particles move under.
+    """
+
+    target: Target[L]
+
+    def log_likelihood(self, latents: L, history: History) -> Tensor:
+        """Log likelihood of a history under each particle; see `Engine`."""
+        return total_log_likelihood(self.target.person(latents), history)
+
+    def sweeps(
+        self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
+    ) -> Moved[L]:
+        """Move every particle some times; see `Engine`."""
+        return Mover(self.target, history, generator).sweeps(number, latents, log_likelihood)
+
+
+@dataclass(frozen=True)
+class Compiled(Generic[L]):
+    """Compiled loops on one processor.
+
+    Args:
+        target: whose posterior particles move under.
+        tables: what the kernels know of it.
+    """
+
+    target: TabledTarget[L]
+    tables: Tables = field(repr=False)
+
+    def log_likelihood(self, latents: L, history: History) -> Tensor:
+        """Log likelihood of a history under each particle; see `Engine`."""
+        with says_if_compiling():
+            particles = records(self.tables, *self._arrays(latents))
+            return torch.from_numpy(compiled.likelihoods(particles, columns_of(history)))
+
+    def sweeps(
+        self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
+    ) -> Moved[L]:
+        """Move every particle some times; see `Engine`."""
+        people, size = log_likelihood.shape
+        values, kinds = (array.copy() for array in self._arrays(latents))
+        found, trials = log_likelihood.numpy().copy(), columns_of(history)
+        counts = torch.zeros((people, 4), dtype=DTYPE)
+        halves = slice(0, size // 2), slice(size // 2, None)
+        with says_if_compiling():
+            for mine, theirs in (halves, halves[::-1]) * number:
+                draws = self._draws(people, found[:, mine].shape[1], values.shape[-1], generator)
+                parts = (values[:, mine], kinds[:, mine], found[:, mine], values[:, theirs])
+                counts += torch.from_numpy(move(self.tables, trials, *parts, *draws))
+        shifts, shifted, jumps, jumped = counts.T
+        moved = self.target.latents(torch.from_numpy(values), torch.from_numpy(kinds))
+        return Moved(moved, torch.from_numpy(found), shifted / shifts, jumped / jumps)
+
+    def _arrays(self, latents: L) -> tuple[FloatArray, IntArray]:
+        return latents.values.contiguous().numpy(), self.target.kinds(latents).contiguous().numpy()
+
+    def _draws(self, people: int, size: int, latents: int, generator: torch.Generator) -> Any:
+        width = OWN_DRAWS + len(self.tables.first) + 4
+        uniform = torch.rand((people, size, width), generator=generator, dtype=DTYPE)
+        return uniform.numpy(), torch.randn((people, size, latents), generator=generator, dtype=DTYPE).numpy()
