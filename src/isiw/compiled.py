@@ -7,12 +7,15 @@ single precision, because loops over them become vector instructions, and loops 
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import os
 import sys
 import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -23,12 +26,14 @@ __all__ = [
     "LANES",
     "exp",
     "exp2",
+    "first_of",
     "inlined",
     "kernel",
     "log",
     "loop",
     "ndtr",
-    "says_if_compiling",
+    "per",
+    "per_root",
     "total",
     "version",
 ]
@@ -87,10 +92,20 @@ def inlined(function: F) -> F:
     return _compiled(function, _SAFE, _nrt=False, forceinline=True)
 
 
+@cache
+def _sources() -> str:
+    """What the kernels depend on, in short: Numba itself notices changes of a function's own file only."""
+    folder = Path(__file__).parent
+    files = sorted([Path(__file__), *folder.glob("models/particles/**/*.py"), *folder.glob("acquisition/kernels.py")])
+    return hashlib.blake2b(b"".join(file.read_bytes() for file in files), digest_size=6).hexdigest()
+
+
 def _compiled(function: F, fastmath: set[str], **more: bool) -> F:
     if not AVAILABLE:
         return function
     import numba  # noqa: PLC0415 - see above
+
+    function.__qualname__ = f"{function.__name__}_{_sources()}"  # which the file on disk is named after
 
     # Errors are numpy's: a check of each divisor is no vector instruction.
     options = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, **more}
@@ -102,9 +117,17 @@ def _compiled(function: F, fastmath: set[str], **more: bool) -> F:
 
 
 @contextmanager
-def says_if_compiling() -> Generator[None, None, None]:
-    """Write a line to standard error if what is done here takes so long that kernels are being compiled."""
-    said = threading.Timer(SLOW_S, sys.stderr.write, ("isiw compiles its kernels, once for this machine …\n",))
+def first_of(family: str) -> Generator[None, None, None]:
+    """Write a line to standard error if the first call of some kernels takes so long that they are being compiled.
+
+    Args:
+        family: what is called; it is watched once.
+    """
+    if family in _CALLED or not AVAILABLE:
+        yield
+        return
+    _CALLED.add(family)
+    said = threading.Timer(SLOW_S, sys.stderr.write, (f"isiw compiles its {family}, once on this machine …\n",))
     said.daemon = True
     said.start()
     try:
@@ -112,6 +135,8 @@ def says_if_compiling() -> Generator[None, None, None]:
     finally:
         said.cancel()
 
+
+_CALLED: Final[set[str]] = set()
 
 if AVAILABLE:
     from llvmlite import ir
@@ -139,6 +164,7 @@ else:
 
 
 _ONE, _HALF, _MOST = np.float32(1.0), np.float32(0.5), np.float32(126.0)
+_TWO, _THREE_HALVES = np.float32(2.0), np.float32(1.5)
 _LOG2E, _LN2 = np.float32(1.4426950408889634), np.float32(0.6931471805599453)
 _E1, _E2, _E3 = np.float32(0.6931472067), np.float32(0.2402264923), np.float32(0.0555032721)
 _E4, _E5, _E6 = np.float32(0.0096184373), np.float32(0.0013400429), np.float32(0.0001546976)
@@ -181,6 +207,25 @@ def log(x: Any) -> Any:
     tail = _L5 + m * (_L4 + m * (_L3 + m * (_L2 + m * (_L1 + m * _L0))))
     square = m * m
     return m - _HALF * square + square * m * (_L8 + m * (_L7 + m * (_L6 + m * tail))) + exponent * _LN2
+
+
+@inlined
+def per(x: Any) -> Any:
+    """1 / x of a positive number, in single precision: by Newton's method, as dividers are slow."""
+    y = _float_of(np.int32(0x7EF311C7 - _bits_of(x)))
+    y = y * (_TWO - x * y)
+    y = y * (_TWO - x * y)
+    return y * (_TWO - x * y)
+
+
+@inlined
+def per_root(x: Any) -> Any:
+    """1 / √x of a positive number, likewise."""
+    half = _HALF * x
+    y = _float_of(np.int32(0x5F3759DF - (_bits_of(x) >> 1)))
+    y = y * (_THREE_HALVES - half * y * y)
+    y = y * (_THREE_HALVES - half * y * y)
+    return y * (_THREE_HALVES - half * y * y)
 
 
 @inlined

@@ -25,7 +25,7 @@ from isiw.models.gp.scale import Scale, Transform, scale_of
 from isiw.models.protocol import DTYPE, Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory, PersonTrials
-from isiw.models.windows import SampledProfiles, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, profile_grid, sampled_estimate
 from isiw.window import WindowEstimate
 
 __all__ = ["GaussianProcess", "GaussianProcessPosterior", "NoiseKind", "ProcessSettings"]
@@ -231,5 +231,9 @@ class GaussianProcessPosterior:
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
         grid = torch.tensor(self.space.grid_ms, dtype=DTYPE)
-        profiles = SampledProfiles(self.profiles_mv(profile_grid(self.space))[person], self.baselines_mv()[person])
-        return sampled_estimate(self.window_masks(grid)[person], profiles, self.space)
+
+        def profiles() -> SampledProfiles:
+            mep_mv = self.profiles_mv(profile_grid(self.space))
+            return SampledProfiles(mep_mv[person], self.baselines_mv()[person])
+
+        return sampled_estimate(Runs.of_masks(self.window_masks(grid)[person]), profiles, self.space)

@@ -26,7 +26,7 @@ from isiw.models.protocol import DTYPE, Observation, PriorPerson, Tensor
 from isiw.models.randomness import SIMULATED, step_generator, systematic
 from isiw.models.shared.history import History, observed
 from isiw.models.shared.tables import OUTCOMES, interpolated, table_levels
-from isiw.models.windows import SampledProfiles, least_excess_mv, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, least_excess_mv, profile_grid, sampled_estimate
 from isiw.types import ArrayLike
 from isiw.window import Window, WindowEstimate
 
@@ -283,5 +283,9 @@ class ParametricPosterior:
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
         masks = self.window_masks(torch.tensor(self.space.grid_ms))[person]
-        profiles = SampledProfiles(self.profiles_mv(profile_grid(self.space))[person], self.baselines_mv()[person])
-        return sampled_estimate(masks, profiles, self.space)
+
+        def profiles() -> SampledProfiles:
+            mep_mv = self.profiles_mv(profile_grid(self.space))
+            return SampledProfiles(mep_mv[person], self.baselines_mv()[person])
+
+        return sampled_estimate(Runs.of_masks(masks), profiles, self.space)

@@ -6,17 +6,18 @@ The same seed leads to other draws with each, so that a log states which it was.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Generic, Literal, Protocol, TypeAlias
+from typing import Generic, Literal, Protocol, TypeAlias
 
 import torch
 
-from isiw.compiled import AVAILABLE, says_if_compiling
+from isiw.compiled import AVAILABLE, first_of
 from isiw.models.particles.kernels import likelihood as compiled
-from isiw.models.particles.kernels.moves import OWN_DRAWS, move, records
-from isiw.models.particles.kernels.records import columns_of
+from isiw.models.particles.kernels.moves import OWN_DRAWS, log_places, records, sweep
+from isiw.models.particles.kernels.records import columns_of, person_of
 from isiw.models.particles.kernels.target import Tables
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.moves import L, Moved, Mover, Target
+from isiw.models.particles.prior import Person
 from isiw.models.protocol import DTYPE, Tensor
 from isiw.models.shared.history import History
 from isiw.types import FloatArray, IntArray
@@ -29,6 +30,13 @@ EngineName: TypeAlias = Literal["compiled", "torch"]
 class Engine(Protocol[L]):
     """What particles are weighed and moved by."""
 
+    def meaning(self, latents: L) -> tuple[Person, FloatArray | None]:
+        """What particles mean, and the same as kernels have it; None where torch computes.
+
+        Args:
+            latents: the particles, fields of shape (b, p).
+        """
+
     def log_likelihood(self, latents: L, history: History) -> Tensor:
         """Log likelihood of a history under each particle, shape (b, p).
 
@@ -36,6 +44,9 @@ class Engine(Protocol[L]):
             latents: the particles, fields of shape (b, p).
             history: trials of b people.
         """
+
+    def log_places(self, latents: L) -> Tensor:
+        """Log prior density of start and width of each particle but for a constant, shape (b, p)."""
 
     def sweeps(
         self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
@@ -87,9 +98,17 @@ class TorchEngine(Generic[L]):
 
     target: Target[L]
 
+    def meaning(self, latents: L) -> tuple[Person, None]:
+        """What particles mean; see `Engine`."""
+        return self.target.person(latents), None
+
     def log_likelihood(self, latents: L, history: History) -> Tensor:
         """Log likelihood of a history under each particle; see `Engine`."""
         return total_log_likelihood(self.target.person(latents), history)
+
+    def log_places(self, latents: L) -> Tensor:
+        """Log prior density of start and width of each particle but for a constant; see `Engine`."""
+        return self.target.log_place(latents)
 
     def sweeps(
         self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
@@ -110,11 +129,22 @@ class Compiled(Generic[L]):
     target: TabledTarget[L]
     tables: Tables = field(repr=False)
 
+    def meaning(self, latents: L) -> tuple[Person, FloatArray]:
+        """What particles mean; see `Engine`."""
+        with first_of("view of particles"):
+            particles = records(self.tables, *self._arrays(latents))
+        return person_of(particles), particles
+
     def log_likelihood(self, latents: L, history: History) -> Tensor:
         """Log likelihood of a history under each particle; see `Engine`."""
-        with says_if_compiling():
+        with first_of("view of particles"):
             particles = records(self.tables, *self._arrays(latents))
             return torch.from_numpy(compiled.likelihoods(particles, columns_of(history)))
+
+    def log_places(self, latents: L) -> Tensor:
+        """Log prior density of start and width of each particle but for a constant; see `Engine`."""
+        with first_of("prior"):
+            return torch.from_numpy(log_places(self.tables, latents.values.contiguous().numpy()))
 
     def sweeps(
         self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
@@ -124,20 +154,16 @@ class Compiled(Generic[L]):
         values, kinds = (array.copy() for array in self._arrays(latents))
         found, trials = log_likelihood.numpy().copy(), columns_of(history)
         counts = torch.zeros((people, 4), dtype=DTYPE)
-        halves = slice(0, size // 2), slice(size // 2, None)
-        with says_if_compiling():
-            for mine, theirs in (halves, halves[::-1]) * number:
-                draws = self._draws(people, found[:, mine].shape[1], values.shape[-1], generator)
-                parts = (values[:, mine], kinds[:, mine], found[:, mine], values[:, theirs])
-                counts += torch.from_numpy(move(self.tables, trials, *parts, *draws))
+        width = OWN_DRAWS + len(self.tables.first) + 4
+        with first_of("moves"):
+            for _ in range(number):
+                uniform = torch.rand((people, size, width), generator=generator, dtype=DTYPE)
+                normal = torch.randn(values.shape, generator=generator, dtype=DTYPE)
+                draws = uniform.numpy(), normal.numpy()
+                counts += torch.from_numpy(sweep(self.tables, trials, values, kinds, found, *draws))
         shifts, shifted, jumps, jumped = counts.T
         moved = self.target.latents(torch.from_numpy(values), torch.from_numpy(kinds))
         return Moved(moved, torch.from_numpy(found), shifted / shifts, jumped / jumps)
 
     def _arrays(self, latents: L) -> tuple[FloatArray, IntArray]:
         return latents.values.contiguous().numpy(), self.target.kinds(latents).contiguous().numpy()
-
-    def _draws(self, people: int, size: int, latents: int, generator: torch.Generator) -> Any:
-        width = OWN_DRAWS + len(self.tables.first) + 4
-        uniform = torch.rand((people, size, width), generator=generator, dtype=DTYPE)
-        return uniform.numpy(), torch.randn((people, size, latents), generator=generator, dtype=DTYPE).numpy()

@@ -104,6 +104,10 @@ class WindowTarget:
         """Log prior density of their latents but for a constant, shape (b, p)."""
         return self.prior.log_density(latents.values, self.space)
 
+    def log_place(self, latents: Latents) -> Tensor:
+        """Log prior density of start and width, shape (b, p)."""
+        return self.prior.log_place(latents.values, self.space)
+
     def shifted(self, latents: Latents, part: Tensor) -> Tensor:
         """Which latents a difference moves, shape (b, p, d)."""
         return _shifted(part.device)[part] & used_by(latents.noise, latents.present)

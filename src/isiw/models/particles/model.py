@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import get_args
@@ -12,21 +11,20 @@ import torch
 from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.particles.engine import EngineName, engine_for
+from isiw.models.particles.engine import Engine, EngineName, engine_for
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import levels
-from isiw.models.particles.noise import Response, draw_log_mep, log_gain, recruits
+from isiw.models.particles.noise import draw_log_mep, log_gain, recruits
 from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.predictions import PersonSample
-from isiw.models.particles.prior import Person, Prior
-from isiw.models.particles.shapes import Shape
-from isiw.models.particles.swarm import Moving, Swarm, taken
-from isiw.models.protocol import DTYPE, Observation, PriorPerson, Tensor
-from isiw.models.randomness import SIMULATED, step_generator, systematic
+from isiw.models.particles.prior import Prior
+from isiw.models.particles.swarm import Moving, Swarm
+from isiw.models.protocol import DTYPE, Observation, PriorPerson
+from isiw.models.randomness import SIMULATED, step_generator
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import ArrayLike, FloatArray
-from isiw.window import Enhancement, Window, WindowEstimate
+from isiw.window import Later, Window, WindowEstimate
 
 __all__ = ["ParticleModel", "ParticlePosterior"]
 
@@ -91,8 +89,11 @@ class ParticleModel:
         """
         self.prior.profile.require_space(space)
         latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0), space)
-        engine = engine_for(self.engine, WindowTarget(self.prior, space), self.device)
-        return ParticlePosterior(self, space, seed, Swarm.of(latents), engine)
+        engine, usual = (
+            engine_for(self.engine, WindowTarget(prior, space), self.device)
+            for prior in (self.prior, self.prior_where_asking)
+        )
+        return ParticlePosterior(self, space, seed, Swarm.of(latents), engine, usual)
 
     def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The posterior after one more trial."""
@@ -123,20 +124,26 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
         seed: seed of all randomness.
         swarm: the particles.
         engine: what computes with them.
+        usual: the same under the prior that ISIs are chosen with.
     """
+
+    usual: Engine[Latents]
 
     @cached_property
     def as_usual(self) -> ParticlePosterior:
         """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
-        latents, usual = self.swarm.latents, self.model.prior_where_asking
-        ratio = usual.log_place(latents.values, self.space) - self.model.prior.log_place(latents.values, self.space)
+        latents = self.swarm.latents
+        ratio = self.usual.log_places(latents) - self.engine.log_places(latents)
         return replace(self, swarm=self.swarm.times(torch.where(latents.present, ratio, 0.0)))
 
     @cached_property
     def sample(self) -> PersonSample:
         """The particles that represent all of them where every candidate ISI is scored."""
-        picks = systematic(self.swarm.log_weights, self.model.thinned)
-        return PersonSample(_each(self.person, lambda x: taken(x, picks)), self.space, self.trials)
+        return self._sample(self.swarm.picked(self.model.thinned), self.trials)
+
+    def _sample(self, latents: Latents, order: int = 0) -> PersonSample:
+        person, records = self.engine.meaning(latents)
+        return PersonSample(person, self.space, order, records)
 
     def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
         """Between which amplitudes the next MEP lies; see `PredictsMeps`."""
@@ -147,28 +154,30 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        one = slice(person, person + 1)
-        picks = systematic(self.swarm.log_weights[one], self.model.particles)
-        latents = Latents(*(taken(x[one], picks) for x in self.swarm.latents))
-        sample = PersonSample(self.model.prior.person(latents), self.space)
-        grid = torch.tensor(self.space.grid_ms, dtype=DTYPE, device=latents.values.device)
-        thinned = PersonSample(_each(self.sample.person, lambda x: x[one]), self.space)
-        profiles_mv = thinned.expected_mep_mv(profile_grid(self.space).to(grid.device))
-        profiles = SampledProfiles(profiles_mv[0], thinned.baselines_mv()[0])
-        hypotheses = SampledHypotheses(self.model.prior.hypothesis(latents)[0], self.model.prior.hypotheses)
-        estimate = sampled_estimate(sample.window_masks(grid)[0], profiles, self.space, hypotheses)
-        return replace(
-            estimate,
-            largest_excluded=self._with_shift(estimate.largest_excluded, latents),
-            unusual=self.model.prior.unusual(latents, self.space),
-        )
+        one, prior = self.swarm.of_person(person), self.model.prior
+        latents = one.picked(self.model.particles)
+        grid_ms = torch.tensor(self.space.grid_ms, dtype=DTYPE, device=self.device)
 
-    def _with_shift(self, excluded: Enhancement | None, latents: Latents) -> Enhancement | None:
-        """The same, with the shift of the input that recruitment curves exclude."""
-        shift_pct_rmt = self.model.prior.shift_pct_rmt(latents)[recruits(latents.noise)]
-        if excluded is None or len(shift_pct_rmt) < LEAST_SAMPLES:
-            return excluded
-        return excluded._replace(shift_pct_rmt=float(torch.quantile(shift_pct_rmt, EXCLUDED_AT)))
+        def profiles() -> SampledProfiles:
+            sample = self._sample(one.picked(self.model.thinned))
+            return SampledProfiles(
+                sample.expected_mep_mv(profile_grid(self.space).to(self.device))[0], sample.baselines_mv()[0]
+            )
+
+        estimate = sampled_estimate(
+            self._sample(latents).runs(grid_ms),
+            profiles,
+            self.space,
+            SampledHypotheses(prior.hypothesis(latents)[0], prior.hypotheses),
+            lambda: _excluded_shift_pct_rmt(prior, latents),
+        )
+        return estimate.noting(unusual=Later(lambda: prior.unusual(latents, self.space)))
+
+
+def _excluded_shift_pct_rmt(prior: Prior, latents: Latents) -> float | None:
+    """The shift of the input that recruitment curves exclude [% RMT]; None where few particles have one."""
+    shift_pct_rmt = prior.shift_pct_rmt(latents)[recruits(latents.noise)]
+    return float(torch.quantile(shift_pct_rmt, EXCLUDED_AT)) if len(shift_pct_rmt) >= LEAST_SAMPLES else None
 
 
 def _require_device(name: str) -> None:
@@ -181,9 +190,3 @@ def _require_device(name: str) -> None:
             expected="such as cpu, cuda or mps",
             remedy="Leave the device out to use the cpu.",
         ) from error
-
-
-def _each(person: Person, function: Callable[[Tensor], Tensor]) -> Person:
-    """The same of every field of a person."""
-    shape, response = map(function, person.shape), map(function, person.response)
-    return Person(Shape(*shape), Response(*response), function(person.present))

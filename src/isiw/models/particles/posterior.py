@@ -5,14 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Generic, Protocol, Self, TypeVar
+from typing import Generic, Protocol, Self, TypeVar
 
 import torch
 
 from isiw.design import DesignSpace
 from isiw.models.particles.engine import Engine
 from isiw.models.particles.moves import L
-from isiw.models.particles.prior import Person
 from isiw.models.particles.swarm import Swarm
 from isiw.models.protocol import DTYPE, Observation, Tensor
 from isiw.models.shared.history import observed
@@ -20,17 +19,9 @@ from isiw.models.shared.history import observed
 __all__ = ["SwarmPosterior"]
 
 
-class _Prior(Protocol):
-    """What is asked of a prior over people."""
-
-    def person(self, latents: Any) -> Person: ...
-
-
 class _Model(Protocol):
     """What is asked of a model's settings."""
 
-    @property
-    def prior(self) -> _Prior: ...
     @property
     def detection_limit_mv(self) -> float: ...
     @property
@@ -66,11 +57,6 @@ class SwarmPosterior(ABC, Generic[M, L]):
     seed: int
     swarm: Swarm[L]
     engine: Engine[L]
-
-    @cached_property
-    def person(self) -> Person:
-        """What the particles mean."""
-        return self.model.prior.person(self.swarm.latents)
 
     @cached_property
     @abstractmethod

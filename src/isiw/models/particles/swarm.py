@@ -138,6 +138,12 @@ class Swarm(Generic[L]):
         health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))
         return replace(fresh, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
 
+    def of_person(self, person: int) -> Swarm[L]:
+        """The particles of one person."""
+        one = slice(person, person + 1)
+        latents = self.latents.remade(field[one] for field in self.latents)
+        return replace(self, latents=latents, log_weights=self.log_weights[one])
+
     def picked(self, size: int) -> L:
         """Equally weighted particles that represent the same posterior, fields of shape (b, s).
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import exp, exp2, kernel, log, loop, ndtr, total
+from isiw.compiled import exp, exp2, kernel, log, loop, ndtr, per, per_root, total
 from isiw.models.particles.kernels.records import (
     BOOST,
     DEPTH,
@@ -66,8 +66,8 @@ from isiw.models.shared.tables import ISI_NODES
 
 __all__ = ["ROOM", "curve_of", "facilitations", "history_likelihood", "is_curved", "likelihoods"]
 
-ROOM: Final = 13
-"""Rows of numbers that the likelihood of a history needs in between; the last two are of the nodes."""
+ROOM: Final = 14
+"""Rows of numbers that the likelihood of a history needs in between; the last three are of the nodes."""
 
 _f = np.float32
 _NIL, _HALF, _ONE, _TWO = _f(0.0), _f(0.5), _f(1.0), _f(2.0)
@@ -151,13 +151,14 @@ def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
 
 
 @loop
-def curve_of(particle: Any, spread: Any, between: Any) -> None:
+def curve_of(particle: Any, spread: Any, between: Any, room: Any) -> None:
     """Write the noise on a particle's input at each node, and the variance of what lies between; see `noise._curve`.
 
     Args:
         particle: its record.
         spread: where the nodes are written, in logits, shape (q,).
         between: where the variance is written, shape (q,).
+        room: for as many numbers.
     """
     width = particle[SPREAD]
     if is_curved(particle):
@@ -165,15 +166,16 @@ def curve_of(particle: Any, spread: Any, between: Any) -> None:
             spread[q] = width * NODES_AT[q]
             between[q] = (_BETWEEN * width) * (_BETWEEN * width)
         return
-    mean = _NIL
-    for q in range(NODES):
+    nodes = len(spread)  # not a constant to the compiler, which would unroll these loops instead of making vectors
+    for q in range(nodes):
         root = _ONE - width * width / _f(9.0) + NODES_AT[q] * width / _f(3.0)
         slope = _BETWEEN * width / max(root, _STEEPEST)
         spread[q] = _f(3.0) * log(max(root, _f(0.02)))
         between[q] = slope * slope
-        mean += NODE_WEIGHTS[q] * exp(spread[q] + _HALF * between[q])
-    shift = log(mean) + _FAR
-    for q in range(NODES):
+    for q in range(nodes):
+        room[q] = NODE_WEIGHTS[q] * exp(spread[q] + _HALF * between[q])
+    shift = log(total(room, nodes)) + _FAR
+    for q in range(nodes):
         spread[q] -= shift
 
 
@@ -256,7 +258,7 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
         if start > _NIL:
             rescaled = _HALF / (_ONE - start)
             for i in range(count):
-                sigmoid = _ONE / (_ONE + exp(-(drive[i] + at)))
+                sigmoid = per(_ONE + exp(-(drive[i] + at)))
                 steep = sigmoid * (_ONE - sigmoid)
                 variance = steep * steep * between
                 over = sigmoid - start
@@ -264,17 +266,17 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
                 share = (math.sqrt(reach) + over) * rescaled * scale[i]
                 total = _ONE + share + known[i]
                 varied = share * share * (variance / reach + output) + floor_variance + varies[i]
-                inverse_sd = total / math.sqrt(varied)
+                inverse_sd = total * per_root(varied)
                 z = min(max((log(total) - relative[i]) * inverse_sd, -_END), _END)
                 evoked[i] += weight * inverse_sd * exp2(_BELL * z * z)
         else:
             for i in range(count):
-                sigmoid = _ONE / (_ONE + exp(-(drive[i] + at)))
+                sigmoid = per(_ONE + exp(-(drive[i] + at)))
                 flat = _ONE - sigmoid
                 share = sigmoid * scale[i]
                 total = _ONE + share + known[i]
                 varied = share * share * (flat * flat * between + output) + floor_variance + varies[i]
-                inverse_sd = total / math.sqrt(varied)
+                inverse_sd = total * per_root(varied)
                 z = min(max((log(total) - relative[i]) * inverse_sd, -_END), _END)
                 evoked[i] += weight * inverse_sd * exp2(_BELL * z * z)
     for i in range(count):
@@ -311,7 +313,7 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
     for q in range(NODES):
         at, between, weight = curve[0, q], curve[1, q], NODE_WEIGHTS[q]
         for i in range(count):
-            sigmoid = _ONE / (_ONE + exp(-(drive[i] + at)))
+            sigmoid = per(_ONE + exp(-(drive[i] + at)))
             flat = _ONE - sigmoid
             variance = sigmoid * flat * (sigmoid * flat) * between
             over = sigmoid - start
@@ -319,7 +321,7 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
             share = scale[i] * ((math.sqrt(reach) + over) * rescaled if rectified else sigmoid)
             varied = share * share * ((variance / reach if rectified else flat * flat * between) + output)
             total = _ONE + share + known[i]
-            inverse_sd, mean = total / math.sqrt(varied + floor_variance + varies[i]), log(total)
+            inverse_sd, mean = total * per_root(varied + floor_variance + varies[i]), log(total)
             evoked[i] += weight * _between((low[i] - mean) * inverse_sd, (high[i] - mean) * inverse_sd)
     for i in range(count):
         still, mean = (_ONE + known[i]) / math.sqrt(floor_variance + varies[i]), log(_ONE + known[i])
@@ -365,8 +367,8 @@ def history_likelihood(particle: Any, known: Any, sizes: Any, censored: Any, mor
         more_sizes: how many are in each piece.
         room: for what is in between, shape (ROOM, PIECE).
     """
-    curve = room[ROOM - 2 :]
-    curve_of(particle, curve[0], curve[1])
+    curve, nodes = room[ROOM - 3 :], NODES
+    curve_of(particle, curve[0, :nodes], curve[1, :nodes], curve[2])
     summed = 0.0
     for piece in range(len(sizes)):
         summed += _total(particle, known[piece], sizes[piece], False, curve, room)  # noqa: FBT003

@@ -16,7 +16,7 @@ from isiw.models.particles.kernels.records import PARTICLE, PIECE, trial_records
 from isiw.models.particles.kernels.target import KINDS, fresh_values, log_block, meant
 from isiw.models.particles.moves import BLUR, JUMP_PROBABILITY
 
-__all__ = ["OWN_DRAWS", "move", "records"]
+__all__ = ["OWN_DRAWS", "log_places", "records", "sweep"]
 
 OWN_DRAWS: Final = 7 + KINDS
 """Uniform draws of a move besides those that fresh latents take: acceptance, jump or not, which, and so on."""
@@ -80,6 +80,16 @@ def _log_ratio(tables: Any, moves: Any, old: Any, new: Any, parts: Any) -> float
     return ratio
 
 
+@loop
+def _log_place(tables: Any, z: Any, parts: Any) -> float:
+    """Log density of the blocks that hold start and width."""
+    summed, block = 0.0, 0
+    while tables.first[block] < 2 and block < len(tables.first):
+        summed += log_block(z, block, tables, parts)
+        block += 1
+    return summed
+
+
 @inlined
 def _overlap(tables: Any, z: Any) -> bool:
     """Whether enhancement and depression overlap where they may not."""
@@ -91,53 +101,61 @@ def _overlap(tables: Any, z: Any) -> bool:
     return not (end <= low_start or low_end <= start)
 
 
+@inlined
+def _proposed(tables: Any, theirs: Any, kinds: Any, u: Any, n: Any, chosen: Any, scratch: Any) -> Any:
+    """Write what a particle may move to, and return the log ratio of prior densities and whether it stays as it is."""
+    old, new, fresh, parts = scratch[0], scratch[1], scratch[2], scratch[4]
+    state = 0
+    for kind in range(KINDS):
+        chosen[kind] = kinds[kind]
+        state += tables.states[kind] * kinds[kind]
+    if u[1] < JUMP_PROBABILITY:
+        jump = _jump(tables, u, n, new, chosen, fresh)
+        ratio, same = 0.0, tables.of_profile[jump] and not (kinds[2] or chosen[2])
+    else:
+        moves = tables.shifted[state, _which(u[2], tables.parts)]
+        ratio, same = 0.0, True
+        for latent in range(len(moves)):
+            same &= not moves[latent]
+        if not same:
+            _shift(tables, theirs, u, n, moves, new)
+            ratio = _log_ratio(tables, moves, old, new, parts)
+    return -math.inf if _overlap(tables, new) else ratio, same
+
+
 @loop
-def _move_person(
-    tables: Any, state: Any, theirs: Any, draws: Any, trials: Any, room: Any, scratch: Any, counts: Any
+def _move_half(
+    tables: Any, state: Any, mine: Any, theirs: Any, draws: Any, trials: Any, rooms: Any, counts: Any
 ) -> None:
-    """Move every particle of one person once, in place.
+    """Move half of the particles of one person once, in place.
 
     Args:
         tables: of the prior and the moves.
-        state: values, kinds and log likelihoods of the particles that move, and room for the kinds of one.
-        theirs: latents of those whose differences they move by, shape (o, d).
+        state: values, kinds and log likelihoods of all particles, and room for the kinds of one.
+        mine: the first of those that move, and the one behind the last.
+        theirs: latents of the others, by whose differences they move, shape (o, d).
         draws: uniform and standard normal ones.
         trials: as `history_likelihood` has them.
-        room: for the likelihood, shape (ROOM, PIECE).
-        scratch: for latents, a record and parts of a density, shape (5, 64).
+        rooms: for the likelihood, shape (ROOM, PIECE); for latents, a record and parts of a density, shape (5, 64).
         counts: shifts, accepted ones, jumps, accepted ones; shape (4,).
     """
     values, kinds, log_likelihood, chosen = state
-    uniform, normal = draws
+    (uniform, normal), (room, scratch) = draws, rooms
     known, sizes, censored, more_sizes = trials
-    old, new, fresh, particle, parts = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
-    for i in range(values.shape[0]):
-        u, n = uniform[i], normal[i]
+    old, new, particle = scratch[0], scratch[1], scratch[3]
+    for i in range(mine[0], mine[1]):
         for latent in range(values.shape[1]):
             old[latent] = new[latent] = values[i, latent]
-        number = 0
-        for kind in range(KINDS):
-            chosen[kind] = kinds[i, kind]
-            number += tables.states[kind] * kinds[i, kind]
-        jumps = u[1] < JUMP_PROBABILITY
-        ratio, same = 0.0, False
-        if jumps:
-            jump = _jump(tables, u, n, new, chosen, fresh)
-            same = tables.of_profile[jump] and not (kinds[i, 2] or chosen[2])
-        else:
-            moves = tables.shifted[number, _which(u[2], tables.parts)]
-            _shift(tables, theirs, u, n, moves, new)
-            ratio = _log_ratio(tables, moves, old, new, parts)
-        if _overlap(tables, new):
-            ratio = -math.inf
+        ratio, same = _proposed(tables, theirs, kinds[i], uniform[i], normal[i], chosen, scratch)
         before = log_likelihood[i]
         after = before
         if ratio > -math.inf and not same:
             meant(new, chosen, tables.at, particle)
             after = np.float32(history_likelihood(particle, known, sizes, censored, more_sizes, room))
-        counts[2 if jumps else 0] += 1
-        if math.log(max(u[0], _LEAST)) < after - before + ratio:
-            counts[3 if jumps else 1] += 1
+        sort = 2 if uniform[i, 1] < JUMP_PROBABILITY else 0
+        counts[sort] += 1
+        if math.log(max(uniform[i, 0], _LEAST)) < after - before + ratio:
+            counts[sort + 1] += 1
             log_likelihood[i] = after
             for latent in range(values.shape[1]):
                 values[i, latent] = new[latent]
@@ -146,32 +164,33 @@ def _move_person(
 
 
 @kernel
-def move(
-    tables: Any, history: Any, values: Any, kinds: Any, log_likelihood: Any, theirs: Any, uniform: Any, normal: Any
-) -> Any:
-    """Move every particle once, in place.
+def sweep(tables: Any, history: Any, values: Any, kinds: Any, log_likelihood: Any, uniform: Any, normal: Any) -> Any:
+    """Move every particle once, in place, one half by differences within the other.
 
     Args:
         tables: of the prior and the moves.
         history: shape (b, n, columns).
-        values: latents of the particles that move, shape (b, p, d).
+        values: latents of the particles, shape (b, p, d).
         kinds: their kinds, shape (b, p, k).
         log_likelihood: of the history under each, shape (b, p).
-        theirs: latents of those whose differences they move by, shape (b, o, d).
         uniform: uniform draws, shape (b, p, u).
         normal: standard normal draws, shape (b, p, d).
 
     Returns:
         How many shifts there were, how many were accepted, and the same of jumps, shape (b, 4).
     """
-    people = values.shape[0]
+    people, size = values.shape[:2]
     counts, chosen = np.zeros((people, 4), dtype=np.float32), np.zeros(KINDS, dtype=np.int64)
     room, scratch = np.empty((ROOM, PIECE), dtype=np.float32), np.zeros((5, 64), dtype=np.float32)
+    half = size // 2
     for person in range(people):
         trials = (*trial_records(history[person], False), *trial_records(history[person], True))  # noqa: FBT003
         state = values[person], kinds[person], log_likelihood[person], chosen
         draws = uniform[person], normal[person]
-        _move_person(tables, state, theirs[person], draws, trials, room, scratch, counts[person])
+        for first, behind in ((0, half), (half, size)):
+            theirs = values[person, half:] if first == 0 else values[person, :half]
+            mine = first, behind
+            _move_half(tables, state, mine, theirs, draws, trials, (room, scratch), counts[person])
     return counts
 
 
@@ -190,4 +209,20 @@ def records(tables: Any, values: Any, kinds: Any) -> Any:
         for i in range(size):
             z[:latents] = values[person, i]
             meant(z, kinds[person, i], tables.at, found[person, i])
+    return found
+
+
+@kernel
+def log_places(tables: Any, values: Any) -> Any:
+    """Log prior density of start and width but for a constant, shape (b, p).
+
+    Args:
+        tables: of the prior.
+        values: the particles' latents, shape (b, p, d).
+    """
+    people, size = values.shape[:2]
+    found, parts = np.empty((people, size), dtype=np.float32), np.empty(64, dtype=np.float32)
+    for person in range(people):
+        for i in range(size):
+            found[person, i] = _log_place(tables, values[person, i], parts)
     return found

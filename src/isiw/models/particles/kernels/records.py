@@ -11,14 +11,15 @@ from typing import Any, Final
 import numpy as np
 import torch
 
-from isiw.compiled import LANES, exp, kernel
-from isiw.models.particles.noise import PERSISTENCE, STARTUP
-from isiw.models.particles.prior import Person
+from isiw.compiled import LANES, exp, kernel, loop
+from isiw.models.particles.noise import PERSISTENCE, STARTUP, Response
+from isiw.models.particles.prior import Depression, Person
+from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.types import FloatArray
 
-__all__ = ["columns_of", "people_of", "trial_records"]
+__all__ = ["columns_of", "gain_of", "people_of", "person_of", "trial_records"]
 
 # Of a particle.
 NOISE, SHAPE, PRESENT, START, WIDTH, FORM, LOG_FLOOR, FLOOR_SD, LOG_RATIO, SPREAD, OUTPUT_SD = range(11)
@@ -32,9 +33,24 @@ STARTLE, RELAXED, REAL = 4, 10, 11
 TRIAL: Final = 12
 PIECE: Final = 128
 
-_FIRST, _SECOND = map(np.float32, STARTUP)
+_f = np.float32
+_FIRST, _SECOND = _f(STARTUP[0]), _f(STARTUP[1])
 _LOG_PERSISTENCE: Final = np.float32(np.log(PERSISTENCE))
 _ONE, _NIL = np.float32(1.0), np.float32(0.0)
+
+
+def person_of(records: FloatArray) -> Person:
+    """What particles mean, as views of their records (b, p, PARTICLE).
+
+    Args:
+        records: the particles; a depression is there where they have one.
+    """
+    column = torch.from_numpy(records).unbind(-1)
+    shape = Shape(column[SHAPE], column[START], column[WIDTH], column[FORM])
+    response = Response(column[NOISE], *column[LOG_FLOOR : SLOPE + 1])
+    low = Shape(torch.zeros_like(column[SHAPE]), column[LOW_START], column[LOW_WIDTH], torch.zeros_like(column[SHAPE]))
+    depression = Depression(low, column[DEPTH], column[DEPTH] > 0) if (records[..., DEPTH] > 0).any() else None
+    return Person(shape, response, column[PRESENT] > 0, depression)
 
 
 def people_of(person: Person) -> FloatArray:
@@ -66,6 +82,13 @@ def _plain(values: Tensor) -> FloatArray:
     return array
 
 
+@loop
+def gain_of(order: Any) -> Any:
+    """How a trial after so many others startles, and how far amplitudes have wandered by then; see `noise.log_gain`."""
+    startle = _FIRST if order == 0 else (_SECOND if order == 1 else _NIL)
+    return startle, _ONE - exp(_LOG_PERSISTENCE * _f(order))
+
+
 @kernel
 def trial_records(columns: Any, censored: bool) -> Any:  # noqa: FBT001 - kernels know no keywords
     """The trials of one person whose amplitude is known, or those that are censored.
@@ -95,9 +118,7 @@ def trial_records(columns: Any, censored: bool) -> Any:  # noqa: FBT001 - kernel
             record[field, i] = columns[n, field]
         if np.isnan(columns[n, ISI]):
             record[ISI, i] = record[FACTOR, i] = _NIL
-        order = columns[n, ORDER]
-        record[STARTLE, i] = _FIRST if order == 0 else (_SECOND if order == 1 else _NIL)
-        record[RELAXED, i] = _ONE - exp(_LOG_PERSISTENCE * order)
+        record[STARTLE, i], record[RELAXED, i] = gain_of(columns[n, ORDER])
         record[REAL, i] = _ONE
         number += 1
     return records, counts

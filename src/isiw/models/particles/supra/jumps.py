@@ -108,6 +108,10 @@ class SupraTarget:
         """Log prior density of their latents but for a constant, -inf where the segments overlap, shape (b, p)."""
         return self.prior.log_density(latents.values, self.space)
 
+    def log_place(self, latents: SupraLatents) -> Tensor:
+        """Log prior density of the latents, as places have none of their own here, shape (b, p)."""
+        return self.log_prior(latents)
+
     def shifted(self, latents: SupraLatents, part: Tensor) -> Tensor:
         """Which latents a difference moves, shape (b, p, d)."""
         enhanced, depressed = (_latents(*BLOCKS[name], device=part.device) for name in ("enhanced", "depressed"))

@@ -22,7 +22,7 @@ from isiw.models.particles.supra.prior import SupraLatents, SupraPrior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import DTYPE, Observation, Tensor
 from isiw.models.randomness import step_generator
-from isiw.models.windows import SampledProfiles, best_window, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, best_window, profile_grid, sampled_estimate
 from isiw.window import WindowEstimate
 
 __all__ = ["SupraModel", "SupraPosterior"]
@@ -100,7 +100,8 @@ class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
         return self._sample(self.model.particles, 0)
 
     def _sample(self, size: int, order: int) -> SupraSample:
-        return SupraSample(self.model.prior.person(self.swarm.picked(size)), self.space, order)
+        person, records = self.engine.meaning(self.swarm.picked(size))
+        return SupraSample(person, self.space, order, records)
 
     def depressed_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled depressed segments; see `SamplesDepression`."""
@@ -109,11 +110,15 @@ class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person, and the segment in which the tap depresses the MEP."""
         grid = torch.tensor(self.space.grid_ms, dtype=DTYPE)
-        profiles_mv, baselines_mv = self.sample.expected_mep_mv(profile_grid(self.space)), self.baselines_mv()
-        profiles = SampledProfiles(profiles_mv[person], baselines_mv[person])
-        estimate = sampled_estimate(self._all.window_masks(grid)[person], profiles, self.space)
-        depressed = self._all.depressed_masks(grid)[person]
-        somewhere = depressed.any(-1)
-        probability = float(somewhere.double().mean())
-        segment = best_window(depressed[somewhere], self.space.grid_ms)[0] if probability >= 0.5 else None
-        return replace(estimate, depressed=segment, depressed_probability=probability)
+
+        def profiles() -> SampledProfiles:
+            mep_mv = self.sample.expected_mep_mv(profile_grid(self.space))
+            return SampledProfiles(mep_mv[person], self.baselines_mv()[person])
+
+        enhanced, depressed = (
+            Runs.of_masks(masks(grid)[person]) for masks in (self._all.window_masks, self._all.depressed_masks)
+        )
+        estimate = sampled_estimate(enhanced, profiles, self.space)
+        probability = len(depressed.found) / depressed.samples
+        segment = best_window(depressed, self.space.grid_ms)[0] if probability >= 0.5 else None
+        return estimate.noting(depressed=segment, depressed_probability=probability)
