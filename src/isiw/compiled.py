@@ -108,7 +108,7 @@ def _compiled(function: F, fastmath: set[str], **more: bool) -> F:
     function.__qualname__ = f"{function.__name__}_{_sources()}"  # which the file on disk is named after
 
     # Errors are numpy's: a check of each divisor is no vector instruction.
-    options = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, **more}
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, **more}
     try:
         compiled: F = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # there is no folder to keep it in
@@ -150,7 +150,7 @@ if AVAILABLE:
 
             return (made(given), built) if value == given else None
 
-        return intrinsic(typed)  # type: ignore[no-any-return] # numba has no types
+        return intrinsic(typed)
 
     _float_of = _reinterpreted(types.int32, types.float32, ir.FloatType())
     _bits_of = _reinterpreted(types.float32, types.int32, ir.IntType(32))

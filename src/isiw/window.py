@@ -256,7 +256,8 @@ class _WorkedOut(Generic[T]):
         return known
 
     def __set__(self, instance: object, value: T | Later[T]) -> None:
-        instance.__dict__[self.name] = self.default if value is self else value  # itself, if a field has it for default
+        unset = isinstance(value, _WorkedOut)  # a field has it for its default
+        instance.__dict__[self.name] = self.default if unset else value
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,12 @@ from isiw.models.particles.kernels.records import columns_of, people_of
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.places import Place
+from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Depression, Person, Prior
 from isiw.models.particles.profile import ProfilePrior
 from isiw.models.particles.shapes import Shape
 from isiw.models.particles.supra.jumps import SupraTarget
+from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import Circumstances, History
@@ -125,6 +128,48 @@ def test_moves_of_both_engines_are_accepted_as_often_and_lead_to_the_same_poster
     apart = (ours.latents.values.mean(1) - theirs.latents.values.mean(1)).abs() / spread
     assert apart.max() < 5.0 / math.sqrt(200)
     assert ours.log_likelihood.mean().item() == pytest.approx(theirs.log_likelihood.mean().item(), abs=0.5)
+
+
+@pytest.mark.parametrize("space", [VALVE_SPACE, DesignSpace(0, 300, 5)], ids=["fine", "coarse"])
+def test_a_sample_predicts_what_it_predicts_in_torch(space: DesignSpace) -> None:
+    target = WindowTarget(Prior(), space)
+    latents = target.prior.sample(2, 300, generator(6), space)
+    engine = engine_for("compiled", target)
+    person, records = engine.meaning(latents)
+    ours, theirs = PersonSample(person, space, 1, records), PersonSample(target.person(latents), space, 1)
+    grid_ms, few_ms = torch.tensor(space.grid_ms, dtype=torch.float32), torch.tensor([0.0, 180.0, 233.0, 260.0, 300.0])
+    torch.testing.assert_close(ours.window_masks(grid_ms), theirs.window_masks(grid_ms))
+    torch.testing.assert_close(ours.outcome_mass(few_ms), theirs.outcome_mass(few_ms), atol=2e-5, rtol=0.0)
+    torch.testing.assert_close(ours.expected_mep_mv(few_ms), theirs.expected_mep_mv(few_ms), atol=1e-6, rtol=1e-4)
+    torch.testing.assert_close(ours.baselines_mv(), theirs.baselines_mv(), atol=1e-6, rtol=1e-4)
+    runs = [sample.runs(grid_ms, 1) for sample in (ours, theirs)]
+    np.testing.assert_array_equal(runs[0].membership, runs[1].membership)
+    np.testing.assert_array_equal(runs[0].hulls, runs[1].hulls)
+
+
+def test_a_sample_with_a_depression_predicts_what_it_predicts_in_torch() -> None:
+    target = TARGETS["supra"]
+    latents = SupraPrior().sample(1, 300, generator(6), target.space)
+    person, records = engine_for("compiled", target).meaning(latents)
+    ours, theirs = (SupraSample(p, target.space, 3, r) for p, r in ((person, records), (target.person(latents), None)))
+    isi_ms = torch.arange(0.0, 201.0, 4.0)
+    torch.testing.assert_close(ours.outcome_mass(isi_ms), theirs.outcome_mass(isi_ms), atol=0.02, rtol=0.0)
+    torch.testing.assert_close(ours.expected_mep_mv(isi_ms), theirs.expected_mep_mv(isi_ms), atol=1e-4, rtol=0.02)
+    for masks in ("window_masks", "depressed_masks"):  # tables of other rows put a few edges one ISI further
+        apart = (getattr(ours, masks)(isi_ms) != getattr(theirs, masks)(isi_ms)).float().mean()
+        assert apart < 0.002, masks
+
+
+@pytest.mark.parametrize("profile", [ProfilePrior(), PLACES])
+def test_both_engines_hold_the_usual_for_as_probable_where_isis_are_chosen(profile: ProfilePrior) -> None:
+    model = ParticleModel(Prior(profile))
+    latents = model.prior.sample(1, 500, generator(8), VALVE_SPACE)
+    targets = [WindowTarget(prior, VALVE_SPACE) for prior in (model.prior_where_asking, model.prior)]
+    ours, theirs = (
+        one(targets[0]).log_places(latents) - one(targets[1]).log_places(latents)
+        for one in (partial(engine_for, "compiled"), TorchEngine)
+    )
+    torch.testing.assert_close(ours, theirs, atol=1e-3, rtol=1e-3)
 
 
 def test_people_of_a_batch_have_the_likelihood_that_each_has_alone() -> None:

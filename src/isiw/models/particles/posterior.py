@@ -12,6 +12,7 @@ import torch
 from isiw.design import DesignSpace
 from isiw.models.particles.engine import Engine
 from isiw.models.particles.moves import L
+from isiw.models.particles.prior import Person
 from isiw.models.particles.swarm import Swarm
 from isiw.models.protocol import DTYPE, Observation, Tensor
 from isiw.models.shared.history import observed
@@ -57,6 +58,11 @@ class SwarmPosterior(ABC, Generic[M, L]):
     seed: int
     swarm: Swarm[L]
     engine: Engine[L]
+
+    @property
+    def person(self) -> Person:
+        """What the particles mean."""
+        return self.engine.meaning(self.swarm.latents)[0]
 
     @cached_property
     @abstractmethod
