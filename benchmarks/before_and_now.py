@@ -181,6 +181,8 @@ def _spent_s(seed: int, trials: int) -> np.ndarray:
 def lap(seed: int) -> None:
     """Print the processor time of 50 sessions with the isiw that is imported [s]."""
     torch.set_num_threads(1)
+    (first,) = study_of("recruitment", 2, seed, (4,), batch=2).units()
+    run_unit(first)  # loads everything
     (unit,) = study_of("recruitment", 50, seed, (10, 20, 30), batch=50).units()
     began_s = time.process_time()
     run_unit(unit)

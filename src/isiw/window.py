@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Final, Generic, NamedTuple, TypeAlias, TypeVar
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
 from isiw.checks import check_probabilities, number
 from isiw.errors import InvalidValueError
 from isiw.findings import lacking
+from isiw.later import WorkedOut
 from isiw.text.summary import summary
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -25,7 +26,6 @@ __all__ = [
     "BestISI",
     "Enhancement",
     "Interval",
-    "Later",
     "ProfileBand",
     "Window",
     "WindowEstimate",
@@ -226,40 +226,6 @@ class Enhancement(NamedTuple):
     shift_pct_rmt: float | None = None
 
 
-T = TypeVar("T")
-
-
-@dataclass(frozen=True, eq=False)
-class Later(Generic[T]):
-    """A value that is worked out when it is first looked at.
-
-    Args:
-        work: gives the value.
-    """
-
-    work: Callable[[], T]
-
-
-class _WorkedOut(Generic[T]):
-    """A field that may be given as `Later`."""
-
-    def __init__(self, name: str, default: T) -> None:
-        self.name, self.default = name, default
-
-    def __get__(self, instance: object, owner: type) -> T:
-        if instance is None:  # a dataclass asks for the default
-            return self.default
-        value = instance.__dict__[self.name]
-        if isinstance(value, Later):
-            value = instance.__dict__[self.name] = value.work()
-        known: T = value
-        return known
-
-    def __set__(self, instance: object, value: T | Later[T]) -> None:
-        unset = isinstance(value, _WorkedOut)  # a field has it for its default
-        instance.__dict__[self.name] = self.default if unset else value
-
-
 @dataclass(frozen=True, eq=False)
 class WindowEstimate:
     """What is believed about one person's window. What a non-Bayesian method does not have is None.
@@ -302,17 +268,17 @@ class WindowEstimate:
     end_ms: float | None = None
     grid_ms: FloatArray | None = field(default=None, repr=False)
     edge_samples_ms: FloatArray | None = field(default=None, repr=False)
-    profile_quantiles_mv: _WorkedOut[FloatArray | None] = field(
-        default=_WorkedOut("profile_quantiles_mv", None), repr=False
+    profile_quantiles_mv: WorkedOut[FloatArray | None] = field(
+        default=WorkedOut("profile_quantiles_mv", None), repr=False
     )
     spread_ms: float | None = None
     split_probability: float | None = None
     hypothesis_samples: IntArray | None = field(default=None, repr=False)
     hypothesis_names: tuple[str, ...] = field(default=(), repr=False)
     expected_f1: float | None = None
-    best_isi: _WorkedOut[BestISI | None] = _WorkedOut("best_isi", None)
-    largest_excluded: _WorkedOut[Enhancement | None] = _WorkedOut("largest_excluded", None)
-    unusual: _WorkedOut[Mapping[str, float]] = field(default=_WorkedOut("unusual", _NOTHING), repr=False)
+    best_isi: WorkedOut[BestISI | None] = field(default=WorkedOut("best_isi", None))
+    largest_excluded: WorkedOut[Enhancement | None] = field(default=WorkedOut("largest_excluded", None))
+    unusual: WorkedOut[Mapping[str, float]] = field(default=WorkedOut("unusual", _NOTHING), repr=False)
     pairs: int | None = None
     silent: bool = False
     depressed: Window | None = None

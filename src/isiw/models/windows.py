@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from isiw.design import DesignSpace
+from isiw.later import Later
 from isiw.models.protocol import DTYPE, Tensor
 from isiw.types import FloatArray, IntArray
 from isiw.window import (
@@ -19,7 +20,6 @@ from isiw.window import (
     MIN_EXCESS_OF_BASELINE,
     BestISI,
     Enhancement,
-    Later,
     Window,
     WindowEstimate,
 )
@@ -97,7 +97,8 @@ class Runs:
         """
         both = pairs.reshape(len(pairs), -1, 2)
         sample, which = np.nonzero(both[..., 0] < both[..., 1])
-        return cls(sample, *both[sample, which].T, len(pairs), points)
+        first, behind = both[sample, which].T
+        return cls(sample, first, behind, len(pairs), points)
 
     @cached_property
     def _leads(self) -> IntArray:

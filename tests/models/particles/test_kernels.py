@@ -36,7 +36,7 @@ PLACES = ProfilePrior(
 TARGETS: dict[str, TabledTarget[Any]] = {
     "default": WindowTarget(Prior(), VALVE_SPACE),
     "places": WindowTarget(Prior(PLACES), VALVE_SPACE),
-    "supra": SupraTarget(SupraPrior(), DesignSpace(0, 200)),
+    "supra": SupraTarget(SupraPrior(), DesignSpace(0, 200, reference="impact")),
 }
 
 
@@ -130,7 +130,7 @@ def test_moves_of_both_engines_are_accepted_as_often_and_lead_to_the_same_poster
     assert ours.log_likelihood.mean().item() == pytest.approx(theirs.log_likelihood.mean().item(), abs=0.5)
 
 
-@pytest.mark.parametrize("space", [VALVE_SPACE, DesignSpace(0, 300, 5)], ids=["fine", "coarse"])
+@pytest.mark.parametrize("space", [VALVE_SPACE, DesignSpace(0, 300, 5, reference="valve")], ids=["fine", "coarse"])
 def test_a_sample_predicts_what_it_predicts_in_torch(space: DesignSpace) -> None:
     target = WindowTarget(Prior(), space)
     latents = target.prior.sample(2, 300, generator(6), space)

@@ -11,6 +11,7 @@ import torch
 from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.later import Later
 from isiw.models.particles.engine import Engine, EngineName, engine_for
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
@@ -24,7 +25,7 @@ from isiw.models.protocol import DTYPE, Observation, PriorPerson
 from isiw.models.randomness import SIMULATED, step_generator
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import ArrayLike, FloatArray
-from isiw.window import Later, Window, WindowEstimate
+from isiw.window import Window, WindowEstimate
 
 __all__ = ["ParticleModel", "ParticlePosterior"]
 

@@ -8,7 +8,7 @@ from functools import cached_property
 import torch
 
 from isiw.design import DesignSpace
-from isiw.models.particles.kernels import predictions as compiled
+from isiw.models.particles.kernels import windows as compiled
 from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import facilitation, highest_facilitation, reaches
 from isiw.models.particles.tables import FacilitationTables, cell_ends, log_ends

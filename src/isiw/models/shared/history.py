@@ -84,7 +84,7 @@ class History:
         columns = (torch.cat(pair, dim=-1) for pair in zip(self.columns, trial.columns, strict=True))
         if self.circumstances is None and trial.circumstances is None:
             return History(*columns)
-        return History(*columns, torch.cat((self.around, trial.around), dim=1))
+        return History(*columns, circumstances=torch.cat((self.around, trial.around), dim=1))
 
     @property
     def around(self) -> Tensor:
