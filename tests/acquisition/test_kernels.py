@@ -14,10 +14,10 @@ class Believed:
     def __init__(self, dtype: torch.dtype) -> None:
         draws = torch.Generator().manual_seed(1)
         mass = torch.rand((2, 60, 11, 7), generator=draws) ** 6
-        self.mass = (mass / mass.sum(-1, keepdim=True)).to(dtype)
+        self.mass: Tensor = (mass / mass.sum(-1, keepdim=True)).to(dtype)
         first, width = torch.randint(-3, 9, (2, 2, 60, 2, 1), generator=draws)
         isi = torch.arange(11)
-        self.masks = ((isi >= first) & (isi < first + width)).any(-2).to(dtype)
+        self.masks: Tensor = ((isi >= first) & (isi < first + width)).any(-2).to(dtype)
 
     def estimate(self, person: int = 0) -> None: ...
 

@@ -2,7 +2,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ import torch
 from isiw import compiled
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.models.particles import ParticleModel
-from isiw.models.particles.engine import Compiled, TabledTarget, TorchEngine, engine_for
+from isiw.models.particles.engine import Compiled, EngineName, TorchEngine, engine_for
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.kernels.likelihood import likelihoods
 from isiw.models.particles.kernels.records import columns_of, people_of
@@ -33,7 +33,7 @@ from isiw.models.shared.scales import Scale
 PLACES = ProfilePrior(
     places=(Place(0.5, Scale(230.0, 12.0), Scale(80.0, 0.3)), Place(0.2, Scale(90.0, 9.0), Scale(60.0, 0.2)))
 )
-TARGETS: dict[str, TabledTarget[Any]] = {
+TARGETS: dict[str, Any] = {
     "default": WindowTarget(Prior(), VALVE_SPACE),
     "places": WindowTarget(Prior(PLACES), VALVE_SPACE),
     "supra": SupraTarget(SupraPrior(), DesignSpace(0, 200, reference="impact")),
@@ -68,10 +68,10 @@ def in_double(person: Person) -> Person:
     return Person(Shape(*double(person.shape)), Response(*double(person.response)), person.present, depression)
 
 
-def furthest(target: TabledTarget[Any], people: int, particles: int, seed: int, isi_sd_ms: float) -> float:
+def furthest(target: Any, people: int, particles: int, seed: int, isi_sd_ms: float) -> float:
     """By how much the log likelihoods of both engines differ, at most, torch computing in double precision."""
     draws = generator(seed)
-    latents = target.prior.sample(people, particles, draws, target.space)  # type: ignore[attr-defined] # ours have both
+    latents = target.prior.sample(people, particles, draws, target.space)
     person = target.person(latents)
     told = history(person, int(torch.randint(1, 60, (1,), generator=draws)), draws, isi_sd_ms=isi_sd_ms)
     got = engine_for("compiled", target).log_likelihood(latents, told)
@@ -103,7 +103,7 @@ def test_long_histories_are_summed_piece_by_piece() -> None:
 @pytest.mark.parametrize("name", TARGETS)
 def test_particles_mean_the_same_to_both_engines(name: str) -> None:
     target = TARGETS[name]
-    latents = target.prior.sample(2, 200, generator(2), target.space)  # type: ignore[attr-defined] # ours have both
+    latents = target.prior.sample(2, 200, generator(2), target.space)
     again = target.latents(latents.values, target.kinds(latents))
     assert all(torch.equal(a, b) for a, b in zip(latents, again, strict=True))
 
@@ -114,7 +114,7 @@ def test_moves_of_both_engines_are_accepted_as_often_and_lead_to_the_same_poster
     # differ by less than five standard errors of 200 independent particles.
     target, found = TARGETS[name], {}
     for engine in (engine_for("compiled", target), TorchEngine(target)):
-        latents = target.prior.sample(1, 4000, generator(3), target.space)  # type: ignore[attr-defined] # ours have both
+        latents = target.prior.sample(1, 4000, generator(3), target.space)
         isi_ms = torch.linspace(20.0, 180.0, 12).unsqueeze(0)
         log_mep = torch.where((isi_ms > 60.0) & (isi_ms < 120.0), math.log(0.2), math.log(0.02))
         order = torch.arange(12.0).unsqueeze(0)
@@ -195,8 +195,8 @@ def test_without_kernels_torch_computes(monkeypatch: pytest.MonkeyPatch) -> None
 def test_both_engines_of_one_seed_come_to_the_same_belief_in_different_ways() -> None:
     trials = [(100.0, 0.01), (230.0, 0.2), (260.0, 0.25), (400.0, 0.012), (330.0, 0.01), (210.0, 0.15)]
     probabilities = []
-    for engine in ("compiled", "torch"):
-        model = ParticleModel(engine=engine)  # type: ignore[arg-type] # one of both
+    for engine in get_args(EngineName):
+        model = ParticleModel(engine=engine)
         posterior = model.begin(VALVE_SPACE, 1)
         for isi_ms, mep_mv in trials:
             posterior = model.update(posterior, Observation.of([isi_ms], [mep_mv]))
@@ -274,8 +274,8 @@ def test_a_known_part_is_added_to_floor_and_response(sd_mv: float) -> None:
     # One particle of a recruitment curve, by its distribution function over 200,000 simulated trials.
     rng = np.random.default_rng(3)
     person, _ = of_kind(NoiseKind.RECRUITMENT)
-    person = Person(*([f[:1, :1] for f in fields] for fields in person[:2]), person.present[:1, :1])  # type: ignore[arg-type]
-    person = Person(Shape(*person.shape), Response(*person.response), torch.ones_like(person.present))
+    shape, response = (Shape(*(f[:1, :1] for f in person.shape)), Response(*(f[:1, :1] for f in person.response)))
+    person = Person(shape, response, torch.ones(1, 1, dtype=torch.bool))
     fields = {"log_floor": math.log(0.01), "floor_log_sd": 0.2, "log_ratio": math.log(16.0), "spread": 1.0}
     fields |= {"output_log_sd": 0.3, "rest": -1.0, "boost": 0.0, "drift": 0.0, "startup": 0.0}
     person = response_with(person, **{k: lambda r, v=v: torch.full_like(r.rest, v) for k, v in fields.items()})

@@ -81,10 +81,10 @@ class History:
 
     def appended(self, trial: History) -> History:
         """This history and one more trial."""
-        columns = (torch.cat(pair, dim=-1) for pair in zip(self.columns, trial.columns, strict=True))
+        both = History(*(torch.cat(pair, dim=-1) for pair in zip(self.columns, trial.columns, strict=True)))
         if self.circumstances is None and trial.circumstances is None:
-            return History(*columns)
-        return History(*columns, circumstances=torch.cat((self.around, trial.around), dim=1))
+            return both
+        return replace(both, circumstances=torch.cat((self.around, trial.around), dim=1))
 
     @property
     def around(self) -> Tensor:

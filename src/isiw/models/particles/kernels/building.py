@@ -15,7 +15,6 @@ from isiw.models.particles.mixture import Mixture
 from isiw.models.particles.moves import PART_PROBABILITY
 from isiw.models.protocol import Tensor
 from isiw.models.shared.start import StartPrior
-from isiw.types import FloatArray
 
 __all__ = ["prior_tables"]
 
@@ -66,34 +65,29 @@ def prior_tables(
     knots = [values.numpy() for values in start.knots(space)]
     where = np.full(MEANINGS, latents)
     where[: len(at)] = [latents if index < 0 else index for index in at]
-    jumps, kinds = moves.pop("jumps"), moves.pop("kinds")
-    return Tables(
-        where,
-        spreads.numpy().copy(),
-        *(np.array(values, dtype=np.int64) for values in (first, size, components)),
-        log_shares,
-        below,
-        means,
-        sds,
-        *knots,
-        *_of_places(places),
-        parts=_edges(PART_PROBABILITY, len(PART_PROBABILITY)),
-        jumps=_edges(jumps, len(jumps)),
-        kinds=np.stack([_edges(shares, max(map(len, kinds))) for shares in kinds]),
-        **{name: value.numpy() if isinstance(value, torch.Tensor) else value for name, value in moves.items()},
-    )
+    most_kinds = max(map(len, moves["kinds"]))
+    law: dict[str, Any] = {"at": where, "spreads": spreads.numpy().copy(), "log_shares": log_shares, "below": below}
+    law |= {"first": np.array(first), "size": np.array(size), "components": np.array(components)}
+    law |= dict(zip(("start_ms", "density", "quantiles"), knots, strict=True)) | _of_places(places)
+    made = {name: value.numpy() if isinstance(value, torch.Tensor) else value for name, value in moves.items()}
+    made |= {"parts": _edges(PART_PROBABILITY, len(PART_PROBABILITY))}
+    made |= {"jumps": _edges(moves["jumps"], len(moves["jumps"]))}
+    made |= {"kinds": np.stack([_edges(shares, most_kinds) for shares in moves["kinds"]])}
+    return Tables(**law, means=means, sds=sds, **made)
 
 
-def _of_places(places: tuple[float, Mixture] | None) -> tuple[FloatArray, float, FloatArray]:
+def _of_places(places: tuple[float, Mixture] | None) -> dict[str, Any]:
     if places is None:
-        return np.zeros((0, 5), dtype=np.float32), 0.0, np.zeros(0, dtype=np.float32)
+        nothing = np.zeros((0, 5), dtype=np.float32)
+        return {"places": nothing, "place_share": 0.0, "place_below": np.zeros(0, dtype=np.float32)}
     share, law = places
     scale = math.log(share) + law.shares.log() - law.sds.log().sum(-1) - math.log(2.0 * math.pi)
     columns = [scale, law.means[:, 0], law.sds[:, 0], law.means[:, 1], law.sds[:, 1]]
-    return torch.stack(columns, dim=-1).contiguous().numpy(), share, law.shares.cumsum(-1).numpy()
+    table = torch.stack(columns, dim=-1).contiguous().numpy()
+    return {"places": table, "place_share": share, "place_below": law.shares.cumsum(-1).numpy()}
 
 
-def _edges(shares: Sequence[float], values: int) -> FloatArray:
+def _edges(shares: Sequence[float], values: int) -> Any:
     """Sums of the probabilities of earlier alternatives, from the second on, for so many of them."""
     edges = np.full(values - 1, _NOT_REACHED, dtype=np.float32)
     edges[: len(shares) - 1] = np.cumsum(shares)[:-1]
