@@ -67,13 +67,16 @@ def prior_tables(
     where[: len(at)] = [latents if index < 0 else index for index in at]
     most_kinds = max(map(len, moves["kinds"]))
     law: dict[str, Any] = {"at": where, "spreads": spreads.numpy().copy(), "log_shares": log_shares, "below": below}
+    law |= {"means": means, "sds": sds}
     law |= {"first": np.array(first), "size": np.array(size), "components": np.array(components)}
     law |= dict(zip(("start_ms", "density", "quantiles"), knots, strict=True)) | _of_places(places)
-    made = {name: value.numpy() if isinstance(value, torch.Tensor) else value for name, value in moves.items()}
+    made: dict[str, Any] = {
+        name: value.numpy() if isinstance(value, torch.Tensor) else value for name, value in moves.items()
+    }
     made |= {"parts": _edges(PART_PROBABILITY, len(PART_PROBABILITY))}
     made |= {"jumps": _edges(moves["jumps"], len(moves["jumps"]))}
     made |= {"kinds": np.stack([_edges(shares, most_kinds) for shares in moves["kinds"]])}
-    return Tables(**law, means=means, sds=sds, **made)
+    return Tables(**law, **made)
 
 
 def _of_places(places: tuple[float, Mixture] | None) -> dict[str, Any]:
