@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-import torch
-
 from isiw.acquisition.lookahead import expected_variance_reduction
 from isiw.acquisition.protocol import ForeseesWindows
 from isiw.checks import check_wholes
+from isiw.lazy import torch
 from isiw.models.protocol import CountsPairs, Posterior, PredictsOutcomes, SamplesDepression, SamplesWindows, Tensor
 
 __all__ = [

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import torch
-
 from isiw.design import DesignSpace
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.lazy import torch
+from isiw.models.protocol import Tensor
 from isiw.types import FloatArray
 from isiw.window import (
     EDGE_LEVEL,
@@ -62,7 +61,7 @@ def best_window(masks: Tensor, grid_ms: FloatArray) -> tuple[Window | None, floa
         grid_ms: ISIs of the masks [ms], shape (t,).
     """
     membership = masks.mean(0)
-    cuts = torch.linspace(0.1, 0.9, 17, dtype=DTYPE, device=masks.device) * membership.max()
+    cuts = torch.linspace(0.1, 0.9, 17, dtype=torch.float32, device=masks.device) * membership.max()
     candidates = (membership >= cuts.unsqueeze(-1)).to(masks.dtype)
     overlap = candidates @ masks.T
     sizes = candidates.sum(-1, keepdim=True) + masks.sum(-1)
@@ -77,7 +76,7 @@ def ends(masks: Tensor) -> tuple[Tensor, Tensor]:
         masks: sampled windows as 0 or 1, shape (s, t); none of them empty.
     """
     points = masks.shape[-1]
-    rising = torch.arange(1.0, points + 1.0, dtype=DTYPE, device=masks.device)
+    rising = torch.arange(1.0, points + 1.0, dtype=torch.float32, device=masks.device)
     # A largest product is found much faster than the place of the first 1.
     last, first = ((masks * weights).amax(-1).long() for weights in (rising, rising.flip(0)))
     return points - first, last - 1
@@ -91,7 +90,7 @@ def edge_samples(first: Tensor, last: Tensor, space: DesignSpace) -> Tensor:
         last: grid index of the end, shape (s,).
         space: the design space.
     """
-    grid = torch.tensor(space.grid_ms, dtype=DTYPE, device=first.device)
+    grid = torch.tensor(space.grid_ms, dtype=torch.float32, device=first.device)
     start = torch.where(first == 0, -torch.inf, grid[first])
     end = torch.where(last == len(grid) - 1, torch.inf, grid[last])
     return torch.stack((start, end), dim=-1)
@@ -100,7 +99,7 @@ def edge_samples(first: Tensor, last: Tensor, space: DesignSpace) -> Tensor:
 def profile_grid(space: DesignSpace) -> Tensor:
     """The ISIs at which profiles are reported [ms], shape (t,)."""
     every = max(1, min(len(space.grid_ms) // PROFILE_POINTS, int(PROFILE_STEP_MS / space.step_ms)))
-    return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=DTYPE)
+    return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=torch.float32)
 
 
 class SampledProfiles(NamedTuple):

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import torch
-
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles.likelihood import in_pieces, levels
 from isiw.models.particles.noise import NODES, Response, evoked_mean, log_gain, outcome_density
 from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import facilitation, highest_facilitation, reaches
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
 from isiw.models.windows import least_excess_mv
 
@@ -50,7 +49,7 @@ class PersonSample:
         """Largest facilitation on the space's grid, shape (b, s); on a fine one that of its whole range."""
         if self.space.step_ms <= FINE_MS:
             return highest_facilitation(self.person.shape, self.space.low_ms, self.space.high_ms)
-        grid_ms = torch.tensor(self.space.grid_ms, dtype=DTYPE, device=self.person.present.device)
+        grid_ms = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=self.person.present.device)
         return facilitation(self.person.shape, grid_ms).amax(-1)
 
     @cached_property
@@ -67,7 +66,7 @@ class PersonSample:
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows as 0 or 1, shape (b, s, t)."""
-        return reaches(self.person.shape, self.edge_level, isi_ms).to(DTYPE)
+        return reaches(self.person.shape, self.edge_level, isi_ms).to(torch.float32)
 
     def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
         """Expected MEP [mV], shape (b, s, t)."""
@@ -143,4 +142,4 @@ def _cell_ends(device: torch.device) -> Tensor:
 
     Shape (y + 1,).
     """
-    return torch.linspace(0.0, 1.0, OUTCOMES + 1, dtype=DTYPE, device=device).pow(1.5)
+    return torch.linspace(0.0, 1.0, OUTCOMES + 1, dtype=torch.float32, device=device).pow(1.5)

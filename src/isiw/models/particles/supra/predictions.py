@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import torch
-
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles.likelihood import levels
 from isiw.models.particles.noise import evoked_mean
 from isiw.models.particles.predictions import outcome_table
 from isiw.models.particles.prior import Person
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, interpolated
 from isiw.models.windows import least_excess_mv
 from isiw.window import LEAST_DEPRESSED_MV
@@ -46,7 +45,7 @@ class SupraSample:
     @cached_property
     def _levels(self) -> Tensor:
         """Facilitation from the deepest depression to the largest enhancement, in equal steps, shape (b, s, l)."""
-        share = torch.linspace(0.0, 1.0, LEVELS, dtype=DTYPE, device=self._depth.device)
+        share = torch.linspace(0.0, 1.0, LEVELS, dtype=torch.float32, device=self._depth.device)
         return share * (1.0 + self._depth.unsqueeze(-1)) - self._depth.unsqueeze(-1)
 
     @cached_property
@@ -84,7 +83,9 @@ class SupraSample:
     def _extremes_mv(self) -> tuple[Tensor, Tensor]:
         """Largest excess over the baseline and largest deficit in the range [mV], each of shape (b, s, 1)."""
         points = min(MOST_RANGE_POINTS, len(self.space.grid_ms))
-        range_ms = torch.linspace(self.space.low_ms, self.space.high_ms, points, dtype=DTYPE, device=self._depth.device)
+        range_ms = torch.linspace(
+            self.space.low_ms, self.space.high_ms, points, dtype=torch.float32, device=self._depth.device
+        )
         excess_mv = self.expected_mep_mv(range_ms) - self._baseline_mv
         return excess_mv.amax(-1, keepdim=True), -excess_mv.amin(-1, keepdim=True)
 
