@@ -30,8 +30,8 @@ says nothing of its certainty. From one half on they are not larger at all."""
 BY_CHANCE, IN_EACH = 0.00135, 0.05
 """A change with time is said below this p-value, three standard errors, and below the other one on each side."""
 
-SURELY_BY_CHANCE = 1.0
-"""Standard errors of Kendall's statistic that no p-value below `IN_EACH` is within, with ties or without."""
+LEAST_STEADY, LEAST_STEADY_IN_EACH = 2.0, 1.0
+"""Standard errors of Kendall's statistic, combined and on each side, within which no such p-values are found."""
 
 CHANGES: Final[Mapping[str, Literal["greater", "less"]]] = MappingProxyType({"grew": "greater", "shrank": "less"})
 
@@ -144,7 +144,7 @@ def changed_with_time(window: Window | None, trials: Sequence[Trial]) -> str | N
     if min(len(set(meps_mv)) for meps_mv in strata) < ENOUGH_ON_EACH_SIDE:
         return None
     for word, alternative in CHANGES.items():
-        if not all(_may_have_changed(meps_mv, alternative) for meps_mv in strata):
+        if not _may_have_changed(strata, 1 if alternative == "greater" else -1):
             continue
         found = [scipy.stats.kendalltau(np.arange(len(s)), s, alternative=alternative).pvalue for s in strata]
         p = float(
@@ -159,15 +159,13 @@ def changed_with_time(window: Window | None, trials: Sequence[Trial]) -> str | N
     return None
 
 
-def _may_have_changed(meps_mv: Sequence[float], alternative: Literal["greater", "less"]) -> bool:
-    """Whether Kendall's test can find a p-value below `IN_EACH`: its statistic alone says where it cannot.
-
-    Most sessions need no test then, nor the second that importing it takes.
-    """
-    n = len(meps_mv)
-    later_is_larger = np.triu(np.sign(np.subtract.outer(meps_mv, meps_mv)).T).sum()
-    change = later_is_larger if alternative == "greater" else -later_is_larger
-    return bool(change > math.sqrt(n * (n - 1) * (2 * n + 5) / 18) * SURELY_BY_CHANCE)
+def _may_have_changed(strata: Sequence[Sequence[float]], sign: int) -> bool:
+    """Whether the tests are worth asking for: importing them takes a second, and few sessions need them."""
+    n = np.array([len(meps_mv) for meps_mv in strata])
+    pairs = [np.triu(np.sign(np.subtract.outer(meps_mv, meps_mv)).T).sum() for meps_mv in strata]
+    steady = sign * np.array(pairs) / np.sqrt(n * (n - 1) * (2 * n + 5) / 18)
+    combined = float(np.sqrt(n) @ steady) / math.sqrt(n.sum())
+    return combined > LEAST_STEADY and float(steady.min()) > LEAST_STEADY_IN_EACH
 
 
 def nothing_stood_out(trials: Sequence[Trial], window_ms: tuple[float, float] | None = None) -> str | None:
