@@ -144,7 +144,7 @@ def start(
     now: Annotated[Path, typer.Argument(help="Folder src of this version.")],
     laps: Annotated[int, typer.Option(help="How often each runs each command; the fastest counts.")] = 3,
 ) -> None:
-    """Print the processor time and the peak memory of commands that learn nothing, of both versions in turn."""
+    """Print the processor time of commands that learn nothing, of both versions in turn."""
     with tempfile.TemporaryDirectory() as folder:
         log = logged_session(isiw.subjects.cohort("recruitment", 1, 10_000)[0], "s", 10_000, 60, Path(folder))
         page, picture, tables = (Path(folder) / name for name in ("page.html", "picture.png", "tables"))
@@ -159,22 +159,22 @@ def start(
         }
         rows = []
         for name, arguments in commands.items():
-            used: dict[Path, list[tuple[float, float]]] = {before: [], now: []}
+            used: dict[Path, list[float]] = {before: [], now: []}
             for _, source in itertools.product(range(laps), used):
                 used[source].append(_command(source, arguments))
                 shutil.rmtree(tables, ignore_errors=True)
-            (before_s, before_mb), (now_s, now_mb) = (tuple(map(min, zip(*used[s], strict=True))) for s in used)
-            rows.append((name, before_s, now_s, now_s / before_s, f"{before_mb:.0f}", f"{now_mb:.0f}"))
-    headings = ["isiw …", "before [s]", "now [s]", "ratio", "before [MB]", "now [MB]"]
+            before_s, now_s = (min(used[source]) for source in used)
+            rows.append((name, before_s, now_s, now_s / before_s))
+    headings = ["isiw …", "before [s]", "now [s]", "ratio"]
     print(f"- command: `{command_of('before_and_now')}`")
     print(f"- {made_with('torch', 'pandas', 'scipy')}; {platform.machine()}, one thread")
-    print(f"- processor time (user and system) and peak memory of each command, the least of {laps}, both in turn; the")
+    print(f"- processor time (user and system) of each command, the least of {laps}, both in turn; the")
     print("  log is of 60 trials of the default, person 10,000 of `recruitment`\n")
     print(pd.DataFrame(rows, columns=headings).to_markdown(index=False, floatfmt=".2f"))
 
 
-def _command(source: Path, arguments: list[str | Path]) -> tuple[float, float]:
-    """Processor time [s] and peak memory [MB] of a command with the isiw in a folder."""
+def _command(source: Path, arguments: list[str | Path]) -> float:
+    """Processor time [s] of a command with the isiw in a folder."""
     environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "isiw", *arguments]
     process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)  # noqa: S603 - our own command
@@ -182,7 +182,7 @@ def _command(source: Path, arguments: list[str | Path]) -> tuple[float, float]:
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
         raise SystemExit(f"isiw {arguments[0]} ended with {process.returncode}")
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    return usage.ru_utime + usage.ru_stime
 
 
 def study_of(
