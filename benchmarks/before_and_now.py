@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import inspect
 import itertools
+import json
 import os
 import platform
 import shutil
@@ -144,7 +145,7 @@ def start(
     now: Annotated[Path, typer.Argument(help="Folder src of this version.")],
     laps: Annotated[int, typer.Option(help="How often each runs each command; the fastest counts.")] = 3,
 ) -> None:
-    """Print the processor time of commands that learn nothing, of both versions in turn."""
+    """Print the processor time and peak memory of commands that learn nothing, of both versions in turn."""
     with tempfile.TemporaryDirectory() as folder:
         log = logged_session(isiw.subjects.cohort("recruitment", 1, 10_000)[0], "s", 10_000, 60, Path(folder))
         page, picture, tables = (Path(folder) / name for name in ("page.html", "picture.png", "tables"))
@@ -159,30 +160,40 @@ def start(
         }
         rows = []
         for name, arguments in commands.items():
-            used: dict[Path, list[float]] = {before: [], now: []}
+            used: dict[Path, list[tuple[float, float]]] = {before: [], now: []}
             for _, source in itertools.product(range(laps), used):
                 used[source].append(_command(source, arguments))
                 shutil.rmtree(tables, ignore_errors=True)
-            before_s, now_s = (min(used[source]) for source in used)
-            rows.append((name, before_s, now_s, now_s / before_s))
-    headings = ["isiw …", "before [s]", "now [s]", "ratio"]
+            (before_s, before_mb), (now_s, now_mb) = (min(used[source]) for source in used)
+            rows.append((name, before_s, now_s, now_s / before_s, before_mb, now_mb))
+    headings = ["isiw …", "before [s]", "now [s]", "ratio", "before [MB]", "now [MB]"]
     print(f"- command: `{command_of('before_and_now')}`")
     print(f"- {made_with('torch', 'pandas', 'scipy')}; {platform.machine()}, one thread")
-    print(f"- processor time (user and system) of each command, the least of {laps}, both in turn; the")
-    print("  log is of 60 trials of the default, person 10,000 of `recruitment`\n")
-    print(pd.DataFrame(rows, columns=headings).to_markdown(index=False, floatfmt=".2f"))
+    print(f"- processor time (user and system) of each command, the least of {laps}, both in turn, and the peak of")
+    print("  its resident memory; the log is of 60 trials of the default, person 10,000 of `recruitment`\n")
+    print(
+        pd.DataFrame(rows, columns=headings).to_markdown(index=False, floatfmt=("", ".2f", ".2f", ".2f", ".0f", ".0f"))
+    )
 
 
-def _command(source: Path, arguments: list[str | Path]) -> float:
-    """Processor time [s] of a command with the isiw in a folder."""
+# A process starts with the peak of the one that started it, so that is a small one.
+MEASURED = """
+import json, os, resource, sys
+quiet = [(os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)]
+child = os.posix_spawn(sys.executable, [sys.executable, "-m", "isiw", *sys.argv[1:]], os.environ, file_actions=quiet)
+_, status, used = os.wait4(child, 0)
+print(json.dumps([used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6]))
+sys.exit(os.waitstatus_to_exitcode(status))
+"""
+
+
+def _command(source: Path, arguments: list[str | Path]) -> tuple[float, float]:
+    """Processor time [s] and peak memory [MB] of a command with the isiw in a folder."""
     environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "isiw", *arguments]
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)  # noqa: S603 - our own command
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise SystemExit(f"isiw {arguments[0]} ended with {process.returncode}")
-    return usage.ru_utime + usage.ru_stime
+    command = [sys.executable, "-c", MEASURED, *arguments]
+    ended = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE)  # noqa: S603 - our own
+    time_s, peak_mb = json.loads(ended.stdout)
+    return time_s, peak_mb
 
 
 def study_of(
