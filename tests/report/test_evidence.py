@@ -75,7 +75,7 @@ def test_the_rank_tests_say_what_scipy_says(decimals: int) -> None:
         inside, outside = rng.standard_normal(rng.integers(4, 30)), rng.standard_normal(rng.integers(8, 30))
         inside, outside = (inside + rng.uniform(-0.5, 1.5)).round(decimals), outside.round(decimals)
         p = scipy.stats.mannwhitneyu(inside, outside, alternative="greater").pvalue
-        assert p_of_larger(inside, outside) == pytest.approx(p, abs=0.015)
+        assert p_of_larger(inside.tolist(), outside.tolist()) == pytest.approx(p, abs=0.015)
         rising = (outside + rng.uniform(-0.1, 0.1) * np.arange(len(outside))).round(decimals)
         p = scipy.stats.kendalltau(np.arange(len(rising)), rising, alternative="greater").pvalue
         assert scipy.stats.norm.sf(growth(rising)) == pytest.approx(p, abs=0.015 if p < 0.05 else 0.06)

@@ -94,7 +94,7 @@ def checked(kind: type[_T], values: Mapping[str, Any], source: str) -> _T:
         ConfigError: an unknown key or a bad value; the message names source, key and value.
     """
     try:
-        return cast("_T", dict(_strict(kind).model_validate({"values": values}))["values"])
+        return cast("_T", dict(_strict(cast("type", kind)).model_validate({"values": values}))["values"])
     except ValidationError as error:
         raise _explained(kind, first_to_tell(error.errors()), source) from error
 
