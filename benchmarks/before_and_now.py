@@ -9,19 +9,25 @@
     python -m benchmarks.before_and_now stops before now --out benchmarks/results/before_and_now_stops
     python -m benchmarks.before_and_now speed ../before/src src > benchmarks/results/before_and_now_speed.md
     python -m benchmarks.before_and_now session ../before/src src > benchmarks/results/session_speed.md
+    python -m benchmarks.before_and_now start ../before/src src > benchmarks/results/before_and_now_start.md
 
 `run` keeps one table a cohort, and goes on where it was interrupted; `compare` pairs the people of both, `stops` where
-the stopping rule of each ends; `speed` and `session` have both run the same sessions in turn. The hit delay is stated
-where a version can be told it. Reported people come from seed 100,000 on; seeds below 1,000 are for work.
+the stopping rule of each ends; `speed` and `session` have both run the same sessions in turn, `start` the same commands
+about a log. The hit delay is stated where a version can be told it. Reported people come from seed 100,000 on; seeds
+below 1,000 are for work.
 """
 
 from __future__ import annotations
 
 import inspect
+import itertools
+import json
 import os
 import platform
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -32,6 +38,7 @@ import torch
 import typer
 
 import isiw
+from benchmarks.earlier import logged_session
 from benchmarks.provenance import command_of, made_with
 from isiw.studies import Processes, Study, StudyStrategy, conduct, run_unit
 
@@ -187,6 +194,63 @@ def lap(seed: int) -> None:
     began_s = time.process_time()
     run_unit(unit)
     print(time.process_time() - began_s)
+
+
+@app.command()
+def start(
+    before: Annotated[Path, typer.Argument(help="Folder src of the other version.")],
+    now: Annotated[Path, typer.Argument(help="Folder src of this version.")],
+    laps: Annotated[int, typer.Option(help="How often each runs each command; the fastest counts.")] = 3,
+) -> None:
+    """Print the processor time and peak memory of commands that learn nothing, of both versions in turn."""
+    with tempfile.TemporaryDirectory() as folder:
+        log = logged_session(isiw.subjects.cohort("recruitment", 1, 10_000)[0], "s", 10_000, 60, Path(folder))
+        page, picture, tables = (Path(folder) / name for name in ("page.html", "picture.png", "tables"))
+        commands = {
+            "--help": ["--help"],
+            "strategies": ["strategies"],
+            "strategies default": ["strategies", "default"],
+            "show": ["show", log],
+            "plot": ["plot", log, "--overwrite", "-o", picture],
+            "report": ["report", log, "--overwrite", "-o", page],
+            "export": ["export", log, tables],
+        }
+        rows = []
+        for name, arguments in commands.items():
+            used: dict[Path, list[tuple[float, float]]] = {before: [], now: []}
+            for _, source in itertools.product(range(laps), used):
+                used[source].append(_command(source, arguments))
+                shutil.rmtree(tables, ignore_errors=True)
+            (before_s, before_mb), (now_s, now_mb) = (min(used[source]) for source in used)
+            rows.append((name, before_s, now_s, now_s / before_s, before_mb, now_mb))
+    headings = ["isiw …", "before [s]", "now [s]", "ratio", "before [MB]", "now [MB]"]
+    print(f"- command: `{command_of('before_and_now')}`")
+    print(f"- {made_with('torch', 'pandas', 'scipy')}; {platform.machine()}, one thread")
+    print(f"- processor time (user and system) of each command, the least of {laps}, both in turn, and the peak of")
+    print("  its resident memory; the log is of 60 trials of the default, person 10,000 of `recruitment`\n")
+    print(
+        pd.DataFrame(rows, columns=headings).to_markdown(index=False, floatfmt=("", ".2f", ".2f", ".2f", ".0f", ".0f"))
+    )
+
+
+# A process starts with the peak of the one that started it, so that is a small one.
+MEASURED = """
+import json, os, resource, sys
+quiet = [(os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)]
+child = os.posix_spawn(sys.executable, [sys.executable, "-m", "isiw", *sys.argv[1:]], os.environ, file_actions=quiet)
+_, status, used = os.wait4(child, 0)
+print(json.dumps([used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6]))
+sys.exit(os.waitstatus_to_exitcode(status))
+"""
+
+
+def _command(source: Path, arguments: list[str | Path]) -> tuple[float, float]:
+    """Processor time [s] and peak memory [MB] of a command with the isiw in a folder."""
+    environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", MEASURED, *arguments]
+    ended = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE)  # noqa: S603 - our own
+    time_s, peak_mb = json.loads(ended.stdout)
+    return time_s, peak_mb
 
 
 def study_of(

@@ -9,15 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-import torch
-
 from isiw.acquisition.kernels import entropy_reductions, variance_reductions
 from isiw.acquisition.lookahead import expected_variance_reduction
 from isiw.acquisition.protocol import ForeseesWindows
 from isiw.checks import check_wholes
 from isiw.compiled import AVAILABLE, first_of
+from isiw.lazy import torch
 from isiw.models.protocol import (
-    DTYPE,
     CountsPairs,
     Posterior,
     PredictsOutcomes,
@@ -63,7 +61,7 @@ def mutual_information(posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
 
 def _is_for_kernels(mass: Tensor) -> bool:
     """Whether compiled loops are there for it: in single precision, on the CPU."""
-    return AVAILABLE and mass.dtype == DTYPE and mass.device.type == "cpu"
+    return AVAILABLE and mass.dtype == torch.float32 and mass.device.type == "cpu"
 
 
 def window_information(posterior: ForeseesWindows, isi_ms: Tensor, cells: int = 5) -> Tensor:
@@ -118,7 +116,7 @@ def window_gain(posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
     mass = posterior.outcome_mass(isi_ms)
     if _is_for_kernels(mass):
         with first_of("scores of windows"):
-            return torch.from_numpy(variance_reductions(mass.numpy(), masks.to(DTYPE).numpy()))
+            return torch.from_numpy(variance_reductions(mass.numpy(), masks.to(torch.float32).numpy()))
     return expected_variance_reduction(mass, masks)
 
 

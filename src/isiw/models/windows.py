@@ -8,11 +8,11 @@ from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
-import torch
 
 from isiw.design import DesignSpace
 from isiw.later import Later
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.lazy import torch
+from isiw.models.protocol import Tensor
 from isiw.types import FloatArray, IntArray
 from isiw.window import (
     EDGE_LEVEL,
@@ -168,7 +168,7 @@ def edge_samples(windows: Runs, space: DesignSpace) -> FloatArray:
 def profile_grid(space: DesignSpace) -> Tensor:
     """The ISIs at which profiles are reported [ms], shape (t,)."""
     every = max(1, min(len(space.grid_ms) // PROFILE_POINTS, int(PROFILE_STEP_MS / space.step_ms)))
-    return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=DTYPE)
+    return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=torch.float32)
 
 
 class SampledProfiles(NamedTuple):

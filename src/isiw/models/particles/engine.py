@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Generic, Literal, Protocol, TypeAlias
 
-import torch
-
 from isiw.compiled import AVAILABLE, first_of
+from isiw.lazy import torch
 from isiw.models.particles.kernels import likelihood as compiled
 from isiw.models.particles.kernels.moves import OWN_DRAWS, log_places, records, sweep
 from isiw.models.particles.kernels.records import columns_of, person_of
@@ -18,7 +17,7 @@ from isiw.models.particles.kernels.target import Tables
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.moves import L, Moved, Mover, Target
 from isiw.models.particles.prior import Person
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.types import FloatArray, IntArray
 
@@ -153,12 +152,12 @@ class Compiled(Generic[L]):
         people, size = log_likelihood.shape
         values, kinds = (array.copy() for array in self._arrays(latents))
         found, trials = log_likelihood.numpy().copy(), columns_of(history)
-        counts = torch.zeros((people, 4), dtype=DTYPE)
+        counts = torch.zeros((people, 4), dtype=torch.float32)
         width = OWN_DRAWS + len(self.tables.first) + 4
         with first_of("moves"):
             for _ in range(number):
-                uniform = torch.rand((people, size, width), generator=generator, dtype=DTYPE)
-                normal = torch.randn(values.shape, generator=generator, dtype=DTYPE)
+                uniform = torch.rand((people, size, width), generator=generator, dtype=torch.float32)
+                normal = torch.randn(values.shape, generator=generator, dtype=torch.float32)
                 draws = uniform.numpy(), normal.numpy()
                 counts += torch.from_numpy(sweep(self.tables, trials, values, kinds, found, *draws))
         shifts, shifted, jumps, jumped = counts.T

@@ -10,9 +10,9 @@ from functools import cache
 from typing import Final
 
 import numpy as np
-import torch
 
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles.kernels.building import prior_tables
 from isiw.models.particles.kernels.target import Tables
 from isiw.models.particles.latents import LATENTS, PROFILE_BLOCKS, RESPONSE_BLOCKS, Latents, latents_of, used_by
@@ -20,7 +20,7 @@ from isiw.models.particles.mixture import drawn
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.places import mixture_of
 from isiw.models.particles.prior import Person, Prior
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 
 __all__ = ["WindowTarget"]
 
@@ -115,7 +115,7 @@ class WindowTarget:
     def jumped(self, latents: Latents, generator: torch.Generator) -> Latents:
         """Particles (n,) with some kinds and latents drawn anew."""
         fresh = self.prior.sample(1, len(latents.present), generator, self.space)
-        uniform = torch.rand(latents.present.shape, generator=generator, dtype=DTYPE, device=generator.device)
+        uniform = torch.rand(latents.present.shape, generator=generator, dtype=torch.float32, device=generator.device)
         jump = drawn(tuple(JUMPS.values()), uniform)
         form, noise, window, _, _ = (jump == number for number in range(len(JUMPS)))
         return Latents(

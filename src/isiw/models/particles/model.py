@@ -6,12 +6,11 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import get_args
 
-import torch
-
 from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.later import Later
+from isiw.lazy import torch
 from isiw.models.particles.engine import Engine, EngineName, engine_for
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
@@ -21,7 +20,7 @@ from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.swarm import Moving, Swarm
-from isiw.models.protocol import DTYPE, Observation, PriorPerson
+from isiw.models.protocol import Observation, PriorPerson
 from isiw.models.randomness import SIMULATED, step_generator
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import ArrayLike, FloatArray
@@ -106,10 +105,10 @@ class ParticleModel:
         """Draw one person from the prior, and an MEP at each ISI; see `SimulatesPeople`."""
         generator = step_generator(self.device, seed, SIMULATED)
         person = self.prior.person(self.prior.sample(1, 1, generator, space))
-        isis_ms = torch.as_tensor(isi_ms, dtype=DTYPE, device=self.device).unsqueeze(0)
-        gain = log_gain(person.response, torch.arange(isis_ms.shape[-1], dtype=DTYPE, device=self.device))
+        isis_ms = torch.as_tensor(isi_ms, dtype=torch.float32, device=self.device).unsqueeze(0)
+        gain = log_gain(person.response, torch.arange(isis_ms.shape[-1], dtype=torch.float32, device=self.device))
         log_mep = draw_log_mep(person.response, levels(person, isis_ms), generator, gain)
-        grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=DTYPE, device=self.device)
+        grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=torch.float32, device=self.device)
         mask = PersonSample(person, space).window_masks(grid_ms)[0, 0]
         window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
         return PriorPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
@@ -149,7 +148,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
     def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
         """Between which amplitudes the next MEP lies; see `PredictsMeps`."""
         isi_ms = profile_grid(self.space).to(self.device)
-        shares = 0.5 + 0.5 * torch.tensor([-level, level], dtype=DTYPE, device=isi_ms.device)
+        shares = 0.5 + 0.5 * torch.tensor([-level, level], dtype=torch.float32, device=isi_ms.device)
         low_mv, high_mv = self.sample.mep_quantiles_mv(isi_ms, shares)[person].T.double().cpu().numpy()
         return low_mv, high_mv
 
@@ -157,7 +156,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
         """The window of one person."""
         one, prior = self.swarm.of_person(person), self.model.prior
         latents = one.picked(self.model.particles)
-        grid_ms = torch.tensor(self.space.grid_ms, dtype=DTYPE, device=self.device)
+        grid_ms = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=self.device)
 
         def profiles() -> SampledProfiles:
             sample = self._sample(one.picked(self.model.thinned))
@@ -182,6 +181,8 @@ def _excluded_shift_pct_rmt(prior: Prior, latents: Latents) -> float | None:
 
 
 def _require_device(name: str) -> None:
+    if name == "cpu":  # is always there; settings are read where torch is not needed, too
+        return
     try:
         torch.Generator(device=name)
     except (RuntimeError, TypeError) as error:

@@ -10,8 +10,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.mixture import drawn
 from isiw.models.particles.prior import Person

@@ -20,8 +20,7 @@ from enum import IntEnum
 from functools import cache
 from typing import NamedTuple
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
 __all__ = [

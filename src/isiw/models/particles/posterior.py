@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic, Protocol, Self, TypeVar
 
-import torch
-
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles.engine import Engine
 from isiw.models.particles.moves import L
 from isiw.models.particles.prior import Person
 from isiw.models.particles.swarm import Swarm
-from isiw.models.protocol import DTYPE, Observation, Tensor
+from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.history import observed
 
 __all__ = ["SwarmPosterior"]
@@ -96,7 +95,7 @@ class SwarmPosterior(ABC, Generic[M, L]):
             observation: the trial.
         """
         known = self.model.detection_limit_mv, self.model.response_threshold_mv
-        trial = observed(observation, *known, order=self.trials).to(self.device, DTYPE)
+        trial = observed(observation, *known, order=self.trials).to(self.device, torch.float32)
         return replace(self, swarm=self.swarm.told(trial, self.engine))
 
     def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> Self:
@@ -105,15 +104,15 @@ class SwarmPosterior(ABC, Generic[M, L]):
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
-        return self.sample.outcome_mass(isi_ms.to(self.device, DTYPE))
+        return self.sample.outcome_mass(isi_ms.to(self.device, torch.float32))
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows; see `SamplesWindows`."""
-        return self.sample.window_masks(isi_ms.to(self.device, DTYPE))
+        return self.sample.window_masks(isi_ms.to(self.device, torch.float32))
 
     def profiles_mv(self, isi_ms: Tensor) -> Tensor:
         """Sampled profiles; see `SamplesProfiles`."""
-        return self.sample.expected_mep_mv(isi_ms.to(self.device, DTYPE))
+        return self.sample.expected_mep_mv(isi_ms.to(self.device, torch.float32))
 
     def baselines_mv(self) -> Tensor:
         """Sampled baselines; see `SamplesProfiles`."""

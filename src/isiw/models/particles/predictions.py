@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import torch
-
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles.kernels import windows as compiled
 from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import facilitation, highest_facilitation, reaches
 from isiw.models.particles.tables import FacilitationTables, cell_ends, log_ends
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated
 from isiw.models.windows import Runs, least_excess_mv
 from isiw.types import FloatArray, IntArray
@@ -50,7 +49,7 @@ class PersonSample:
 
     @cached_property
     def _grid_ms(self) -> Tensor:
-        return torch.tensor(self.space.grid_ms, dtype=DTYPE, device=self.person.present.device)
+        return torch.tensor(self.space.grid_ms, dtype=torch.float32, device=self.person.present.device)
 
     @cached_property
     def _highest(self) -> Tensor:
@@ -78,7 +77,7 @@ class PersonSample:
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows as 0 or 1, shape (b, s, t)."""
         if self.records is None:
-            return reaches(self.person.shape, self.edge_level, isi_ms).to(DTYPE)
+            return reaches(self.person.shape, self.edge_level, isi_ms).to(torch.float32)
         return torch.from_numpy(compiled.masks_of(self._pairs(isi_ms), len(isi_ms)))
 
     def runs(self, isi_ms: Tensor, person: int = 0) -> Runs:

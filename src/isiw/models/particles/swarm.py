@@ -10,9 +10,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Generic
 
-import torch
-
 from isiw.checks import check_probabilities, check_wholes
+from isiw.lazy import torch
 from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
 from isiw.models.particles.engine import Engine
 from isiw.models.particles.moves import L

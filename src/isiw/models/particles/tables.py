@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import torch
-
 from isiw.compiled import first_of
+from isiw.lazy import torch
 from isiw.models.particles.kernels import predictions as compiled
 from isiw.models.particles.likelihood import in_pieces, levels
 from isiw.models.particles.noise import NODES, Response, evoked_mean, log_gain, outcome_density
 from isiw.models.particles.prior import Person
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
 from isiw.types import FloatArray
 
@@ -45,7 +44,7 @@ class FacilitationTables:
         people, device = len(self.person.present), self.person.present.device
         if self._depth is None:
             return table_levels(device).expand(people, 1, -1)
-        return torch.linspace(0.0, 1.0, LEVELS, dtype=DTYPE, device=device) * (1.0 + self._depth) - self._depth
+        return torch.linspace(0.0, 1.0, LEVELS, dtype=torch.float32, device=device) * (1.0 + self._depth) - self._depth
 
     @cached_property
     def evoked(self) -> Tensor:
@@ -116,4 +115,4 @@ def cell_ends(device: torch.device) -> Tensor:
 
     Shape (y + 1,).
     """
-    return torch.linspace(0.0, 1.0, OUTCOMES + 1, dtype=DTYPE, device=device).pow(1.5)
+    return torch.linspace(0.0, 1.0, OUTCOMES + 1, dtype=torch.float32, device=device).pow(1.5)

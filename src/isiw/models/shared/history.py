@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import torch
 
 from isiw.errors import StrategyError
-from isiw.models.protocol import DTYPE, Observation, Tensor
+from isiw.lazy import torch
+from isiw.models.protocol import Observation, Tensor
 from isiw.types import FloatArray
 
 __all__ = ["AmplitudeHistory", "Circumstances", "History", "PersonTrials", "observed"]
@@ -63,7 +63,7 @@ class History:
             people: how many, b.
             device: torch device.
         """
-        return cls(*(torch.empty((people, 0), dtype=DTYPE, device=device) for _ in range(5)))
+        return cls(*(torch.empty((people, 0), dtype=torch.float32, device=device) for _ in range(5)))
 
     @property
     def columns(self) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-import torch
 
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles.kernels.target import MEANINGS, Tables
 from isiw.models.particles.mixture import Mixture
 from isiw.models.particles.moves import PART_PROBABILITY

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-import torch
 
 from isiw.compiled import LANES, exp, kernel, loop
+from isiw.lazy import torch
 from isiw.models.particles.noise import PERSISTENCE, STARTUP, Response
 from isiw.models.particles.prior import Depression, Person
 from isiw.models.particles.shapes import Shape

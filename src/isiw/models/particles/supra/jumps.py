@@ -7,9 +7,9 @@ from functools import cache
 from typing import Final
 
 import numpy as np
-import torch
 
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles.kernels.building import prior_tables
 from isiw.models.particles.kernels.target import Tables
 from isiw.models.particles.latents import LATENTS as DEFAULT_LATENTS
@@ -18,7 +18,7 @@ from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import ShapeKind
 from isiw.models.particles.supra.prior import BLOCKS, LATENTS, SupraLatents, SupraPrior
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 
 __all__ = ["SupraTarget"]
 
@@ -121,7 +121,7 @@ class SupraTarget:
     def jumped(self, latents: SupraLatents, generator: torch.Generator) -> SupraLatents:
         """Particles (n,) with some latents, and whether their segment is there, drawn anew."""
         fresh = self.prior.draw(1, len(latents.enhanced), generator, self.space)
-        uniform = torch.rand(latents.enhanced.shape, generator=generator, dtype=DTYPE, device=generator.device)
+        uniform = torch.rand(latents.enhanced.shape, generator=generator, dtype=torch.float32, device=generator.device)
         jump = drawn(tuple(JUMPS.values()), uniform)
         enhanced, depressed, *_ = (jump == number for number in range(len(JUMPS)))
         return SupraLatents(

@@ -10,17 +10,16 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import get_args
 
-import torch
-
 from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles.engine import EngineName, engine_for
 from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraLatents, SupraPrior
 from isiw.models.particles.swarm import Moving, Swarm
-from isiw.models.protocol import DTYPE, Observation, Tensor
+from isiw.models.protocol import Observation, Tensor
 from isiw.models.randomness import step_generator
 from isiw.models.windows import Runs, SampledProfiles, best_window, profile_grid, sampled_estimate
 from isiw.window import WindowEstimate
@@ -109,7 +108,7 @@ class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person, and the segment in which the tap depresses the MEP."""
-        grid = torch.tensor(self.space.grid_ms, dtype=DTYPE)
+        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32)
 
         def profiles() -> SampledProfiles:
             mep_mv = self.sample.expected_mep_mv(profile_grid(self.space))

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import torch
-
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles.prior import Person
 from isiw.models.particles.tables import FacilitationTables
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 from isiw.models.windows import least_excess_mv
 from isiw.types import FloatArray
 from isiw.window import LEAST_DEPRESSED_MV
@@ -66,7 +65,7 @@ class SupraSample:
         """Largest excess over the baseline and largest deficit in the range [mV], each of shape (b, s, 1)."""
         points = min(MOST_RANGE_POINTS, len(self.space.grid_ms))
         range_ms = torch.linspace(
-            self.space.low_ms, self.space.high_ms, points, dtype=DTYPE, device=self._baseline_mv.device
+            self.space.low_ms, self.space.high_ms, points, dtype=torch.float32, device=self._baseline_mv.device
         )
         excess_mv = self.expected_mep_mv(range_ms) - self._baseline_mv
         return excess_mv.amax(-1, keepdim=True), -excess_mv.amin(-1, keepdim=True)
