@@ -71,7 +71,12 @@ class TabledTarget(Target[L], Protocol):
         """The kinds of particles, integers of shape (b, p, k)."""
 
     def latents(self, values: Tensor, kinds: Tensor) -> L:
-        """Particles from their latents (b, p, d) and kinds (b, p, k)."""
+        """Particles as the target has them.
+
+        Args:
+            values: their latents, shape (b, p, d).
+            kinds: their kinds, integers of shape (b, p, k).
+        """
 
 
 def engine_for(name: EngineName, target: TabledTarget[L], device: str = "cpu") -> Engine[L]:

@@ -81,7 +81,12 @@ class PersonSample:
         return torch.from_numpy(compiled.masks_of(self._pairs(isi_ms), len(isi_ms)))
 
     def runs(self, isi_ms: Tensor, person: int = 0) -> Runs:
-        """Sampled windows of one person, as runs of some ascending ISIs [ms] (t,)."""
+        """Sampled windows of one person, as runs of some ascending ISIs [ms] (t,).
+
+        Args:
+            isi_ms: ISIs [ms], shape (t,).
+            person: which one.
+        """
         if self.records is None:
             return Runs.of_masks(self.window_masks(isi_ms)[person])
         return Runs.of_pairs(self._pairs(isi_ms)[person], len(isi_ms))
