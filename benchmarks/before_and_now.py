@@ -8,27 +8,37 @@
     python -m benchmarks.before_and_now run --to-stopping 80 --out now
     python -m benchmarks.before_and_now stops before now --out benchmarks/results/before_and_now_stops
     python -m benchmarks.before_and_now speed ../before/src src > benchmarks/results/before_and_now_speed.md
+    python -m benchmarks.before_and_now session ../before/src src > benchmarks/results/session_speed.md
+    python -m benchmarks.before_and_now start ../before/src src > benchmarks/results/before_and_now_start.md
 
 `run` keeps one table a cohort, and goes on where it was interrupted; `compare` pairs the people of both, `stops` where
-the stopping rule of each ends; `speed` has both run the same sessions in turn. The hit delay is stated where a version
-can be told it. Reported people come from seed 100,000 on; seeds below 1,000 are for work.
+the stopping rule of each ends; `speed` and `session` have both run the same sessions in turn, `start` the same commands
+about a log. The hit delay is stated where a version can be told it. Reported people come from seed 100,000 on; seeds
+below 1,000 are for work.
 """
 
 from __future__ import annotations
 
 import inspect
+import itertools
+import json
 import os
 import platform
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import pandas as pd
 import torch
 import typer
 
+import isiw
+from benchmarks.earlier import logged_session
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.studies import Processes, Study, StudyStrategy, conduct, run_unit
@@ -116,20 +126,132 @@ def speed(
 
 def _lap_s(source: Path, seed: int) -> float:
     """Processor time of 50 sessions with the isiw in a folder [s]."""
+    return _of_lap(source, "lap", seed)[0]
+
+
+def _of_lap(source: Path, lap: str, seed: int) -> list[float]:
+    """The numbers that a lap with the isiw in a folder prints."""
     environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "benchmarks.before_and_now", "lap", str(seed)]
+    command = [sys.executable, "-m", "benchmarks.before_and_now", lap, str(seed)]
     ended = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)  # noqa: S603 - this file
-    return float(ended.stdout)
+    return [float(number) for number in ended.stdout.split()]
+
+
+@app.command()
+def session(
+    before: Annotated[Path, typer.Argument(help="Folder src of the other version.")],
+    now: Annotated[Path, typer.Argument(help="Folder src of this version.")],
+    laps: Annotated[int, typer.Option(help="How often each runs a session of 200 trials.")] = 4,
+) -> None:
+    """Print the processor time of one person's session with a decision after each trial, each version in turn."""
+    rows = []
+    for number in range(laps):
+        order = (before, now) if number % 2 == 0 else (now, before)
+        spent = {source: _of_lap(source, "session-lap", number) for source in order}
+        for what, old, new in zip(("60 trials [s]", "99th percentile [ms]"), spent[before], spent[now], strict=True):
+            rows.append({"": what, "seed": number, "before": old, "now": new, "ratio": old / new})
+    print(f"- command: `{command_of('before_and_now')}`")
+    print(f"- {made_with('torch', 'numba')}; {platform.machine()}, one thread")
+    print(
+        "- processor time of a person of `recruitment`, in a process that has run ten trials before: 60 trials with a"
+    )
+    print("  decision after each, and the 99th percentile of ask + tell in 200 trials\n")
+    print(pd.DataFrame(rows).sort_values(["", "seed"]).to_markdown(index=False, floatfmt=".2f"))
+
+
+@app.command(hidden=True)
+def session_lap(seed: int) -> None:
+    """Print what `session` measures with the isiw that is imported: 60 trials [s], and ask + tell [ms]."""
+    torch.set_num_threads(1)
+    _spent_s(seed, 10)
+    spent_s = _spent_s(seed, 200)
+    print(spent_s[:60].sum(), 1e3 * np.percentile(spent_s[:, 0], 99))
+
+
+def _spent_s(seed: int, trials: int) -> np.ndarray:
+    """Processor time of ask and tell, and of the decision, by trial [s], shape (n, 2)."""
+    responder, strategy = isiw.subjects.cohort("recruitment", 1, seed)[0].begin(seed), isiw.make_strategy(seed=seed)
+    spent_s = []
+    for _ in range(trials):
+        began_s = time.process_time()
+        isi_ms = strategy.ask()
+        asked_s = time.process_time()
+        response = responder.respond(isi_ms, "valve")
+        answered_s = time.process_time()
+        strategy.tell(response.isi_ms, response.mep_mv)
+        told_s = time.process_time()
+        strategy.decision()
+        spent_s.append((asked_s - began_s + told_s - answered_s, time.process_time() - told_s))
+    return np.array(spent_s)
 
 
 @app.command(hidden=True)
 def lap(seed: int) -> None:
     """Print the processor time of 50 sessions with the isiw that is imported [s]."""
     torch.set_num_threads(1)
+    (first,) = study_of("recruitment", 2, seed, (4,), batch=2).units()
+    run_unit(first)  # loads everything
     (unit,) = study_of("recruitment", 50, seed, (10, 20, 30), batch=50).units()
     began_s = time.process_time()
     run_unit(unit)
     print(time.process_time() - began_s)
+
+
+@app.command()
+def start(
+    before: Annotated[Path, typer.Argument(help="Folder src of the other version.")],
+    now: Annotated[Path, typer.Argument(help="Folder src of this version.")],
+    laps: Annotated[int, typer.Option(help="How often each runs each command; the fastest counts.")] = 3,
+) -> None:
+    """Print the processor time and peak memory of commands that learn nothing, of both versions in turn."""
+    with tempfile.TemporaryDirectory() as folder:
+        log = logged_session(isiw.subjects.cohort("recruitment", 1, 10_000)[0], "s", 10_000, 60, Path(folder))
+        page, picture, tables = (Path(folder) / name for name in ("page.html", "picture.png", "tables"))
+        commands = {
+            "--help": ["--help"],
+            "strategies": ["strategies"],
+            "strategies default": ["strategies", "default"],
+            "show": ["show", log],
+            "plot": ["plot", log, "--overwrite", "-o", picture],
+            "report": ["report", log, "--overwrite", "-o", page],
+            "export": ["export", log, tables],
+        }
+        rows = []
+        for name, arguments in commands.items():
+            used: dict[Path, list[tuple[float, float]]] = {before: [], now: []}
+            for _, source in itertools.product(range(laps), used):
+                used[source].append(_command(source, arguments))
+                shutil.rmtree(tables, ignore_errors=True)
+            (before_s, before_mb), (now_s, now_mb) = (min(used[source]) for source in used)
+            rows.append((name, before_s, now_s, now_s / before_s, before_mb, now_mb))
+    headings = ["isiw …", "before [s]", "now [s]", "ratio", "before [MB]", "now [MB]"]
+    print(f"- command: `{command_of('before_and_now')}`")
+    print(f"- {made_with('torch', 'pandas', 'scipy')}; {platform.machine()}, one thread")
+    print(f"- processor time (user and system) of each command, the least of {laps}, both in turn, and the peak of")
+    print("  its resident memory; the log is of 60 trials of the default, person 10,000 of `recruitment`\n")
+    print(
+        pd.DataFrame(rows, columns=headings).to_markdown(index=False, floatfmt=("", ".2f", ".2f", ".2f", ".0f", ".0f"))
+    )
+
+
+# A process starts with the peak of the one that started it, so that is a small one.
+MEASURED = """
+import json, os, resource, sys
+quiet = [(os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)]
+child = os.posix_spawn(sys.executable, [sys.executable, "-m", "isiw", *sys.argv[1:]], os.environ, file_actions=quiet)
+_, status, used = os.wait4(child, 0)
+print(json.dumps([used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6]))
+sys.exit(os.waitstatus_to_exitcode(status))
+"""
+
+
+def _command(source: Path, arguments: list[str | Path]) -> tuple[float, float]:
+    """Processor time [s] and peak memory [MB] of a command with the isiw in a folder."""
+    environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", MEASURED, *arguments]
+    ended = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE)  # noqa: S603 - our own
+    time_s, peak_mb = json.loads(ended.stdout)
+    return time_s, peak_mb
 
 
 def study_of(
@@ -152,7 +274,7 @@ def study_of(
 
 
 def paired(before: Path, now: Path) -> pd.DataFrame:
-    """F1 of both, their mean difference on the people of both, and the shares told "no window", by trial.
+    """F1 of both, their mean difference on the people of both, shares told "no window", and coverage, by trial.
 
     Args:
         before: rows of the other version.
@@ -162,12 +284,18 @@ def paired(before: Path, now: Path) -> pd.DataFrame:
     new, old = pd.read_parquet(now), pd.read_parquet(before)
     both = new.merge(old, on=keys, suffixes=("_now", "_before"))
     both["difference"] = both["f1_now"] - both["f1_before"]
+    edges = ("start_covered", "end_covered")
+    for edge in edges:  # NaN for people without a window
+        both[edge] = both[f"{edge}_now"] - both[f"{edge}_before"]
     for which in ("now", "before"):
         both[f"none_{which}"] = ~both[f"reported_window_{which}"].astype(bool)
     groups = both.groupby(["cohort", "trial"])
     table = groups[["f1_before", "f1_now", "difference", "none_before", "none_now"]].mean()
     table.insert(0, "people", groups.size())
     table.insert(4, "difference_se", groups["difference"].sem())
+    for edge in edges:
+        table[f"{edge}_now"], table[f"{edge}_more"] = groups[f"{edge}_now"].mean(), groups[edge].mean()
+        table[f"{edge}_more_se"] = groups[edge].sem()
     return table.reset_index()
 
 

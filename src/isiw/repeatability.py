@@ -16,8 +16,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
-from scipy.stats import norm
 
 from isiw.checks import number, whole
 from isiw.devices.robot.mechanism import Geometry, draw_taps
@@ -26,6 +24,7 @@ from isiw.devices.robot.vane.actuator import Vane
 from isiw.devices.robot.vane.strokes import RATE_HZ, draw_strokes, record_strokes
 from isiw.devices.robot.waveforms import record_emg, record_robot, sample_times_ms
 from isiw.errors import InvalidValueError
+from isiw.lazy import pd, scipy
 from isiw.log.reader import SessionRecord
 from isiw.signals.events import TapEvents, detect_events, sweep_events
 from isiw.signals.impact import VALVE_MS
@@ -190,7 +189,7 @@ def error_probabilities(commanded_ms: FloatArray, realised_ms: FloatArray, sd_ms
     trials = pd.DataFrame({"isi_ms": commanded_ms, "error_ms": realised_ms - commanded_ms})[realised_ms >= 0].dropna()
     size_ms = (trials["error_ms"] - trials.groupby("isi_ms")["error_ms"].transform("mean")).abs().to_numpy()
     counted = ((size_ms[:, None] >= low) & (size_ms[:, None] < high)).sum(axis=0) / max(len(size_ms), 1)
-    gaussian = 2 * (norm.sf(low, scale=sd_ms) - norm.sf(high, scale=sd_ms))
+    gaussian = 2 * (scipy.stats.norm.sf(low, scale=sd_ms) - scipy.stats.norm.sf(high, scale=sd_ms))
     return pd.DataFrame({"from_ms": low, "to_ms": high, "gaussian": gaussian, "counted": counted})
 
 

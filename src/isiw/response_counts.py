@@ -14,11 +14,11 @@ from types import MappingProxyType
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
-import pandas as pd
 
 from isiw.checks import choice, number, whole
 from isiw.errors import InvalidValueError
 from isiw.findings import AMPLITUDE_MV
+from isiw.lazy import pd
 from isiw.signals.values import require_amplitude
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse

@@ -10,11 +10,11 @@ from enum import StrEnum
 from typing import ClassVar, Final
 
 import numpy as np
-import pandas as pd
 
 from isiw.checks import check_amplitude, check_numbers, check_texts, check_wholes, choice, number, text
 from isiw.errors import InvalidValueError
 from isiw.findings import MISTRIALS, Kind
+from isiw.lazy import pd
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.types import FloatArray
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import NamedTuple, TypeAlias
+from dataclasses import dataclass, field, fields
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
 from isiw.checks import check_probabilities, number
 from isiw.errors import InvalidValueError
 from isiw.findings import lacking
+from isiw.later import WorkedOut
 from isiw.text.summary import summary
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -48,6 +49,8 @@ SURE = 0.95
 """Probability from which on it is said outright that there is a window, or none; below it "probably", or undecided."""
 
 Interval: TypeAlias = tuple[float, float]
+
+_NOTHING: Final[Mapping[str, float]] = {}
 
 
 def rules_out(probability: float | None) -> bool:
@@ -227,6 +230,9 @@ class Enhancement(NamedTuple):
 class WindowEstimate:
     """What is believed about one person's window. What a non-Bayesian method does not have is None.
 
+    A stopping rule needs the probability, the edges and the F1 only; bands, the best ISI, what is excluded and what is
+    unusual may be given as `Later`.
+
     Args:
         probability: probability that there is a window.
         window: the reported decision; None where the probability is below one half.
@@ -262,19 +268,30 @@ class WindowEstimate:
     end_ms: float | None = None
     grid_ms: FloatArray | None = field(default=None, repr=False)
     edge_samples_ms: FloatArray | None = field(default=None, repr=False)
-    profile_quantiles_mv: FloatArray | None = field(default=None, repr=False)
+    profile_quantiles_mv: WorkedOut[FloatArray | None] = field(
+        default=WorkedOut("profile_quantiles_mv", None), repr=False
+    )
     spread_ms: float | None = None
     split_probability: float | None = None
     hypothesis_samples: IntArray | None = field(default=None, repr=False)
     hypothesis_names: tuple[str, ...] = field(default=(), repr=False)
     expected_f1: float | None = None
-    best_isi: BestISI | None = None
-    largest_excluded: Enhancement | None = None
-    unusual: Mapping[str, float] = field(default_factory=dict, repr=False)
+    best_isi: WorkedOut[BestISI | None] = field(default=WorkedOut("best_isi", None))
+    largest_excluded: WorkedOut[Enhancement | None] = field(default=WorkedOut("largest_excluded", None))
+    unusual: WorkedOut[Mapping[str, float]] = field(default=WorkedOut("unusual", _NOTHING), repr=False)
     pairs: int | None = None
     silent: bool = False
     depressed: Window | None = None
     depressed_probability: float | None = None
+
+    def noting(self, **facts: Any) -> WindowEstimate:
+        """The same with other `pairs`, `silent` or `unusual`; what is still to be worked out remains so."""
+        noted = object.__new__(type(self))
+        noted.__dict__.update(self.__dict__ | facts)
+        return noted
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     def __post_init__(self) -> None:
         self._check_hypotheses()
@@ -374,8 +391,8 @@ class WindowEstimate:
         whole = self.interval(level)
         if whole is None or self.hypothesis_samples is None or self.edge_samples_ms is None:
             return whole
-        kinds, counts = np.unique(self.hypothesis_samples, return_counts=True)
-        probable = kinds[counts >= min_share * len(self.hypothesis_samples)]
+        counts = np.bincount(self.hypothesis_samples)
+        probable = np.flatnonzero(counts >= max(1.0, min_share * len(self.hypothesis_samples)))
         given = [_central(self.edge_samples_ms[self.hypothesis_samples == kind], level) for kind in probable]
         lows, highs = np.stack([np.transpose(whole), *given], axis=1)
         (start_low, end_low), (start_high, end_high) = lows.min(0).tolist(), highs.max(0).tolist()
@@ -409,5 +426,7 @@ class WindowEstimate:
 def _central(edges_ms: FloatArray, level: float) -> FloatArray:
     """Lower and upper quantile of start and end, shape (2, 2)."""
     tail = (1.0 - level) / 2.0
-    # An order statistic never averages a finite edge with an infinite one.
-    return np.quantile(edges_ms, [tail, 1.0 - tail], axis=0, method="nearest")
+    # An order statistic never averages a finite edge with an infinite one; of two as near, that of an even index.
+    picks = np.rint((len(edges_ms) - 1) * np.array([tail, 1.0 - tail])).astype(int)
+    central_ms: FloatArray = np.sort(edges_ms, axis=0)[picks]
+    return central_ms

@@ -30,7 +30,7 @@ def test_resuming_a_log_runs_no_function_that_it_names(isiw: Command, tmp_path: 
     result = isiw("resume", "evil.mcap")
     assert result.exit_code == 1
     assert "the session's device is not known here" in result.output
-    assert "isiw resume" in result.output
+    assert "Continue it where it was run" in result.output
     assert "Traceback" not in result.output
     assert not (tmp_path / "RUN").exists()
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import isiw
+from isiw.compiled import version
 from isiw.errors import OtherVersionsWarning
 from isiw.findings import Kind
 from isiw.plots import save_session_plot
@@ -123,6 +124,17 @@ def test_shares_of_a_kind_that_the_log_does_not_name_are_none() -> None:
     noise = strategy_of(header.model_copy(update={"strategy": recipe})).recipe.settings["prior"]["noise"]
     assert noise == dict.fromkeys(noise, 0.0) | prior["noise"]
     assert "all_or_none" in noise
+
+
+def test_a_log_that_names_no_engine_goes_on_with_the_one_there_was(copy: Callable[[str], Path]) -> None:
+    log = copy("e31d040-killed.mcap.part")
+    assert strategy_of(isiw.read_session(log).header).recipe.settings["engine"] == "torch"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OtherVersionsWarning)
+        isiw.resume(log, isiw.SimulatedDevice(person("killed"))).run()
+    header = isiw.read_session(log).header
+    assert strategy_of(header).recipe.settings["engine"] == "torch"
+    assert header.versions["engine"] == version()
 
 
 def test_settings_that_this_version_does_not_know_are_as_by_default_and_named() -> None:

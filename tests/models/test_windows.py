@@ -1,20 +1,23 @@
+import pickle
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import torch
 
 from isiw.design import DesignSpace
-from isiw.models.windows import SampledProfiles, best_window, edge_samples, ends, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, best_window, edge_samples, profile_grid, sampled_estimate
 from known import known
 
 SPACE = DesignSpace(0, 9, reference="impact")
 
 
-def masks(*rows: str) -> torch.Tensor:
-    return torch.tensor([[float(c) for c in row] for row in rows])
+def masks(*rows: str) -> Runs:
+    return Runs.of_masks(torch.tensor([[float(c) for c in row] for row in rows]))
 
 
-def flat(samples: int) -> SampledProfiles:
-    return SampledProfiles(torch.ones(samples, 10), torch.ones(samples))
+def flat(samples: int) -> Callable[[], SampledProfiles]:
+    return lambda: SampledProfiles(torch.ones(samples, 10), torch.ones(samples))
 
 
 def test_certain_membership_is_reported_as_it_is() -> None:
@@ -27,7 +30,7 @@ def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets() -> 
     rng = np.random.default_rng(0)
     starts, ends = rng.integers(0, 5, 200), rng.integers(5, 10, 200)
     samples = np.array([[float(a <= t <= b) for t in range(10)] for a, b in zip(starts, ends, strict=True)])
-    window, told = best_window(torch.tensor(samples, dtype=torch.float32), SPACE.grid_ms)
+    window, told = best_window(Runs.of_masks(torch.tensor(samples)), SPACE.grid_ms)
     reported = known(window).mask(SPACE.grid_ms)
 
     def expected_f1(mask: np.ndarray) -> float:
@@ -40,7 +43,7 @@ def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets() -> 
 
 
 def test_an_edge_at_the_border_of_the_range_lies_beyond_it() -> None:
-    edges = edge_samples(*ends(masks("1110000000", "0000011111", "0011100000")), SPACE)
+    edges = edge_samples(masks("1110000000", "0000000000", "0000011111", "0011100000"), SPACE)
     assert edges.tolist() == [[-np.inf, 2.0], [5.0, np.inf], [2.0, 4.0]]
 
 
@@ -48,6 +51,31 @@ def test_more_than_one_segment_has_a_probability_given_a_window() -> None:
     sampled = masks("0111001100", "1100110000", "0011110000", "0000000011", "0000000000")
     assert sampled_estimate(sampled, flat(5), SPACE).split_probability == 0.5
     assert sampled_estimate(masks("0000000000"), flat(1), SPACE).split_probability is None
+
+
+def test_runs_of_pairs_are_those_of_masks() -> None:
+    pairs = np.array([[1, 4, 6, 8], [0, 2, 0, 0], [0, 0, 0, 0], [0, 0, 2, 10]])
+    ours, theirs = Runs.of_pairs(pairs, 10), masks("0111001100", "1100000000", "0000000000", "0011111111")
+    for name in ("sample", "first", "behind", "sizes", "membership", "found", "hulls"):
+        np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), name)
+
+
+def test_what_a_stopping_rule_does_not_need_is_worked_out_when_somebody_looks() -> None:
+    asked = []
+
+    def profiles() -> SampledProfiles:
+        asked.append(1)
+        return flat(4)()
+
+    estimate = sampled_estimate(masks("0111000000", "0011000000"), profiles, SPACE).noting(pairs=4, silent=True)
+    assert (estimate.probability, estimate.pairs, estimate.silent) == (1.0, 4, True)
+    assert known(estimate.expected_f1) > 0.8
+    assert not asked
+    assert known(estimate.profile_quantiles_mv).shape == (3, 10)
+    assert known(estimate.largest_excluded).mep_mv == 0.0
+    again = pickle.loads(pickle.dumps(estimate))  # noqa: S301 - made here
+    assert again.largest_excluded == estimate.largest_excluded
+    assert len(asked) == 1
 
 
 def test_the_expected_f1_is_that_of_the_decision() -> None:
@@ -62,7 +90,8 @@ def test_the_best_isi_is_told_of_samples_that_have_one_and_what_is_excluded_of_a
     # Ten samples: peaks of 50 µV at 3 or 4 ms in eight, nothing in two; nine in ten are at most 50 µV.
     mep_mv = torch.full((10, 10), 0.01)
     mep_mv[:5, 3], mep_mv[5:8, 4] = 0.06, 0.06
-    estimate = sampled_estimate(masks("0011110000"), SampledProfiles(mep_mv, torch.full((10,), 0.01)), SPACE)
+    profiles = SampledProfiles(mep_mv, torch.full((10,), 0.01))
+    estimate = sampled_estimate(masks("0011110000"), lambda: profiles, SPACE)
     assert known(estimate.best_isi) == (3.0, 3.0, 4.0)
     assert known(estimate.largest_excluded).mep_mv == pytest.approx(0.05)
     assert sampled_estimate(masks("0000000000"), flat(1), SPACE).best_isi is None

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.stats
 
 import isiw
 from isiw.errors import LogError
 from isiw.findings import NO_MEP
-from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_stood_out
+from isiw.report.evidence import changed_with_time, contradiction, growth, no_comparison, nothing_stood_out, p_of_larger
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import Status, Trial
 from isiw.window import Window
@@ -65,6 +66,23 @@ def test_amplitudes_that_change_with_time_whatever_the_isi_are_told(factor: floa
     assert changed_with_time(WINDOW, inside_only) is None
     assert changed_with_time(None, session) is None
     assert changed_with_time(WINDOW, session[:4]) is None
+
+
+@pytest.mark.parametrize("decimals", [15, 0], ids=["all different", "many equal"])
+def test_the_rank_tests_say_what_scipy_says(decimals: int) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        inside, outside = rng.standard_normal(rng.integers(4, 30)), rng.standard_normal(rng.integers(8, 30))
+        inside, outside = (inside + rng.uniform(-0.5, 1.5)).round(decimals), outside.round(decimals)
+        p = scipy.stats.mannwhitneyu(inside, outside, alternative="greater").pvalue
+        assert p_of_larger(inside.tolist(), outside.tolist()) == pytest.approx(p, abs=0.015)
+        rising = (outside + rng.uniform(-0.1, 0.1) * np.arange(len(outside))).round(decimals)
+        p = scipy.stats.kendalltau(np.arange(len(rising)), rising, alternative="greater").pvalue
+        assert scipy.stats.norm.sf(growth(rising)) == pytest.approx(p, abs=0.015 if p < 0.05 else 0.06)
+
+
+def test_nothing_is_larger_where_everything_is_equal() -> None:
+    assert p_of_larger([0.02] * 4, [0.02] * 5) == 1.0
 
 
 @pytest.mark.parametrize("cohort", ["recruitment", "gaussian"])

@@ -46,7 +46,7 @@ def play(strategy: Strategy, meps_mv: list[float]) -> list[float]:
 @pytest.fixture
 def particles() -> Strategy:
     """The default strategy, with few particles."""
-    return make_strategy(particles=64, seed=3)
+    return make_strategy(particles=64, seed=3, engine="torch")
 
 
 @dataclass(frozen=True)

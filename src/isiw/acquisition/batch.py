@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import torch
-
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.errors import StrategyError
-from isiw.models.protocol import DTYPE, Conditions, Posterior, ProposesIsi, SamplesProfiles
+from isiw.lazy import torch
+from isiw.models.protocol import Conditions, Posterior, ProposesIsi, SamplesProfiles
 
 __all__ = ["greedy_batch", "own_plan"]
 
@@ -67,5 +66,5 @@ def _as_expected(posterior: Posterior, isi_ms: float) -> Posterior:
             got=f"a posterior without {', '.join(missing)}",
             remedy="Ask for one ISI at a time, or choose another model.",
         )
-    isi = torch.tensor([isi_ms], dtype=DTYPE)
+    isi = torch.tensor([isi_ms], dtype=torch.float32)
     return posterior.condition(isi, posterior.profiles_mv(isi).median(dim=1).values.squeeze(-1))

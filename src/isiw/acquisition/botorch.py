@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.protocol import HasBotorchModel, Tensor
 
 __all__ = ["BotorchAcquisition"]

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import torch
-from scipy.stats import qmc
 
 from isiw.checks import check_numbers, check_wholes
 from isiw.design import DesignSpace
-from isiw.models.protocol import DTYPE, Posterior, ProposesIsi, Tensor
+from isiw.lazy import scipy, torch
+from isiw.models.protocol import Posterior, ProposesIsi, Tensor
 
 __all__ = ["EvenSpacing", "IncrementalSweep", "OwnProposal", "RandomIsi", "SobolIsi", "golden_index"]
 
@@ -30,7 +29,7 @@ def golden_index(trial: int, candidates: int) -> int:
 
 
 def _only(index: int, isi_ms: Tensor) -> Tensor:
-    scores = torch.zeros((1, len(isi_ms)), dtype=DTYPE, device=isi_ms.device)
+    scores = torch.zeros((1, len(isi_ms)), dtype=torch.float32, device=isi_ms.device)
     scores[0, index] = 1.0
     return scores
 
@@ -76,7 +75,9 @@ class SobolIsi:
 
     def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
         """Score the ISI whose turn it is 1 and all others 0, shape (1, t)."""
-        share = float(qmc.Sobol(1, seed=self.seed).random_base2(posterior.trials.bit_length())[posterior.trials, 0])
+        share = float(
+            scipy.stats.qmc.Sobol(1, seed=self.seed).random_base2(posterior.trials.bit_length())[posterior.trials, 0]
+        )
         return _only(min(int(share * len(isi_ms)), len(isi_ms) - 1), isi_ms)
 
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
-import torch
 
 from isiw.acquisition.lookahead import lookahead
 from isiw.acquisition.protocol import ForeseesProfiles
 from isiw.checks import check_numbers
+from isiw.lazy import torch
 from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesProfiles, Tensor
 
 __all__ = [

@@ -9,12 +9,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-import torch
-
+from isiw.acquisition.kernels import entropy_reductions, variance_reductions
 from isiw.acquisition.lookahead import expected_variance_reduction
 from isiw.acquisition.protocol import ForeseesWindows
 from isiw.checks import check_wholes
-from isiw.models.protocol import CountsPairs, Posterior, PredictsOutcomes, SamplesDepression, SamplesWindows, Tensor
+from isiw.compiled import AVAILABLE, first_of
+from isiw.lazy import torch
+from isiw.models.protocol import (
+    CountsPairs,
+    Posterior,
+    PredictsOutcomes,
+    SamplesDepression,
+    SamplesWindows,
+    Tensor,
+)
 
 __all__ = [
     "Alternating",
@@ -45,7 +53,15 @@ def mutual_information(posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
         isi_ms: candidate ISIs [ms], shape (t,).
     """
     mass = posterior.outcome_mass(isi_ms)
+    if _is_for_kernels(mass):
+        with first_of("scores"):
+            return torch.from_numpy(entropy_reductions(mass.numpy()))
     return _entropy(mass.mean(dim=1)) - _entropy(mass).mean(dim=1)
+
+
+def _is_for_kernels(mass: Tensor) -> bool:
+    """Whether compiled loops are there for it: in single precision, on the CPU."""
+    return AVAILABLE and mass.dtype == torch.float32 and mass.device.type == "cpu"
 
 
 def window_information(posterior: ForeseesWindows, isi_ms: Tensor, cells: int = 5) -> Tensor:
@@ -97,7 +113,11 @@ def window_gain(posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
     masks = posterior.window_masks(isi_ms)
     if isinstance(posterior, SamplesDepression):
         masks = torch.cat((masks, posterior.depressed_masks(isi_ms)), dim=-1)
-    return expected_variance_reduction(posterior.outcome_mass(isi_ms), masks)
+    mass = posterior.outcome_mass(isi_ms)
+    if _is_for_kernels(mass):
+        with first_of("scores of windows"):
+            return torch.from_numpy(variance_reductions(mass.numpy(), masks.to(torch.float32).numpy()))
+    return expected_variance_reduction(mass, masks)
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import torch
-
 from isiw.acquisition.lookahead import lookahead
 from isiw.acquisition.protocol import ForeseesProfiles
 from isiw.checks import check_numbers
+from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, Tensor
 from isiw.window import EDGE_LEVEL
 

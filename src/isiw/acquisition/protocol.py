@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Protocol, runtime_checkable
 
-import torch
-
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
+from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
 
 __all__ = [

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import torch
-
 from isiw.acquisition.lookahead import expected_variance_reduction
 from isiw.acquisition.protocol import ForeseesWindows
 from isiw.checks import check_wholes
+from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesWindows, Tensor
 
 __all__ = ["TwoStep", "two_step_gain"]

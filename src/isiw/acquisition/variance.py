@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import torch
-
 from isiw.acquisition.lookahead import expected_variance_reduction
 from isiw.acquisition.protocol import ForeseesProfiles, ForeseesWindows
+from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
 
 __all__ = [

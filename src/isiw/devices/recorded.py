@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.robot.waveforms import scale_of_mep
 from isiw.devices.simulated import Respond
 from isiw.errors import DeviceError, InvalidValueError
+from isiw.lazy import pd
 from isiw.signals.mep import MEP_WINDOW_MS
 from isiw.trials import Channel, Stimulus, Sweep
 from isiw.types import BoolArray, Conditioning, FloatArray, Reference

@@ -9,14 +9,13 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
-import pandas as pd
-
 import isiw
 from isiw.errors import InvalidValueError
 from isiw.export import emg
 from isiw.export.collection import Part, log_losses, stimulus_of
 from isiw.export.emg import Run
 from isiw.export.tables import session_columns, session_facts, tidy
+from isiw.lazy import pd
 from isiw.log.frames import trial_columns
 from isiw.log.outputs import write_output
 from isiw.text import one_line

@@ -7,9 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-import pandas as pd
-
 from isiw.export.collection import Part, log_losses, stimulus_of
+from isiw.lazy import pd
 from isiw.log.frames import trial_columns
 from isiw.log.outputs import write_output
 from isiw.log.reader import SessionRecord

@@ -12,16 +12,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import torch
-from botorch.acquisition.analytic import UpperConfidenceBound
-from botorch.models import SingleTaskGP
-from gpytorch.kernels import RBFKernel, ScaleKernel
 
 from isiw.checks import check_numbers, check_wholes, whole
 from isiw.errors import InvalidValueError
 from isiw.interval.task import score_pct
+from isiw.lazy import botorch, gpytorch, torch
 from isiw.log.production import LONGEST_MS, Block
-from isiw.models.protocol import DTYPE
 from isiw.types import FloatArray
 
 __all__ = ["LightSearch", "search_light"]
@@ -94,10 +90,10 @@ def search_light(block: Block, seed: int, search: LightSearch | None = None) -> 
 
 def _next_ms(how: LightSearch, grid_ms: FloatArray, produced_ms: FloatArray, lights: FloatArray) -> float:
     """Where the upper confidence bound is highest [ms]."""
-    kernel = ScaleKernel(RBFKernel()).double()
-    length_scale_ms, variance, beta = torch.tensor([how.length_scale_ms, LIGHT_VARIANCE, how.beta], dtype=DTYPE)
+    kernel = gpytorch.kernels.ScaleKernel(gpytorch.kernels.RBFKernel()).double()
+    length_scale_ms, variance, beta = torch.tensor([how.length_scale_ms, LIGHT_VARIANCE, how.beta], dtype=torch.float32)
     kernel.base_kernel.lengthscale, kernel.outputscale = length_scale_ms.double(), variance.double()
-    model = SingleTaskGP(
+    model = botorch.models.SingleTaskGP(
         torch.tensor(produced_ms)[:, None],
         torch.tensor(lights)[:, None],
         torch.full((len(lights), 1), LIGHT_VARIANCE, dtype=torch.double),
@@ -105,5 +101,7 @@ def _next_ms(how: LightSearch, grid_ms: FloatArray, produced_ms: FloatArray, lig
         outcome_transform=None,
     )
     with torch.no_grad():
-        bounds = UpperConfidenceBound(model, beta=beta)(torch.tensor(grid_ms)[:, None, None])
+        bounds = botorch.acquisition.analytic.UpperConfidenceBound(model, beta=beta)(
+            torch.tensor(grid_ms)[:, None, None]
+        )
     return float(grid_ms[int(bounds.argmax())])

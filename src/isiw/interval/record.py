@@ -8,11 +8,11 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 import isiw
 from isiw.checks import text, whole
 from isiw.errors import InvalidValueError
+from isiw.lazy import pd
 from isiw.log.clock import now
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.production import PRODUCTION_VERSION, Block, Production, ProductionHeader

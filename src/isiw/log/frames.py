@@ -6,8 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-import pandas as pd
-
+from isiw.lazy import pd
 from isiw.log.onsets import Onset
 from isiw.log.schema import Estimate
 from isiw.text.stimuli import TAP, StimulusWords, meanings

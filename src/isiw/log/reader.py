@@ -9,10 +9,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import cast
 
-import pandas as pd
-
 from isiw.errors import DamagedLogError, InvalidValueError
 from isiw.findings import lacking
+from isiw.lazy import pd
 from isiw.log.frames import trial_frame
 from isiw.log.headers import require_read
 from isiw.log.kinds import LogKind, continued_by, of_another_kind

@@ -13,16 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple, Protocol, TypeAlias, runtime_checkable
-
-import torch
+from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window, WindowEstimate
 
 __all__ = [
-    "DTYPE",
     "Conditions",
     "CountsPairs",
     "ExpectsTheUsual",
@@ -43,12 +41,9 @@ __all__ = [
     "Tensor",
 ]
 
-Tensor: TypeAlias = torch.Tensor
+Tensor: TypeAlias = "torch.Tensor"
 
-DTYPE: Final = torch.float32
-"""Of tensors that are not in double precision, whatever torch's default is."""
-
-Values: TypeAlias = Tensor | Sequence[float | None] | Sequence[bool | None]
+Values: TypeAlias = "Tensor | Sequence[float | None] | Sequence[bool | None]"
 """One value a person, as a tensor or plain; None is not known."""
 
 
@@ -93,7 +88,7 @@ class Observation:
 def _column(values: Values) -> Tensor:
     if isinstance(values, torch.Tensor):
         return values
-    return torch.tensor([math.nan if value is None else float(value) for value in values], dtype=DTYPE)
+    return torch.tensor([math.nan if value is None else float(value) for value in values], dtype=torch.float32)
 
 
 @runtime_checkable

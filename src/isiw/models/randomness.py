@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-import torch
 
+from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
 __all__ = ["SIMULATED", "step_generator", "systematic"]

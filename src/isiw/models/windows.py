@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, cached_property
 from typing import NamedTuple
 
-import torch
+import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.models.protocol import DTYPE, Tensor
-from isiw.types import FloatArray
+from isiw.later import Later
+from isiw.lazy import torch
+from isiw.models.protocol import Tensor
+from isiw.types import FloatArray, IntArray
 from isiw.window import (
     EDGE_LEVEL,
     MIN_EXCESS_MV,
@@ -22,11 +27,11 @@ from isiw.window import (
 __all__ = [
     "EXCLUDED_AT",
     "PROFILE_POINTS",
+    "Runs",
     "SampledHypotheses",
     "SampledProfiles",
     "best_window",
     "edge_samples",
-    "ends",
     "least_excess_mv",
     "profile_grid",
     "sampled_estimate",
@@ -54,53 +59,116 @@ EXCLUDED_AT = 0.9
 """With which probability `WindowEstimate.largest_excluded` is larger than the largest enhancement."""
 
 
-def best_window(masks: Tensor, grid_ms: FloatArray) -> tuple[Window | None, float]:
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Sampled windows as runs of ISIs next to each other, sample by sample.
+
+    Args:
+        sample: which sample each run is of, ascending, shape (r,).
+        first: index of its first ISI, shape (r,).
+        behind: index behind its last, shape (r,).
+        samples: how many samples there are.
+        points: how many ISIs.
+    """
+
+    sample: IntArray
+    first: IntArray
+    behind: IntArray
+    samples: int
+    points: int
+
+    @classmethod
+    def of_masks(cls, masks: Tensor) -> Runs:
+        """The runs of windows given as 0 or 1, shape (s, t)."""
+        samples, points = masks.shape
+        inside = np.zeros((samples, points + 2), dtype=np.int8)
+        inside[:, 1:-1] = masks.cpu().numpy() > 0
+        steps = np.diff(inside, axis=-1)
+        (sample, first), behind = np.nonzero(steps > 0), np.nonzero(steps < 0)[1]
+        return cls(sample, first, behind, samples, points)
+
+    @classmethod
+    def of_pairs(cls, pairs: IntArray, points: int) -> Runs:
+        """The runs of windows given as pairs of indices, shape (s, 2 k): of the first ISI, and behind the last.
+
+        Args:
+            pairs: the indices; where they are equal there is no run.
+            points: how many ISIs there are.
+        """
+        both = pairs.reshape(len(pairs), -1, 2)
+        sample, which = np.nonzero(both[..., 0] < both[..., 1])
+        first, behind = both[sample, which].T
+        return cls(sample, first, behind, len(pairs), points)
+
+    @cached_property
+    def _leads(self) -> IntArray:
+        """The first run of each window, shape (w,)."""
+        return np.flatnonzero(np.diff(self.sample, prepend=-1))
+
+    @property
+    def found(self) -> IntArray:
+        """The samples that have a window, shape (w,)."""
+        return self.sample[self._leads]
+
+    @property
+    def hulls(self) -> tuple[IntArray, IntArray]:
+        """Index of the first and of the last ISI of each window, each of shape (w,)."""
+        lasts = np.append(self._leads[1:], len(self.sample))[: len(self._leads)] - 1
+        return self.first[self._leads], self.behind[lasts] - 1
+
+    def summed(self, values: FloatArray) -> FloatArray:
+        """Sum of what each window has at its runs, shape (..., w).
+
+        Args:
+            values: of the runs, shape (..., r).
+        """
+        return np.add.reduceat(values, self._leads, axis=-1) if len(self._leads) else values[..., :0]
+
+    @cached_property
+    def sizes(self) -> FloatArray:
+        """How many ISIs each window has, shape (w,)."""
+        return self.summed((self.behind - self.first).astype(float))
+
+    @property
+    def membership(self) -> FloatArray:
+        """The share of the windows that holds each ISI, shape (t,)."""
+        steps = [np.bincount(ends, minlength=self.points + 1) for ends in (self.first, self.behind)]
+        return np.cumsum(steps[0] - steps[1])[:-1] / max(1, len(self._leads))
+
+
+def best_window(windows: Runs, grid_ms: FloatArray) -> tuple[Window | None, float]:
     """The window of largest expected F1 among the level sets of the posterior's membership, and that F1.
 
     Args:
-        masks: sampled windows as 0 or 1, shape (s, t); none of them empty.
-        grid_ms: ISIs of the masks [ms], shape (t,).
+        windows: sampled windows, at least one of them.
+        grid_ms: their ISIs [ms], shape (t,).
     """
-    membership = masks.mean(0)
-    cuts = torch.linspace(0.1, 0.9, 17, dtype=DTYPE, device=masks.device) * membership.max()
-    candidates = (membership >= cuts.unsqueeze(-1)).to(masks.dtype)
-    overlap = candidates @ masks.T
-    sizes = candidates.sum(-1, keepdim=True) + masks.sum(-1)
-    expected_f1, best = (2.0 * overlap / sizes).mean(-1).max(-1)
-    return Window.from_mask(grid_ms, candidates[best].cpu().numpy() > 0), float(expected_f1)
+    membership = windows.membership
+    candidates = membership >= (np.linspace(0.1, 0.9, 17) * membership.max())[:, None]
+    below = np.pad(np.cumsum(candidates, axis=-1), ((0, 0), (1, 0)))
+    overlap = windows.summed((below[:, windows.behind] - below[:, windows.first]).astype(float))
+    expected_f1 = (2.0 * overlap / (below[:, -1:] + windows.sizes)).mean(-1)
+    best = int(expected_f1.argmax())
+    return Window.from_mask(grid_ms, candidates[best]), float(expected_f1[best])
 
 
-def ends(masks: Tensor) -> tuple[Tensor, Tensor]:
-    """Grid index of the start and of the end of sampled windows, each of shape (s,).
+def edge_samples(windows: Runs, space: DesignSpace) -> FloatArray:
+    """Start and end of sampled windows [ms], ±inf where a window runs out of the range, shape (w, 2).
 
     Args:
-        masks: sampled windows as 0 or 1, shape (s, t); none of them empty.
-    """
-    points = masks.shape[-1]
-    rising = torch.arange(1.0, points + 1.0, dtype=DTYPE, device=masks.device)
-    # A largest product is found much faster than the place of the first 1.
-    last, first = ((masks * weights).amax(-1).long() for weights in (rising, rising.flip(0)))
-    return points - first, last - 1
-
-
-def edge_samples(first: Tensor, last: Tensor, space: DesignSpace) -> Tensor:
-    """Start and end of sampled windows [ms], ±inf where a window runs out of the range, shape (s, 2).
-
-    Args:
-        first: grid index of the start, shape (s,).
-        last: grid index of the end, shape (s,).
+        windows: the windows.
         space: the design space.
     """
-    grid = torch.tensor(space.grid_ms, dtype=DTYPE, device=first.device)
-    start = torch.where(first == 0, -torch.inf, grid[first])
-    end = torch.where(last == len(grid) - 1, torch.inf, grid[last])
-    return torch.stack((start, end), dim=-1)
+    first, last = windows.hulls
+    start = np.where(first == 0, -np.inf, space.grid_ms[first])
+    end = np.where(last == windows.points - 1, np.inf, space.grid_ms[last])
+    return np.stack((start, end), axis=-1)
 
 
 def profile_grid(space: DesignSpace) -> Tensor:
     """The ISIs at which profiles are reported [ms], shape (t,)."""
     every = max(1, min(len(space.grid_ms) // PROFILE_POINTS, int(PROFILE_STEP_MS / space.step_ms)))
-    return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=DTYPE)
+    return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=torch.float32)
 
 
 class SampledProfiles(NamedTuple):
@@ -133,39 +201,53 @@ class SampledHypotheses(NamedTuple):
 
 
 def sampled_estimate(
-    masks: Tensor, profiles: SampledProfiles, space: DesignSpace, hypotheses: SampledHypotheses | None = None
+    windows: Runs,
+    profiles: Callable[[], SampledProfiles],
+    space: DesignSpace,
+    hypotheses: SampledHypotheses | None = None,
+    shift_pct_rmt: Callable[[], float | None] = lambda: None,
 ) -> WindowEstimate:
     """What equally weighted samples say about the window of one person.
 
     Args:
-        masks: sampled windows on the space's grid as 0 or 1, all 0 where there is none, shape (s, t).
-        profiles: sampled profiles, of the same or of other samples.
+        windows: sampled windows on the space's grid.
+        profiles: gives sampled profiles, of the same or of other samples; they are asked for only if somebody looks at
+            what rests on them.
         space: the design space.
         hypotheses: of the sampled windows; None where the model has none.
+        shift_pct_rmt: gives the shift of the input that recruitment curves exclude [% RMT].
     """
-    somewhere = masks.sum(-1) > 0
-    present = masks[somewhere]
-    probability = len(present) / len(masks)
-    first, last = ends(present)
-    edges = edge_samples(first, last, space)
-    start, end = edges.median(0).values.tolist() if len(present) else (None, None)
-    reported, f1 = best_window(present, space.grid_ms) if probability >= 0.5 else (None, 1.0)
-    levels = torch.tensor([0.05, 0.5, 0.95], dtype=profiles.mep_mv.dtype, device=profiles.mep_mv.device)
+    probability = len(windows.found) / windows.samples
+    first, last = windows.hulls
+    edges = edge_samples(windows, space)
+    start, end = np.sort(edges, axis=0)[(len(edges) - 1) // 2].tolist() if len(edges) else (None, None)
+    reported, f1 = best_window(windows, space.grid_ms) if probability >= 0.5 else (None, 1.0)
+    profiles = cache(profiles)
     return WindowEstimate(
         probability=probability,
         window=reported,
         start_ms=start,
         end_ms=end,
         grid_ms=profile_grid(space).double().numpy(),
-        edge_samples_ms=edges.double().cpu().numpy(),
-        profile_quantiles_mv=torch.quantile(profiles.mep_mv, levels, dim=0).double().cpu().numpy(),
-        split_probability=float((present.sum(-1) <= last - first).double().mean()) if len(present) else None,
-        hypothesis_samples=None if hypotheses is None else hypotheses.kinds[somewhere].cpu().numpy(),
+        edge_samples_ms=edges,
+        profile_quantiles_mv=Later(lambda: _band_mv(profiles())),
+        split_probability=float((windows.sizes <= last - first).mean()) if len(edges) else None,
+        hypothesis_samples=None if hypotheses is None else hypotheses.kinds.cpu().numpy()[windows.found],
         hypothesis_names=() if hypotheses is None else hypotheses.names,
         expected_f1=f1 * (1.0 - probability if reported is None else probability),
-        best_isi=_best_isi(profiles, space),
-        largest_excluded=Enhancement(float(torch.quantile(profiles.excess_mv, EXCLUDED_AT))),
+        best_isi=Later(lambda: _best_isi(profiles(), space)),
+        largest_excluded=Later(lambda: Enhancement(_excluded_mv(profiles()), shift_pct_rmt())),
     )
+
+
+def _band_mv(profiles: SampledProfiles) -> FloatArray:
+    levels = torch.tensor([0.05, 0.5, 0.95], dtype=profiles.mep_mv.dtype, device=profiles.mep_mv.device)
+    band_mv: FloatArray = torch.quantile(profiles.mep_mv, levels, dim=0).double().cpu().numpy()
+    return band_mv
+
+
+def _excluded_mv(profiles: SampledProfiles) -> float:
+    return float(torch.quantile(profiles.excess_mv, EXCLUDED_AT))
 
 
 def _best_isi(profiles: SampledProfiles, space: DesignSpace) -> BestISI | None:

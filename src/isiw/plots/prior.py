@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from isiw.lazy import pd
 from isiw.plots.style import BLUE, FAINT, INK, save_figure, tidied
 
 __all__ = ["prior_figure", "save_prior_plot"]

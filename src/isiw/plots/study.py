@@ -9,12 +9,12 @@ from types import MappingProxyType
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from isiw.checks import choice
+from isiw.lazy import pd
 from isiw.plots.style import FAINT, INK, explain, save_figure, saying, strategy_colours, tidied
 
 __all__ = ["STUDY_PICTURES", "StudyPicture", "draw_curve", "save_study_plot", "study_figure"]

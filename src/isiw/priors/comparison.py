@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import pandas as pd
-import torch
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.lazy import pd, torch
 from isiw.models.particles.latents import LATENTS
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior
@@ -77,7 +76,7 @@ def _drawn(lab: LabPrior) -> list[dict[str, FloatArray]]:
     drawn, own = [], lab.joined()
     for prior in (Prior(ProfilePrior(conditioning=own.profile.conditioning)), own):
         latents = prior.sample(1, PEOPLE, torch.Generator().manual_seed(0), space)
-        columns = latents.values[0].double().numpy().T  # noqa: PD011 - no DataFrame
+        columns = latents.values[0].double().numpy().T
         drawn.append(dict(zip(LATENTS, columns, strict=True)))
     return drawn
 

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import astuple, replace
 from typing import Final, TypeVar
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.particles.latents import latents_of
 from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
 from isiw.models.particles.places import Place

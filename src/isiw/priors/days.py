@@ -13,11 +13,10 @@ from functools import partial
 from typing import Final, TypeAlias
 
 import numpy as np
-import torch
-from sklearn.mixture import GaussianMixture
 
 from isiw.checks import check_numbers, check_probabilities
 from isiw.errors import InvalidValueError
+from isiw.lazy import sklearn, torch
 from isiw.log.reader import SessionRecord, require_records
 from isiw.models.particles import ParticlePosterior
 from isiw.models.particles.latents import LATENTS, Latents, used_by
@@ -228,7 +227,9 @@ def _normals(latents: Latents, name: str, law: DayToDay) -> list[_Normal]:
         return []
     centre, spread = values.mean(0), values.std(0) + 1e-6
     # The regularisation keeps a law from being narrower than a few of the particles that it stands for.
-    fit = GaussianMixture(COMPONENTS[name], covariance_type="diag", reg_covar=0.05, max_iter=1000, random_state=0)
+    fit = sklearn.mixture.GaussianMixture(
+        COMPONENTS[name], covariance_type="diag", reg_covar=0.05, max_iter=1000, random_state=0
+    )
     fit.fit((values - centre) / spread)
     added = law.added_sd()
     grown = np.array([added.get(LATENTS[column], 0.0) for column in own])

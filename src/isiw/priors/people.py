@@ -7,9 +7,9 @@ from dataclasses import astuple
 from typing import Final, NamedTuple
 
 import numpy as np
-import torch
 
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles import ParticlePosterior
 from isiw.models.particles.latents import used_by
 from isiw.models.particles.prior import Prior

@@ -12,6 +12,7 @@ from types import UnionType
 from typing import Any, Final, get_args
 
 import isiw
+from isiw.compiled import version as engine_version
 from isiw.errors import InvalidValueError
 from isiw.log.clock import now
 from isiw.log.durable import log_of
@@ -51,9 +52,9 @@ class Earlier:
 
 
 def versions() -> dict[str, str]:
-    """The versions that what a strategy asks depends on, by package."""
+    """The versions that what a strategy asks depends on, by package; a log that states no engine is torch's."""
     installed = {package: importlib.metadata.version(package) for package in _PACKAGES}
-    return {"isiw": isiw.__version__, "python": platform.python_version()} | installed
+    return {"isiw": isiw.__version__, "python": platform.python_version(), **installed, "engine": engine_version()}
 
 
 def require_parts(log: object, **parts: tuple[object, type | UnionType]) -> Path:

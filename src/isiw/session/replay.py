@@ -12,7 +12,7 @@ from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent, StrategyRecip
 from isiw.log.verdicts import VERDICTS, under
 from isiw.session.examination import learn, relearned
 from isiw.session.header import versions
-from isiw.strategy.catalogue import remade_strategy, settings_for
+from isiw.strategy.catalogue import known_settings, remade_strategy, settings_for
 from isiw.strategy.strategy import Strategy
 from isiw.text import plain
 from isiw.trials import Trial, TrialTable
@@ -111,9 +111,9 @@ def strategy_of(header: Header) -> Strategy:
             "the session's strategy was built from a user's own objects, which no log can hold",
             remedy="Build the same strategy again and hand it over: isiw.resume(path, device, strategy).",
         )
-    settings = recipe.settings
+    settings = known_settings(recipe.name, {"engine": "torch"}) | recipe.settings  # the one there was before others
     if header.schema_version < SCHEMA_VERSION:
-        settings = _known_settings(recipe)
+        settings = _known_settings(recipe.model_copy(update={"settings": settings}))
     return remade_strategy(recipe.name, header.space, recipe.seed, **settings)
 
 

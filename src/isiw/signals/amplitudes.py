@@ -9,9 +9,8 @@ import math
 import statistics
 from collections.abc import Sequence
 
-from scipy.special import betaln
-
 from isiw.findings import ENOUGH_PAIRS, Finding, Kind, Severity
+from isiw.lazy import scipy
 from isiw.signals.evidence import Evidence, Told
 from isiw.trials import RESPONSE_MV
 
@@ -135,7 +134,9 @@ def stopped_after(isis_ms: Sequence[float | None], answered: Sequence[bool]) -> 
         return None
     misses = sum(comparable[:first]) - hits
     # How probable so many misses are after these, whatever the share of answers is.
-    by_chance = math.exp(betaln(hits + 1, misses + silent + 1) - betaln(hits + 1, misses + 1))
+    by_chance = math.exp(
+        scipy.special.betaln(hits + 1, misses + silent + 1) - scipy.special.betaln(hits + 1, misses + 1)
+    )
     return first if by_chance < STOPPED_BY_CHANCE else None
 
 

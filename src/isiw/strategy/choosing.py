@@ -7,12 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-import torch
-
 from isiw.acquisition.fixed import golden_index
 from isiw.acquisition.protocol import AcquisitionFunction, best_candidate, require_scores
 from isiw.design import DesignSpace
-from isiw.models.protocol import DTYPE, Posterior, Tensor
+from isiw.lazy import torch
+from isiw.models.protocol import Posterior, Tensor
 
 __all__ = ["Choice", "ChosenBy", "Cost", "best_choices", "candidate_isis", "evenly_spaced", "instead_of_lost"]
 
@@ -56,7 +55,7 @@ def candidate_isis(space: DesignSpace) -> Tensor:
     grid = space.grid_ms
     stride = max(1, math.ceil((len(grid) - 1) / (MAX_CANDIDATES - 1)))
     picked = sorted({*range(0, len(grid), stride), len(grid) - 1})
-    return torch.as_tensor(grid[picked], dtype=DTYPE)
+    return torch.as_tensor(grid[picked], dtype=torch.float32)
 
 
 def best_choices(

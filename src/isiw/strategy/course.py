@@ -67,7 +67,7 @@ class Belief:
     def estimate(self, person: int) -> WindowEstimate:
         """What is believed about the window of one person."""
         if person not in self.estimates and self.posterior is not None:
-            self.estimates[person] = replace(self.posterior.estimate(person), pairs=self.pairs)
+            self.estimates[person] = self.posterior.estimate(person).noting(pairs=self.pairs)
         return self.estimates[person]
 
     def looked_back_on(self, people: int) -> Belief:
@@ -195,6 +195,6 @@ class Course:
             silent: whether no trial of the person showed an MEP; see `WindowEstimate.silent`.
         """
         past = tuple(belief.estimate(person) for belief in self.past)
-        estimate = replace(self.estimate(person), silent=silent)
+        estimate = self.estimate(person).noting(silent=silent)
         progress = Progress(self.paired_trials + mistrials, self.paired_trials, estimate, past=past)
         return self.method.stopping(progress)

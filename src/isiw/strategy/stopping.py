@@ -351,4 +351,5 @@ def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:
 
 def looks_back(rule: StoppingRule) -> int:
     """How many past estimates a rule needs."""
-    return rule.looks_back if isinstance(rule, LooksBack) else 0
+    past: int = getattr(rule, "looks_back", 0)  # asked for after each trial, and a check of `LooksBack` is slow
+    return past

@@ -345,7 +345,7 @@ class Strategy:
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""
         estimate = self._course.estimate()
-        return replace(estimate, silent=True) if self._is_silent else estimate
+        return estimate.noting(silent=True) if self._is_silent else estimate
 
     def prediction_mv(self) -> tuple[FloatArray, FloatArray] | None:
         """The band of nine of ten next MEPs [mV], at the ISIs of the estimate; None where the model predicts none."""

@@ -10,11 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, is_dataclass, replace
 from typing import Any
 
-import pandas as pd
-import torch
-
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.errors import StudyError
+from isiw.lazy import pd, torch
 from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel, Tensor
 from isiw.strategy.choosing import Choice, instead_of_lost
 from isiw.strategy.course import Method

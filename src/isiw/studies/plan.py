@@ -20,12 +20,10 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias, get_args
 
-import pandas as pd
-import torch
-
 from isiw.checks import check_choice, check_numbers, check_wholes, text, whole
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import ConfigError, InvalidValueError
+from isiw.lazy import pd, torch
 from isiw.strategy.catalogue import settings_for
 from isiw.strategy.settings.common import settings_values
 from isiw.studies.batch import simulate_batch

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import pandas as pd
-
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StudyError
+from isiw.lazy import pd
 from isiw.studies.code import code_checksum
 from isiw.studies.execution import Executor, Failure, Processes
 from isiw.studies.plan import Study, Unit, run_unit

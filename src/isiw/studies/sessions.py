@@ -11,11 +11,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias, get_args
 
-import pandas as pd
-
 from isiw.checks import check_choice, check_numbers, check_wholes, whole
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StudyError
+from isiw.lazy import pd
 from isiw.metrics import covers, f1
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy

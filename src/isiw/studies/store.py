@@ -22,15 +22,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 import tomli_w
-import torch
 
 import isiw
 from isiw.errors import StudyError
 from isiw.files import TEMPORARY, opened, put
+from isiw.lazy import pa, parquet, pd, torch
 from isiw.log.locks import claim
 from isiw.studies.code import code_checksum
 from isiw.studies.execution import Failure
@@ -282,7 +279,7 @@ def _read(path: Path, state: str) -> pa.Table:
             content = file.read()
         if path.suffixes[-2:-1] != [f".{_checksum(content)}"]:
             raise pa.ArrowInvalid("its checksum fails")
-        part = pq.read_table(pa.BufferReader(content))
+        part = parquet.read_table(pa.BufferReader(content))
     except (pa.ArrowException, OSError) as error:
         raise StudyError(
             f"a part of the study is damaged, or cannot be read: {error}",
@@ -301,7 +298,7 @@ def _read(path: Path, state: str) -> pa.Table:
 def _write(folder: Path, key: str, rows: pd.DataFrame, state: str) -> Path:
     folder.mkdir(parents=True, exist_ok=True)  # version control keeps no empty folders
     sink, part = pa.BufferOutputStream(), pa.Table.from_pandas(rows, preserve_index=False)
-    pq.write_table(part.replace_schema_metadata({**(part.schema.metadata or {}), _OF_STUDY: state}), sink)
+    parquet.write_table(part.replace_schema_metadata({**(part.schema.metadata or {}), _OF_STUDY: state}), sink)
     content = sink.getvalue().to_pybytes()
     path = folder / f"{key}.{_checksum(content)}.parquet"
     put(path, content, replacing=True)

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
-import pandas as pd
-from scipy import stats
 
 from isiw.errors import InvalidValueError, did_you_mean
+from isiw.lazy import pd, scipy
 from isiw.types import FloatArray
 
 __all__ = ["differences", "means_table", "summarise"]
@@ -69,7 +68,7 @@ def _means(rows: pd.DataFrame) -> pd.DataFrame:
     at_end |= {"sure_and_wrong": wrong.astype(float).mask(expected_f1.isna())}
     groups = rows.assign(**at_end, called_none=~rows["reported_window"].astype(bool)).groupby(_GROUP)
     people, f1, se = groups.size(), groups["f1"].mean(), groups["f1"].sem()
-    reach = se * stats.t.ppf(0.5 + LEVEL / 2, people - 1)
+    reach = se * scipy.stats.t.ppf(0.5 + LEVEL / 2, people - 1)
     return pd.DataFrame(
         {
             "people": people,
@@ -140,14 +139,14 @@ def _difference(paired: FloatArray, comparisons: int) -> dict[str, float]:
     if people < 2:
         return found
     low, high = (mean, mean) if np.ptp(paired) == 0 else _bootstrapped(paired, 1.0 - (1.0 - LEVEL) / comparisons)
-    return found | {"se": float(stats.sem(paired)), "low": low, "high": high}
+    return found | {"se": float(scipy.stats.sem(paired)), "low": low, "high": high}
 
 
 def _bootstrapped(paired: FloatArray, level: float) -> tuple[float, float]:
     """The interval of a mean: bias-corrected and accelerated, or by percentiles if very few people leave that open."""
     for method in ("BCa", "percentile"):
         rng = np.random.default_rng(0)
-        drawn = stats.bootstrap(
+        drawn = scipy.stats.bootstrap(
             (paired,), np.mean, confidence_level=level, n_resamples=RESAMPLES, batch=500, method=method, rng=rng
         )
         low, high = map(float, drawn.confidence_interval)

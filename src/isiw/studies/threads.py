@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import contextmanager
 
-import torch
+from isiw.lazy import torch
 
 __all__ = ["one_torch_thread"]
 

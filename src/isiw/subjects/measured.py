@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.optimize import brentq
 
 from isiw.checks import check_numbers
+from isiw.lazy import scipy
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
@@ -90,7 +90,7 @@ class MeasuredPerson:
             evoked_mv = replace(curve, boost_pct_rmt=boost_pct_rmt).expected_evoked_mv(1.0)
             return float(evoked_mv) + floor.mean_mv - self.peak_mv
 
-        return replace(curve, boost_pct_rmt=float(brentq(too_much_mv, 0.0, MAX_BOOST_PCT_RMT)))
+        return replace(curve, boost_pct_rmt=float(scipy.optimize.brentq(too_much_mv, 0.0, MAX_BOOST_PCT_RMT)))
 
     def subject(self, start_ms: float, hit_delay_ms: float, hit_delay_sd_ms: float) -> SimulatedSubject:
         """A simulated person with this measured window.

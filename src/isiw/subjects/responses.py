@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.special import expit
 
 from isiw.checks import check_numbers
+from isiw.lazy import scipy
 from isiw.types import ArrayLike, FloatArray
 
 __all__ = ["EmgFloor", "GainResponse", "RecruitmentResponse", "ResponseCurve", "TrialNoise"]
@@ -160,7 +160,7 @@ class RecruitmentResponse:
         """
         x = self.intensity_pct_rmt + self.boost_pct_rmt * np.asarray(facilitation, dtype=np.float64)
         drive = self.slope_per_pct * (x + self.sigma_x_pct_rmt * np.asarray(input_z) - self.x50_pct_rmt)
-        return np.asarray(self.amplitude_mv * expit(drive))
+        return np.asarray(self.amplitude_mv * scipy.special.expit(drive))
 
     def expected_evoked_mv(self, facilitation: ArrayLike) -> FloatArray:
         """Expected MEP above the EMG floor [mV], without drift, by facilitation of at most 1; same shape."""

@@ -13,11 +13,10 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import logit, ndtr
 
 from isiw.checks import check_numbers, choice, number, whole
 from isiw.errors import InvalidValueError
+from isiw.lazy import scipy
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.responses import RecruitmentResponse, TrialNoise
 from isiw.trials import RESPONSE_MV
@@ -125,19 +124,19 @@ def _criterion_drive(response: RecruitmentResponse) -> FloatArray:
     output = np.exp(response.sigma_y * _NODES)[:, None]
     floor_mv = response.floor.median_mv * np.exp(response.floor.log_sd * _NODES)
     share = (RESPONSE_MV - floor_mv) / (response.amplitude_mv * output)
-    return np.asarray(logit(np.clip(share, 0.0, 1.0)) / response.slope_per_pct)
+    return np.asarray(scipy.special.logit(np.clip(share, 0.0, 1.0)) / response.slope_per_pct)
 
 
 def _exceeding(drive: float, needed: FloatArray, sigma_x: float) -> float:
     with np.errstate(divide="ignore"):
-        probability = ndtr(np.divide(drive - needed, sigma_x))
+        probability = scipy.special.ndtr(np.divide(drive - needed, sigma_x))
     return float(_WEIGHTS @ probability @ _WEIGHTS)
 
 
 def _x50(response: RecruitmentResponse) -> float:
     """Where the half-maximal MEP is [% RMT], if half of the MEPs exceed 50 µV at 100 %."""
     needed, sigma_x = _criterion_drive(response), response.sigma_x_pct_rmt
-    drive = brentq(lambda above: _exceeding(above, needed, sigma_x) - 0.5, -200.0, 200.0)
+    drive = scipy.optimize.brentq(lambda above: _exceeding(above, needed, sigma_x) - 0.5, -200.0, 200.0)
     return 100.0 - float(drive)
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import torch
-
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.design import DesignSpace
-from isiw.models.protocol import DTYPE, Posterior
+from isiw.lazy import torch
+from isiw.models.protocol import Posterior
 from isiw.testing.requirements import require, same_estimates
 
 __all__ = ["check_acquisition"]
@@ -28,7 +27,7 @@ def check_acquisition(acquisition: AcquisitionFunction, posterior: Posterior, sp
     require(not missing, "the posterior has what the acquisition function needs", f"not {', '.join(missing)}")
     before = posterior.estimate()
     for count in (1, 2, 23):
-        isi_ms = torch.linspace(space.low_ms, space.high_ms, count, dtype=DTYPE)
+        isi_ms = torch.linspace(space.low_ms, space.high_ms, count, dtype=torch.float32)
         scores = acquisition(posterior, isi_ms)
         shaped = scores.dim() == 2 and scores.shape[1] == count
         require(shaped, "scores have the shape (b, t)", f"{tuple(scores.shape)} for {count} ISIs")

@@ -6,11 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import torch
 
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.protocol import (
-    DTYPE,
     Conditions,
     HasEvidence,
     Observation,
@@ -111,7 +110,7 @@ def _check_order(model: ResponseModel, space: DesignSpace, trials: Trials, toler
 
 
 def _check_capabilities(posterior: Posterior, space: DesignSpace, people: int, when: str) -> None:
-    isi_ms = torch.linspace(space.low_ms, space.high_ms, 7, dtype=DTYPE)
+    isi_ms = torch.linspace(space.low_ms, space.high_ms, 7, dtype=torch.float32)
     shapes = _sample_shapes(posterior, isi_ms, when)
     wrong = [shape for shape in shapes if shape[0] != people]
     require(not wrong, f"all samples are of {people} people {when}", str(wrong))
@@ -161,7 +160,7 @@ def _sample_shapes(posterior: Any, isi_ms: Tensor, when: str) -> list[tuple[int,
 def _check_further(posterior: Posterior, people: int, when: str) -> None:
     trials = posterior.trials
     if isinstance(posterior, Conditions):
-        isi_ms, mep_mv = torch.tensor([[100.0] * people, [0.05] * people], dtype=DTYPE)
+        isi_ms, mep_mv = torch.tensor([[100.0] * people, [0.05] * people], dtype=torch.float32)
         imagined = posterior.condition(isi_ms, mep_mv)
         require(imagined.trials == trials + 1, f"condition adds one trial {when}")
     if isinstance(posterior, HasEvidence):

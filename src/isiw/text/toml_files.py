@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
@@ -93,11 +94,12 @@ def checked(kind: type[_T], values: Mapping[str, Any], source: str) -> _T:
         ConfigError: an unknown key or a bad value; the message names source, key and value.
     """
     try:
-        return cast("_T", dict(_strict(kind).model_validate({"values": values}))["values"])
+        return cast("_T", dict(_strict(cast("type", kind)).model_validate({"values": values}))["values"])
     except ValidationError as error:
         raise _explained(kind, first_to_tell(error.errors()), source) from error
 
 
+@cache
 def _strict(kind: type) -> type[BaseModel]:
     """A model around the kind: dataclasses take from it that unknown keys are an error."""
     return create_model("Strict", __config__=ConfigDict(extra="forbid"), values=(kind, ...))

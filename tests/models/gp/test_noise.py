@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from isiw.models.gp.noise import EQUAL_NOISE, MAX_LOG_VARIANCE, leave_one_out, noise_profile
+from isiw.models.gp.noise import MAX_LOG_VARIANCE, equal_noise, leave_one_out, noise_profile
 
 ISIS_MS = torch.linspace(0.0, 500.0, 80, dtype=torch.float64)
 
@@ -46,7 +46,7 @@ def test_residuals_that_break_things_give_finite_profiles() -> None:
 
 
 def test_equal_noise_is_equal() -> None:
-    assert EQUAL_NOISE.log_variance(ISIS_MS).abs().max() == 0
+    assert equal_noise().log_variance(ISIS_MS).abs().max() == 0
 
 
 def test_leave_one_out_residuals_are_those_of_leaving_one_out() -> None:

@@ -38,6 +38,7 @@ def particle(kind: NoiseKind, **values: float) -> Response:
         "rest_probability": 0.1,
         "drift": 0.0,
         "startup": 0.0,
+        "slope": 0.25,
     }
     return Response(torch.tensor([[kind]]), *(torch.tensor([[v]]) for v in (defaults | values).values()))
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
 
 from isiw.checks import check_numbers, check_probabilities
 from isiw.errors import InvalidValueError
+from isiw.lazy import scipy
 from isiw.types import ArrayLike, FloatArray
 
 __all__ = [
@@ -196,7 +196,7 @@ class Geometry:
         softest = 3 * drive_m_s2 / (1000 * self.hit_speed_m_s)  # below it the drive all but wins against the spring
         if too_short(softest) < 0:
             raise InvalidValueError("the hammer is too slow to be pushed back for so long", got=self.contact.mean_ms)
-        return float(brentq(too_short, softest, 2 * math.pi / self.contact.mean_ms))
+        return float(scipy.optimize.brentq(too_short, softest, 2 * math.pi / self.contact.mean_ms))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.signal import butter, sosfilt
 
 from isiw.devices.robot.mechanism import SEPARATION_RAD, Taps, drive, pressure_kpa, rebound, restitution
+from isiw.lazy import scipy
 from isiw.signals.mep import MEP_WINDOW_MS
 from isiw.types import ArrayLike, FloatArray
 
@@ -141,7 +140,7 @@ def scale_of_mep(resting_mv: FloatArray, mep_mv: FloatArray, amplitude_mv: float
     if missing_mv(0.0) <= 0:
         return 0.0
     # The sum's amplitude is at least scale * ptp(mep) - ptp(rest), so this scale is enough.
-    return float(brentq(missing_mv, 0.0, (amplitude_mv + np.ptp(resting_mv)) / np.ptp(mep_mv)))
+    return float(scipy.optimize.brentq(missing_mv, 0.0, (amplitude_mv + np.ptp(resting_mv)) / np.ptp(mep_mv)))
 
 
 def valve_v(since_valve_ms: FloatArray, late_ms: FloatArray) -> FloatArray:
@@ -228,11 +227,11 @@ def emg_noise_uv(n: int, samples: int, rate_hz: float, rms_uv: float, rng: np.ra
     """
     settle = round(rate_hz / 10)  # the filter starts from zero
     high_hz = min(EMG_BAND_HZ[1], 0.45 * rate_hz)
-    band = butter(2, (EMG_BAND_HZ[0], high_hz), btype="bandpass", fs=rate_hz, output="sos")
+    band = scipy.signal.butter(2, (EMG_BAND_HZ[0], high_hz), btype="bandpass", fs=rate_hz, output="sos")
     impulse = np.zeros(4 * settle)
     impulse[0] = 1.0
-    passed_sd = math.sqrt(float(np.sum(sosfilt(band, impulse) ** 2)))
-    noise: FloatArray = sosfilt(band, rng.standard_normal((n, settle + samples)), axis=-1)[:, settle:]
+    passed_sd = math.sqrt(float(np.sum(scipy.signal.sosfilt(band, impulse) ** 2)))
+    noise: FloatArray = scipy.signal.sosfilt(band, rng.standard_normal((n, settle + samples)), axis=-1)[:, settle:]
     return rms_uv / passed_sd * noise
 
 

@@ -12,13 +12,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
-import torch
 
 from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.dissertation.curves import FittedCurve, curve_masks
 from isiw.models.dissertation.nonlinear import NonlinearRegression
-from isiw.models.protocol import DTYPE, Observation, Tensor
+from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory
 from isiw.types import BoolArray, FloatArray, IntArray
@@ -224,7 +224,7 @@ class BootstrapPosterior:
         """The particles that are not measured yet; see `ProposesIsi`."""
         left = self.model.particles - int(self.count.max())
         plan_ms = np.take_along_axis(self.plan_ms, self.count[:, None] + np.arange(left), axis=-1)
-        return torch.as_tensor(plan_ms, dtype=DTYPE)
+        return torch.as_tensor(plan_ms, dtype=torch.float32)
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person: none before the first generation is complete."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.special import stdtrit
 
+from isiw.lazy import scipy
 from isiw.types import BoolArray, FloatArray
 from isiw.window import EDGE_LEVEL, least_excess_mv
 
@@ -52,7 +52,7 @@ class FittedCurve:
         return self._about_mean(np.hypot(self.sd_mv, self.noise_sd_mv), level)
 
     def _about_mean(self, sd_mv: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
-        reach = float(stdtrit(self.dof, 0.5 + 0.5 * level)) * sd_mv
+        reach = float(scipy.special.stdtrit(self.dof, 0.5 + 0.5 * level)) * sd_mv
         return self.mean_mv - reach, self.mean_mv + reach
 
 

@@ -11,13 +11,11 @@ from functools import cache, partial
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from threadpoolctl import ThreadpoolController
 
 from isiw.checks import check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.lazy import scipy, sklearn
 from isiw.models.dissertation.curves import FittedCurve
 from isiw.types import FloatArray
 
@@ -95,15 +93,15 @@ class GaussianProcessRegression:
 
     def _process(self, isi: FloatArray, scaled: FloatArray) -> tuple[Any, float, str | None]:
         """The process at its best hyperparameters, its noise SD, and what went wrong."""
-        signal = ConstantKernel(1.0, (0.01, 10.0))
-        kernel = signal * RBF(self.length_ms, (self.min_length_ms, self.max_length_ms)) + WhiteKernel(
-            self.noise**2, (1e-4, 1.0)
-        )
-        process = GaussianProcessRegressor(kernel, optimizer=None)
+        signal = sklearn.gaussian_process.kernels.ConstantKernel(1.0, (0.01, 10.0))
+        kernel = signal * sklearn.gaussian_process.kernels.RBF(
+            self.length_ms, (self.min_length_ms, self.max_length_ms)
+        ) + sklearn.gaussian_process.kernels.WhiteKernel(self.noise**2, (1e-4, 1.0))
+        process = sklearn.gaussian_process.GaussianProcessRegressor(kernel, optimizer=None)
         if not len(isi):
             return process, self.noise, "There are no trials to fit yet: the Gaussian process before any stands in."
         process.fit(isi, scaled)
-        found = minimize(
+        found = scipy.optimize.minimize(
             partial(_cost, process),
             kernel.theta,
             jac=True,
@@ -111,7 +109,9 @@ class GaussianProcessRegression:
             bounds=kernel.bounds,
             options={"maxiter": self.max_fit_iterations, "ftol": 1e-5},
         )
-        process = GaussianProcessRegressor(kernel.clone_with_theta(found.x), optimizer=None).fit(isi, scaled)
+        process = sklearn.gaussian_process.GaussianProcessRegressor(
+            kernel.clone_with_theta(found.x), optimizer=None
+        ).fit(isi, scaled)
         gave_up = f"The kernel did not converge in {self.max_fit_iterations} iterations: its best parameters stand in."
         return process, math.exp(0.5 * found.x[-1]), None if found.success else gave_up
 

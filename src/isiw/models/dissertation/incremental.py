@@ -8,13 +8,13 @@ from statistics import NormalDist
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-import torch
 
 from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.lazy import torch
 from isiw.models.dissertation.curves import curve_masks
-from isiw.models.protocol import DTYPE, Observation, Tensor
+from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory, PersonTrials
 from isiw.types import FloatArray
@@ -117,7 +117,7 @@ class SweepPosterior:
         """One sweep, from where it has come to; see `ProposesIsi`."""
         sweep = self._stops_ms.repeat(self.model.trials_per_isi)
         done = (~np.isnan(self.told.isi_ms)).sum(axis=-1, keepdims=True)
-        return torch.as_tensor(sweep[(done + np.arange(len(sweep))) % len(sweep)], dtype=DTYPE)
+        return torch.as_tensor(sweep[(done + np.arange(len(sweep))) % len(sweep)], dtype=torch.float32)
 
     def _means(self, trials: PersonTrials) -> _Means:
         """Means by the nearest stop of the realised ISI; the first trials of each block of the sweep are left out."""

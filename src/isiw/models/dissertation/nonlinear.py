@@ -8,10 +8,10 @@ from functools import partial
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.lazy import scipy
 from isiw.models.dissertation.curves import FittedCurve
 from isiw.types import FloatArray
 
@@ -177,7 +177,7 @@ class NonlinearRegression:
             flat = beliefs.start * np.tile([0.0, 1.0, 1.0], self.peaks)
             trouble = f"{len(isi_ms)} trials do not determine {len(flat)} parameters: a flat curve stands in."
             return _Estimate(flat, np.diag(beliefs.sd**2), float(beliefs.sd[0]), trouble=trouble, fitted=False)
-        found = least_squares(
+        found = scipy.optimize.least_squares(
             partial(_residuals_mv, isi_ms, excess_mv),
             beliefs.start,
             jac=partial(gradient_mv, isi_ms),

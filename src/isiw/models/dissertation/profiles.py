@@ -14,12 +14,10 @@ from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.interpolate import make_smoothing_spline
-from scipy.optimize import least_squares
-from scipy.stats import shapiro
 
 from isiw.checks import number, whole
 from isiw.errors import InvalidValueError
+from isiw.lazy import scipy
 from isiw.models.dissertation.nonlinear import gaussians_mv, gradient_mv
 from isiw.text.numbers import counted
 from isiw.types import ArrayLike, FloatArray
@@ -94,7 +92,7 @@ def normality(values: ArrayLike, level: float = 0.05) -> Normality:
         raise InvalidValueError("the values must be finite", remedy="Leave mistrials out.")
     if np.ptp(sample) == 0.0:
         raise InvalidValueError("values that are all the same have no law to be tested", got=float(sample[0]))
-    found = shapiro(sample)
+    found = scipy.stats.shapiro(sample)
     return Normality(float(found.statistic), float(found.pvalue), bool(found.pvalue >= level))
 
 
@@ -180,7 +178,7 @@ def _least_squares(profile: _Profile, start: FloatArray) -> FloatArray:
     low = np.concatenate([[-np.inf], np.tile([-np.inf, first_ms - range_ms, 0.5 * narrowest_ms], gaussians)])
     high = np.concatenate([[np.inf], np.tile([np.inf, last_ms + range_ms, 2.0 * range_ms], gaussians)])
     inside = np.clip(start, low, high)
-    found = least_squares(
+    found = scipy.optimize.least_squares(
         _residuals, inside, jac=_jacobian, bounds=(low, high), x_scale="jac", max_nfev=200, args=(profile,)
     )
     return np.asarray(found.x)
@@ -198,8 +196,12 @@ def _spline(profile: _Profile) -> ProfileFit:
     unit = np.eye(len(profile.isi_ms))
     fits = []
     for stiffness in _STIFFNESSES:
-        hat = make_smoothing_spline(profile.isi_ms, unit, w=profile.weights, lam=stiffness)(profile.isi_ms)
-        curve = make_smoothing_spline(profile.isi_ms, profile.mep_mv, w=profile.weights, lam=stiffness)
+        hat = scipy.interpolate.make_smoothing_spline(profile.isi_ms, unit, w=profile.weights, lam=stiffness)(
+            profile.isi_ms
+        )
+        curve = scipy.interpolate.make_smoothing_spline(
+            profile.isi_ms, profile.mep_mv, w=profile.weights, lam=stiffness
+        )
         fits.append(_scored("smoothing spline", profile, curve, float(np.trace(hat)) + 1.0, np.empty((0, 3))))
     return min(fits, key=lambda fit: fit.aicc)
 

@@ -11,12 +11,12 @@ from functools import cached_property
 from typing import Protocol, get_args
 
 import numpy as np
-import torch
 
 from isiw.checks import check_choice
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.dissertation.curves import FittedCurve, Segments, curve_masks
-from isiw.models.protocol import DTYPE, Observation, Tensor
+from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory
 from isiw.types import FloatArray
@@ -121,14 +121,14 @@ class RegressionPosterior:
     @cached_property
     def _samples_mv(self) -> Tensor:
         """Sampled curves above the floor, shape (b, s, t)."""
-        return torch.as_tensor(np.stack([curve.samples_mv for curve in self.curves]), dtype=DTYPE)
+        return torch.as_tensor(np.stack([curve.samples_mv for curve in self.curves]), dtype=torch.float32)
 
     @cached_property
     def _masks(self) -> Tensor:
         """Their windows as 0 or 1, shape (b, s, t)."""
         pairs = zip(self.curves, self.floors_mv, strict=True)
         masks = [curve_masks(curve.samples_mv, floor_mv, self.model.segments) for curve, floor_mv in pairs]
-        return torch.as_tensor(np.stack(masks), dtype=DTYPE)
+        return torch.as_tensor(np.stack(masks), dtype=torch.float32)
 
     def _nearest(self, isi_ms: Tensor) -> Tensor:
         """Indices of the nearest grid points, shape (t,)."""
@@ -145,15 +145,15 @@ class RegressionPosterior:
 
     def baselines_mv(self) -> Tensor:
         """The floor, which a fit does not sample; see `SamplesProfiles`."""
-        floors = torch.as_tensor(self.floors_mv, dtype=DTYPE)
+        floors = torch.as_tensor(self.floors_mv, dtype=torch.float32)
         return floors.unsqueeze(-1).expand(self._samples_mv.shape[:2])
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Gaussian predictions about each sampled curve; see `PredictsOutcomes`."""
         expected = self._samples_mv[..., self._nearest(isi_ms), None]
-        noise = torch.tensor([curve.noise_sd_mv for curve in self.curves], dtype=DTYPE)[:, None, None, None]
+        noise = torch.tensor([curve.noise_sd_mv for curve in self.curves], dtype=torch.float32)[:, None, None, None]
         low, high = expected.amin((1, 2, 3), keepdim=True), expected.amax((1, 2, 3), keepdim=True)
-        share = torch.linspace(0.0, 1.0, OUTCOMES, dtype=DTYPE)
+        share = torch.linspace(0.0, 1.0, OUTCOMES, dtype=torch.float32)
         values = (low - 3.0 * noise) + share * (high - low + 6.0 * noise)
         # Noise finer than the grid of values would fall between two of them.
         spread = noise.maximum(values.diff(dim=-1)[..., :1]).clamp_min(1e-9)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from sklearn.svm import SVR
 
 from isiw.checks import check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.lazy import sklearn
 from isiw.models.dissertation.curves import FittedCurve
 from isiw.types import FloatArray
 
@@ -55,7 +55,7 @@ class SupportVectorRegression:
             trouble = "There are no trials to fit yet: a flat curve stands in."
             return FittedCurve(grid, flat, flat, np.tile(flat, (self.committee, 1)), 0.0, trouble=trouble, fitted=False)
         scale_mv = max(float(np.abs(excess_mv).max()), LEAST_SCALE_MV)
-        regression = SVR(C=self.c, epsilon=self.epsilon, gamma=0.5 / self.length_ms**2)
+        regression = sklearn.svm.SVR(C=self.c, epsilon=self.epsilon, gamma=0.5 / self.length_ms**2)
         isi, scaled = isi_ms[:, None], excess_mv / scale_mv
         picks = rng.integers(len(isi), size=(self.committee, len(isi)))
         members_mv = np.stack([regression.fit(isi[i], scaled[i]).predict(grid[:, None]) for i in picks]) * scale_mv

@@ -10,17 +10,16 @@ which a process that could explain anything pays for it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-import torch
-from scipy.optimize import minimize
 
-from isiw.models.gp.noise import EQUAL_NOISE, NoiseProfile, leave_one_out, noise_profile
+from isiw.lazy import botorch, scipy, torch
+from isiw.models.gp.noise import NoiseProfile, equal_noise, leave_one_out, noise_profile
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, Hyperparameters
-from isiw.models.gp.process import KernelName, Process, SingleTaskGP, correlations, regression
+from isiw.models.gp.process import KernelName, Process, correlations, regression
 from isiw.models.gp.scale import Scale
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import PersonTrials
@@ -64,7 +63,7 @@ class Fit:
     told: PersonTrials
     processes: Hyperparameters
     log_prior: Tensor
-    noise: NoiseProfile = EQUAL_NOISE
+    noise: NoiseProfile = field(default_factory=equal_noise)
     trouble: str | None = None
 
     @cached_property
@@ -139,7 +138,7 @@ class Fit:
         """The same processes on other trials; their hyperparameters, scale and noise profile stay."""
         return _sound(replace(self, told=told))
 
-    def regression(self, picks: Tensor) -> SingleTaskGP:
+    def regression(self, picks: Tensor) -> botorch.models.SingleTaskGP:
         """Some of the processes as BoTorch models, from ISIs [ms] to standardised MEPs.
 
         Args:
@@ -207,7 +206,7 @@ def _sound(found: Fit) -> Fit:
         found,
         processes=medians._replace(amplitude=medians.amplitude * torch.tensor([1.0, 0.0], dtype=torch.float64)),
         log_prior=found.prior.log_hypotheses,
-        noise=EQUAL_NOISE,
+        noise=equal_noise(),
         trouble="The covariance of the trials is singular under all hyperparameters. "
         "The medians of their priors, with the same noise at all ISIs, stand in for them.",
     )
@@ -229,7 +228,7 @@ def _most_likely(found: Fit, max_evaluations: int) -> Fit:
         "fatol": 0.02,
         "maxfev": max_evaluations,
     }
-    result = minimize(loss, start.numpy(), method="Nelder-Mead", options=options)  # type: ignore[call-overload]
+    result = scipy.optimize.minimize(loss, start.numpy(), method="Nelder-Mead", options=options)  # type: ignore[call-overload]
     trouble = None
     if not result.success:
         trouble = (

@@ -12,20 +12,20 @@ from functools import cached_property
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
-import torch
 
 from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.lazy import botorch, torch
 from isiw.models.gp.fit import Fit, fit, fixed_fit
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior
-from isiw.models.gp.process import KernelName, SingleTaskGP
+from isiw.models.gp.process import KernelName
 from isiw.models.gp.samples import Paths, ProfileSample, draw_paths
 from isiw.models.gp.scale import Scale, Transform, scale_of
-from isiw.models.protocol import DTYPE, Observation, Tensor
+from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory, PersonTrials
-from isiw.models.windows import SampledProfiles, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, profile_grid, sampled_estimate
 from isiw.window import WindowEstimate
 
 __all__ = ["GaussianProcess", "GaussianProcessPosterior", "NoiseKind", "ProcessSettings"]
@@ -212,14 +212,14 @@ class GaussianProcessPosterior:
         It is that of equal noise also where the noise depends on the ISI, and of a process whose mean and scale come
         from the same trials (empirical Bayes): it compares these processes with each other, not with other models.
         """
-        return torch.tensor([f.log_evidence for f in self.fits], dtype=DTYPE)
+        return torch.tensor([f.log_evidence for f in self.fits], dtype=torch.float32)
 
     @property
     def trouble(self) -> str | None:
         """What went wrong with the last fit, of all people; see `ReportsTrouble`."""
         return " ".join(dict.fromkeys(f.trouble for f in self.fits if f.trouble)) or None
 
-    def botorch_model(self, person: int = 0) -> SingleTaskGP:
+    def botorch_model(self, person: int = 0) -> botorch.models.SingleTaskGP:
         """The most believable process of one person; see `HasBotorchModel`.
 
         Its outcomes are transformed, standardised MEPs. Where the noise depends on the ISI, fantasies of BoTorch have
@@ -230,6 +230,10 @@ class GaussianProcessPosterior:
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        grid = torch.tensor(self.space.grid_ms, dtype=DTYPE)
-        profiles = SampledProfiles(self.profiles_mv(profile_grid(self.space))[person], self.baselines_mv()[person])
-        return sampled_estimate(self.window_masks(grid)[person], profiles, self.space)
+        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32)
+
+        def profiles() -> SampledProfiles:
+            mep_mv = self.profiles_mv(profile_grid(self.space))
+            return SampledProfiles(mep_mv[person], self.baselines_mv()[person])
+
+        return sampled_estimate(Runs.of_masks(self.window_masks(grid)[person]), profiles, self.space)

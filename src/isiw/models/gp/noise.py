@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
-__all__ = ["EQUAL_NOISE", "NoiseProfile", "leave_one_out", "noise_profile"]
+__all__ = ["NoiseProfile", "equal_noise", "leave_one_out", "noise_profile"]
 
 LOG_VARIANCE_SD = 0.6
 """Prior SD of the log variance about its mean: the noise SD varies by a factor of e^0.3 either way."""
@@ -57,9 +56,10 @@ class NoiseProfile:
         return log_variance.clamp(-MAX_LOG_VARIANCE, MAX_LOG_VARIANCE)
 
 
-_NOTHING = torch.empty(0, dtype=torch.float64)
-EQUAL_NOISE = NoiseProfile(_NOTHING, _NOTHING)
-"""The same noise everywhere."""
+def equal_noise() -> NoiseProfile:
+    """The same noise everywhere."""
+    nothing = torch.empty(0, dtype=torch.float64)
+    return NoiseProfile(nothing, nothing)
 
 
 def _covariance(one: Tensor, other: Tensor) -> Tensor:

@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import torch
-
 from isiw.checks import check_numbers
 from isiw.errors import InvalidValueError
+from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale, check_scales
 

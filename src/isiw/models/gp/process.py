@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Literal, NamedTuple, TypeAlias
 
+from isiw.lazy import botorch, gpytorch
 from isiw.models.protocol import Tensor
 
-with warnings.catch_warnings():
-    # GPyTorch's stack compiles functions with torch.jit.script as it is imported, which torch has deprecated; whoever
-    # imports isiw can do nothing about it.
-    for category in (FutureWarning, DeprecationWarning):
-        warnings.filterwarnings("ignore", message=r".*torch\.jit\.script.*", category=category)
-    from botorch.models import SingleTaskGP
-    from gpytorch.constraints import Positive
-    from gpytorch.kernels import ConstantKernel, Kernel, MaternKernel, RBFKernel, ScaleKernel
-    from gpytorch.likelihoods import GaussianLikelihood
-    from gpytorch.means import ConstantMean
-
-__all__ = ["KernelName", "Process", "SingleTaskGP", "correlations", "regression"]
+__all__ = ["KernelName", "Process", "correlations", "regression"]
 
 KernelName: TypeAlias = Literal["rbf", "matern"]
 
@@ -58,7 +47,7 @@ def correlations(kernel: KernelName, length_ms: Tensor, isi_ms: Tensor) -> Tenso
 
 def regression(
     kernel: KernelName, process: Process, isi_ms: Tensor, values: Tensor, relative_variance: Tensor
-) -> SingleTaskGP:
+) -> botorch.models.SingleTaskGP:
     """Processes given some trials, as a BoTorch model whose batch shape is theirs.
 
     Args:
@@ -70,33 +59,41 @@ def regression(
     """
     inputs = isi_ms.unsqueeze(-1).expand(*process.length_ms.shape, -1, 1)
     variance = process.noise_variance[..., None, None] * relative_variance.unsqueeze(-1)
-    return SingleTaskGP(
+    return botorch.models.SingleTaskGP(
         inputs,
         values.unsqueeze(-1).expand_as(inputs),
         variance if len(values) else None,
         # Without a trial, BoTorch cannot take the next one's noise from theirs.
         likelihood=None if len(values) else _likelihood(process.noise_variance),
-        mean_module=ConstantMean(batch_shape=process.level.shape).double().initialize(constant=process.level),
+        mean_module=gpytorch.means.ConstantMean(batch_shape=process.level.shape)
+        .double()
+        .initialize(constant=process.level),
         covar_module=_covariance(kernel, process),
         outcome_transform=None,
     )
 
 
-def _kernel(name: KernelName, length_ms: Tensor) -> Kernel:
+def _kernel(name: KernelName, length_ms: Tensor) -> gpytorch.kernels.Kernel:
     shape = length_ms.shape
-    kernel = MaternKernel(nu=2.5, batch_shape=shape) if name == "matern" else RBFKernel(batch_shape=shape)
+    kernel = (
+        gpytorch.kernels.MaternKernel(nu=2.5, batch_shape=shape)
+        if name == "matern"
+        else gpytorch.kernels.RBFKernel(batch_shape=shape)
+    )
     return kernel.double().initialize(lengthscale=length_ms[..., None, None])
 
 
-def _covariance(kernel: KernelName, process: Process) -> Kernel:
+def _covariance(kernel: KernelName, process: Process) -> gpytorch.kernels.Kernel:
     shape = process.amplitude.shape
-    profile = ScaleKernel(_kernel(kernel, process.length_ms), batch_shape=shape).double()
-    constant = ConstantKernel(batch_shape=shape).double()
+    profile = gpytorch.kernels.ScaleKernel(_kernel(kernel, process.length_ms), batch_shape=shape).double()
+    constant = gpytorch.kernels.ConstantKernel(batch_shape=shape).double()
     return profile.initialize(outputscale=process.amplitude.square()) + constant.initialize(
         constant=process.level_variance
     )
 
 
-def _likelihood(noise_variance: Tensor) -> GaussianLikelihood:
-    likelihood = GaussianLikelihood(batch_shape=noise_variance.shape, noise_constraint=Positive()).double()
+def _likelihood(noise_variance: Tensor) -> gpytorch.likelihoods.GaussianLikelihood:
+    likelihood = gpytorch.likelihoods.GaussianLikelihood(
+        batch_shape=noise_variance.shape, noise_constraint=gpytorch.constraints.Positive()
+    ).double()
     return likelihood.initialize(noise=noise_variance.unsqueeze(-1))

@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import torch
 
+from isiw.lazy import torch
 from isiw.models.gp.fit import Fit
 from isiw.models.gp.scale import Transform, expected_mep_mv
 from isiw.models.protocol import Tensor

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
-import torch
 
+from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 from isiw.types import FloatArray
 

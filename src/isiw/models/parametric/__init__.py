@@ -1,7 +1,5 @@
-"""The parametric window model, as a Pyro program."""
+"""The parametric window model, as a Pyro program. Names are loaded when they are used, as Pyro takes long to load."""
 
-from __future__ import annotations
+import lazy_loader
 
-from isiw.models.parametric.model import ParametricModel, ParametricPosterior
-
-__all__ = ["ParametricModel", "ParametricPosterior"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

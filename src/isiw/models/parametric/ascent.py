@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
 __all__ = ["LogDensity", "Modes", "find_modes"]
@@ -26,7 +25,7 @@ LEAST_CURVATURE: Final = 0.25
 STEP: Final = 1e-4
 """Of the differences that give a curvature, in standard normal latents."""
 
-STEP_LENGTHS: Final = torch.tensor([[1.0], [0.3], [0.05]], dtype=torch.double)
+STEP_LENGTHS: Final = (1.0, 0.3, 0.05)
 SMALL_GAIN_NATS: Final = 0.1
 
 
@@ -104,7 +103,9 @@ def _climb(log_density: LogDensity, starts: Tensor, steps: int) -> Tensor:
     inverse = plain
     for _ in range(steps):
         direction = (inverse @ slopes.unsqueeze(-1)).squeeze(-1)
-        tried = points.unsqueeze(1) + STEP_LENGTHS * _shortened(direction).unsqueeze(1)
+        tried = points.unsqueeze(1) + direction.new_tensor(STEP_LENGTHS).unsqueeze(-1) * _shortened(
+            direction
+        ).unsqueeze(1)
         with torch.no_grad():
             reached, best = log_density(tried.flatten(0, 1)).view(len(points), -1).max(-1)
         better = (reached > values).unsqueeze(-1)

@@ -12,9 +12,8 @@ import math
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-import torch
-
 from isiw.checks import check_numbers, check_wholes
+from isiw.lazy import torch
 from isiw.models.parametric.ascent import LogDensity, Modes, find_modes
 from isiw.models.protocol import Tensor
 

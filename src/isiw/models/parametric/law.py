@@ -12,8 +12,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.parametric.prior import Likelihood, Unknowns
 from isiw.models.protocol import Tensor
 

@@ -13,20 +13,20 @@ from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
-import torch
 
 from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.parametric.importance import Effort
 from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
 from isiw.models.parametric.program import WindowProgram
 from isiw.models.parametric.sampling import Chains, sample_person
-from isiw.models.protocol import DTYPE, Observation, PriorPerson, Tensor
+from isiw.models.protocol import Observation, PriorPerson, Tensor
 from isiw.models.randomness import SIMULATED, step_generator, systematic
 from isiw.models.shared.history import History, observed
 from isiw.models.shared.tables import OUTCOMES, interpolated, table_levels
-from isiw.models.windows import SampledProfiles, least_excess_mv, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, least_excess_mv, profile_grid, sampled_estimate
 from isiw.types import ArrayLike
 from isiw.window import Window, WindowEstimate
 
@@ -106,7 +106,7 @@ class ParametricModel:
         generator = step_generator("cpu", seed, SIMULATED)
         program = self.program(space)
         latents = torch.randn((1, 1, program.latents), generator=generator, dtype=torch.double)
-        present = torch.rand((1, 1), generator=generator, dtype=DTYPE) < self.prior.p_window
+        present = torch.rand((1, 1), generator=generator, dtype=torch.float32) < self.prior.p_window
         person = WindowSample(program.unknowns(latents), present, self.likelihood, space)
         log_mep = draw_log_mep(
             person.unknowns, person.levels(torch.as_tensor(isi_ms, dtype=torch.double)), self.likelihood, generator
@@ -134,7 +134,7 @@ class ParametricModel:
             history=history,
             latents=torch.stack([fit.latents for fit in fits]),
             present=torch.stack([fit.present for fit in fits]),
-            evidence=torch.tensor([fit.log_evidence for fit in fits], dtype=DTYPE),
+            evidence=torch.tensor([fit.log_evidence for fit in fits], dtype=torch.float32),
             trouble=" ".join(fit.trouble for fit in fits if fit.trouble) or None,
         )
 
@@ -179,7 +179,7 @@ class WindowSample:
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows as 0 or 1, shape (b, s, t)."""
-        return (self._excess_mv(isi_ms.double()) >= self.least_excess_mv.unsqueeze(-1)).to(DTYPE)
+        return (self._excess_mv(isi_ms.double()) >= self.least_excess_mv.unsqueeze(-1)).to(torch.float32)
 
     def profiles_mv(self, isi_ms: Tensor) -> Tensor:
         """Expected MEP [mV], shape (b, s, t)."""
@@ -195,7 +195,7 @@ class WindowSample:
         u = Unknowns(*(field.float() for field in self.unknowns))
         low = torch.quantile(u.floor_mv.log(), 0.05, dim=-1) - 1.0
         high = torch.quantile((u.baseline_mv + u.amplitude_mv).log(), 0.95, dim=-1) + 1.5
-        share = torch.linspace(0.0, 1.0, OUTCOMES, dtype=DTYPE)
+        share = torch.linspace(0.0, 1.0, OUTCOMES, dtype=torch.float32)
         log_mep = (low.unsqueeze(-1) + share * (high - low).unsqueeze(-1))[:, None, None, :, None].expand(
             -1, -1, -1, -1, 2
         )
@@ -283,5 +283,9 @@ class ParametricPosterior:
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
         masks = self.window_masks(torch.tensor(self.space.grid_ms))[person]
-        profiles = SampledProfiles(self.profiles_mv(profile_grid(self.space))[person], self.baselines_mv()[person])
-        return sampled_estimate(masks, profiles, self.space)
+
+        def profiles() -> SampledProfiles:
+            mep_mv = self.profiles_mv(profile_grid(self.space))
+            return SampledProfiles(mep_mv[person], self.baselines_mv()[person])
+
+        return sampled_estimate(Runs.of_masks(masks), profiles, self.space)

@@ -10,10 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
-import torch
-
 from isiw.checks import check_numbers
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.models.shared.start import Span, StartPrior

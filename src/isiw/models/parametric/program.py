@@ -6,75 +6,20 @@ log MEP of each trial ~ MepLaw(what the latents mean, ISI of the trial)
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Final
-
-import pyro
-import torch
-from pyro.distributions import Independent, Normal
-from pyro.distributions.torch_distribution import TorchDistribution
-from pyro.infer import MCMC, NUTS
-from torch.distributions import constraints
+from typing import Final
 
 from isiw.design import DesignSpace
-from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
+from isiw.lazy import pyro, torch
+from isiw.models import parametric
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior, latent_names
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
-from isiw.models.shared.tables import ISI_NODES
 
-__all__ = ["MepLaw", "WindowProgram", "nuts_sample"]
+__all__ = ["WindowProgram", "nuts_sample"]
 
 TREE_DEPTH: Final = 6
 """Latents are of the order of one: 63 leaps reach far enough, and a chain between two modes stays affordable."""
-
-
-class MepLaw(TorchDistribution):
-    """Distribution of the natural logs of one person's MEPs [mV], as intervals that are points where one is known.
-
-    Args:
-        unknowns: fields of shape (m,) or ().
-        isi_ms: ISIs [ms], NaN for TMS alone, shape (n,).
-        isi_sd_ms: SDs of the ISIs [ms], shape (n,).
-        likelihood: the likelihood.
-        present: whether there is a window at all.
-    """
-
-    arg_constraints: ClassVar[dict[str, Any]] = {}
-    support = constraints.independent(constraints.real, 1)
-
-    def __init__(
-        self, unknowns: Unknowns, isi_ms: Tensor, isi_sd_ms: Tensor, likelihood: Likelihood, *, present: bool = True
-    ) -> None:
-        self.unknowns, self.isi_ms, self.isi_sd_ms = unknowns, isi_ms, isi_sd_ms
-        self.likelihood, self.present = likelihood, present
-        # An interval may reach to infinity, which the support of Pyro's checks cannot express.
-        super().__init__(torch.Size((*unknowns.start_ms.shape, len(isi_ms))), torch.Size((2,)), validate_args=False)
-
-    def log_prob(self, value: Tensor) -> Tensor:
-        """Log density of each log MEP, or log probability of its interval (n, 2), shape (m, n)."""
-        if not self.present:
-            nowhere = torch.zeros_like(self.unknowns.start_ms).unsqueeze(-1)
-            return log_likelihood(self.unknowns, nowhere, value, self.likelihood)
-        if not bool((self.isi_sd_ms > 0).any()):
-            return self._log_prob_at(self.isi_ms, value)
-        nodes = [
-            self._log_prob_at(self.isi_ms + shift * self.isi_sd_ms, value) + math.log(weight)
-            for shift, weight in ISI_NODES
-        ]
-        return torch.logsumexp(torch.stack(nodes), dim=0)
-
-    def _log_prob_at(self, isi_ms: Tensor, value: Tensor) -> Tensor:
-        return log_likelihood(self.unknowns, levels(self.unknowns, isi_ms), value, self.likelihood)
-
-    def sample(self, sample_shape: Sequence[int] = ()) -> Tensor:
-        """Log MEPs as points, shape (..., m, n, 2)."""
-        unknowns = Unknowns(*(x.expand((*sample_shape, *x.shape)) for x in self.unknowns))
-        level = levels(unknowns, self.isi_ms + self.isi_sd_ms * torch.randn_like(self.isi_sd_ms))
-        log_mep = draw_log_mep(unknowns, level if self.present else torch.zeros_like(level), self.likelihood)
-        return torch.stack((log_mep, log_mep), dim=-1)
 
 
 @dataclass(frozen=True)
@@ -139,11 +84,13 @@ class WindowProgram:
         """What latents (..., d) mean."""
         return self.prior.unknowns(latents, self.likelihood, self.space)
 
-    def _latents(self) -> Independent:
-        return Independent(Normal(torch.zeros(self.latents, dtype=torch.double), 1.0), 1)
+    def _latents(self) -> pyro.distributions.Independent:
+        return pyro.distributions.Independent(
+            pyro.distributions.Normal(torch.zeros(self.latents, dtype=torch.double), 1.0), 1
+        )
 
-    def _meps(self, unknowns: Unknowns, trials: History) -> MepLaw:
-        return MepLaw(unknowns, trials.isi_ms[0], trials.isi_sd_ms[0], self.likelihood, present=self.present)
+    def _meps(self, unknowns: Unknowns, trials: History) -> parametric.MepLaw:
+        return parametric.MepLaw(unknowns, trials.isi_ms[0], trials.isi_sd_ms[0], self.likelihood, present=self.present)
 
 
 def _ends(trials: History) -> Tensor:
@@ -171,8 +118,10 @@ def nuts_sample(
         # Pyro draws from torch's global stream.
         torch.manual_seed(int(torch.randint(2**31, (1,), generator=generator)))
         for start in starts:
-            kernel = NUTS(program, full_mass=True, max_tree_depth=TREE_DEPTH)
-            mcmc = MCMC(kernel, draws, warmup_steps=warmup, initial_params={"latents": start}, disable_progbar=True)
+            kernel = pyro.infer.NUTS(program, full_mass=True, max_tree_depth=TREE_DEPTH)
+            mcmc = pyro.infer.MCMC(
+                kernel, draws, warmup_steps=warmup, initial_params={"latents": start}, disable_progbar=True
+            )
             mcmc.run(trials)
             chains.append(mcmc.get_samples()["latents"])
     return torch.stack(chains)

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-import torch
-
 from isiw.checks import check_numbers, check_wholes
+from isiw.lazy import torch
 from isiw.models.parametric.ascent import Modes
 from isiw.models.parametric.importance import Effort, Mixture, WeightedDraws, importance_sample, worth
 from isiw.models.parametric.program import WindowProgram, nuts_sample

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import torch
-
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.lazy import torch
+from isiw.models.protocol import Tensor
 
 __all__ = ["Health", "distinct_share", "ess_share", "trouble_of"]
 
@@ -53,7 +52,7 @@ def distinct_share(log_likelihood: Tensor) -> Tensor:
         log_likelihood: of the history under each particle, shape (b, p).
     """
     changes = log_likelihood.sort(dim=-1).values.diff(dim=-1) != 0
-    return (1.0 + changes.sum(-1, dtype=DTYPE)) / log_likelihood.shape[-1]
+    return (1.0 + changes.sum(-1, dtype=torch.float32)) / log_likelihood.shape[-1]
 
 
 def trouble_of(health: Health) -> str | None:

@@ -5,17 +5,22 @@ A jump leads to another kind of profile, of noise, or to and from "no window".
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cache
 from typing import Final
 
-import torch
+import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.models.particles.latents import PROFILE_BLOCKS, RESPONSE_BLOCKS, Latents, latents_of, used_by
+from isiw.lazy import torch
+from isiw.models.particles.kernels.building import prior_tables
+from isiw.models.particles.kernels.target import Tables
+from isiw.models.particles.latents import LATENTS, PROFILE_BLOCKS, RESPONSE_BLOCKS, Latents, latents_of, used_by
 from isiw.models.particles.mixture import drawn
+from isiw.models.particles.noise import NoiseKind
+from isiw.models.particles.places import mixture_of
 from isiw.models.particles.prior import Person, Prior
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 
 __all__ = ["WindowTarget"]
 
@@ -31,6 +36,12 @@ REDRAWN: Final = {
     "response": RESPONSE_BLOCKS,
 }
 """The blocks of latents that each jump draws anew."""
+
+KINDS: Final = ("shape", "noise", "present", "depressed")
+"""The kinds of a particle as the kernels have them."""
+
+_RENEWED: Final = {"form": {"shape"}, "noise": {"noise"}, "window": {"shape", "present"}, "place": (), "response": ()}
+"""Which kinds each jump draws anew."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +65,48 @@ class WindowTarget:
         """What particles mean."""
         return self.prior.person(latents)
 
+    def tables(self) -> Tables:
+        """What kernels know of the prior and of what moves may do."""
+        profile = self.prior.profile
+        known, absent = torch.ones(len(NoiseKind), dtype=torch.long), torch.zeros(len(NoiseKind), dtype=torch.long)
+        used = [used_by(torch.arange(len(NoiseKind)), present.bool()) for present in (absent, known)]
+        moves = {
+            "apart": False,
+            "states": np.array([0, 1, len(NoiseKind), 0]),
+            "shifted": _shifted(torch.device("cpu")) & torch.cat(used).unsqueeze(1),
+            "jumps": tuple(JUMPS.values()),
+            "redrawn": _redrawn(torch.device("cpu")),
+            "renewed": np.array([[kind in kinds for kind in KINDS] for kinds in _RENEWED.values()]),
+            "of_profile": np.array([jump in {"form", "place"} for jump in JUMPS]),
+            "kinds": (astuple(profile.shapes), astuple(self.prior.noise), _no_and_yes(profile.p_window), (1.0,)),
+        }
+        return prior_tables(
+            self.space,
+            profile.start,
+            list(self.prior.mixtures.values()),
+            starts=1,
+            places=(profile.p_place, mixture_of(profile.places)) if profile.p_place else None,
+            at=range(len(LATENTS)),
+            spreads=self.spreads,
+            moves=moves,
+        )
+
+    def kinds(self, latents: Latents) -> Tensor:
+        """The kinds of particles, integers of shape (b, p, k); there is no depression."""
+        present = latents.present.long()
+        return torch.stack((latents.shape, latents.noise, present, torch.zeros_like(present)), dim=-1)
+
+    def latents(self, values: Tensor, kinds: Tensor) -> Latents:
+        """Particles from their latents (b, p, d) and kinds (b, p, k)."""
+        return Latents(values, kinds[..., 0], kinds[..., 1], kinds[..., 2].bool())
+
     def log_prior(self, latents: Latents) -> Tensor:
         """Log prior density of their latents but for a constant, shape (b, p)."""
         return self.prior.log_density(latents.values, self.space)
+
+    def log_place(self, latents: Latents) -> Tensor:
+        """Log prior density of start and width, shape (b, p)."""
+        return self.prior.log_place(latents.values, self.space)
 
     def shifted(self, latents: Latents, part: Tensor) -> Tensor:
         """Which latents a difference moves, shape (b, p, d)."""
@@ -65,7 +115,7 @@ class WindowTarget:
     def jumped(self, latents: Latents, generator: torch.Generator) -> Latents:
         """Particles (n,) with some kinds and latents drawn anew."""
         fresh = self.prior.sample(1, len(latents.present), generator, self.space)
-        uniform = torch.rand(latents.present.shape, generator=generator, dtype=DTYPE, device=generator.device)
+        uniform = torch.rand(latents.present.shape, generator=generator, dtype=torch.float32, device=generator.device)
         jump = drawn(tuple(JUMPS.values()), uniform)
         form, noise, window, _, _ = (jump == number for number in range(len(JUMPS)))
         return Latents(
@@ -74,6 +124,10 @@ class WindowTarget:
             noise=torch.where(noise, fresh.noise[0], latents.noise),
             present=torch.where(window, fresh.present[0], latents.present),
         )
+
+
+def _no_and_yes(probability: float) -> tuple[float, float]:
+    return 1.0 - probability, probability
 
 
 @cache

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 from functools import cache
 from typing import Final, NamedTuple
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.protocol import Tensor
 

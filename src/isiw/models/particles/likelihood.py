@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.particles.noise import NODES, Response, log_gain, log_likelihood
 from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import facilitation

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
 
-import torch
-
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.lazy import torch
+from isiw.models.protocol import Tensor
 
 __all__ = ["JointMixture", "Mixture", "drawn"]
 
@@ -37,8 +36,8 @@ class Mixture:
             components: of each its share, and the (mean, SD) of every latent.
             device: torch device.
         """
-        shares = torch.tensor([share for share, _ in components], dtype=DTYPE, device=device)
-        laws = torch.tensor([latents for _, latents in components], dtype=DTYPE, device=device)
+        shares = torch.tensor([share for share, _ in components], dtype=torch.float32, device=device)
+        laws = torch.tensor([latents for _, latents in components], dtype=torch.float32, device=device)
         return cls(shares / shares.sum(), laws[..., 0], laws[..., 1])
 
     def log_parts(self, x: Tensor) -> Tensor:
@@ -96,9 +95,13 @@ class JointMixture:
             generator: source of randomness.
         """
         tables = self._on(generator.device)
-        uniform = torch.rand((*size, len(tables.below)), generator=generator, dtype=DTYPE, device=generator.device)
+        uniform = torch.rand(
+            (*size, len(tables.below)), generator=generator, dtype=torch.float32, device=generator.device
+        )
         component = (uniform.unsqueeze(-1) > tables.below).sum(-1)[..., tables.block].flatten(0, -2)
-        normal = torch.randn((*size, len(tables.block)), generator=generator, dtype=DTYPE, device=generator.device)
+        normal = torch.randn(
+            (*size, len(tables.block)), generator=generator, dtype=torch.float32, device=generator.device
+        )
         means, sds = (law.gather(0, component).view_as(normal) for law in (tables.means, tables.sds))
         return torch.addcmul(means, sds, normal)
 
@@ -151,4 +154,4 @@ def drawn(shares: tuple[float, ...], quantile: Tensor) -> Tensor:
 
 @cache
 def _inner_edges(shares: tuple[float, ...], device: torch.device) -> Tensor:
-    return torch.tensor(shares, dtype=DTYPE, device=device).cumsum(0)[:-1]
+    return torch.tensor(shares, dtype=torch.float32, device=device).cumsum(0)[:-1]

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import get_args
 
-import torch
-
-from isiw.checks import MOST_OF_A_KIND, check_numbers, check_probabilities, check_wholes
+from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.later import Later
+from isiw.lazy import torch
+from isiw.models.particles.engine import Engine, EngineName, engine_for
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import levels
-from isiw.models.particles.noise import Response, draw_log_mep, log_gain, recruits
+from isiw.models.particles.noise import draw_log_mep, log_gain, recruits
 from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.predictions import PersonSample
-from isiw.models.particles.prior import Person, Prior
-from isiw.models.particles.shapes import Shape
-from isiw.models.particles.swarm import Moving, Swarm, taken
-from isiw.models.protocol import DTYPE, Observation, PriorPerson, Tensor
-from isiw.models.randomness import SIMULATED, step_generator, systematic
+from isiw.models.particles.prior import Prior
+from isiw.models.particles.swarm import Moving, Swarm
+from isiw.models.protocol import Observation, PriorPerson
+from isiw.models.randomness import SIMULATED, step_generator
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import ArrayLike, FloatArray
-from isiw.window import Enhancement, Window, WindowEstimate
+from isiw.window import Window, WindowEstimate
 
 __all__ = ["ParticleModel", "ParticlePosterior"]
 
@@ -46,6 +46,8 @@ class ParticleModel:
         unusual_kept: the part of their probability that unusual starts and widths of the window keep where the next ISI
             is chosen; what is believed and reported keeps all of it.
         device: torch device.
+        engine: `"compiled"` loops on the CPU, or `"torch"`, which stands in where there are none; the same seed asks
+            other ISIs with each.
 
     Raises:
         InvalidValueError: fewer than two particles or more than a memory holds, or an invalid number.
@@ -59,12 +61,14 @@ class ParticleModel:
     response_threshold_mv: float = 0.02
     unusual_kept: float = 1 / 3
     device: str = "cpu"
+    engine: EngineName = "compiled"
 
     def __post_init__(self) -> None:
         check_wholes(self, "particles", least=2, most=MOST_OF_A_KIND)  # half of them move at a time
         check_wholes(self, "thinned", least=1, most=MOST_OF_A_KIND)
         check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
         check_probabilities(self, "unusual_kept")
+        check_choice(self, "engine", get_args(EngineName))
         _require_device(self.device)
 
     @cached_property
@@ -85,23 +89,26 @@ class ParticleModel:
         """
         self.prior.profile.require_space(space)
         latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0), space)
-        return ParticlePosterior(self, space, seed, Swarm.of(latents))
+        engine, usual = (
+            engine_for(self.engine, WindowTarget(prior, space), self.device)
+            for prior in (self.prior, self.prior_where_asking)
+        )
+        return ParticlePosterior(self, space, seed, Swarm.of(latents), engine, usual)
 
     def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The posterior after one more trial."""
         after = posterior.told(observation)
         generator = step_generator(self.device, posterior.seed, after.trials)
-        target = WindowTarget(self.prior, posterior.space)
-        return replace(after, swarm=after.swarm.moved(target, self.moves, generator))
+        return replace(after, swarm=after.swarm.moved(posterior.engine, self.moves, generator))
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> PriorPerson:
         """Draw one person from the prior, and an MEP at each ISI; see `SimulatesPeople`."""
         generator = step_generator(self.device, seed, SIMULATED)
         person = self.prior.person(self.prior.sample(1, 1, generator, space))
-        isis_ms = torch.as_tensor(isi_ms, dtype=DTYPE, device=self.device).unsqueeze(0)
-        gain = log_gain(person.response, torch.arange(isis_ms.shape[-1], dtype=DTYPE, device=self.device))
+        isis_ms = torch.as_tensor(isi_ms, dtype=torch.float32, device=self.device).unsqueeze(0)
+        gain = log_gain(person.response, torch.arange(isis_ms.shape[-1], dtype=torch.float32, device=self.device))
         log_mep = draw_log_mep(person.response, levels(person, isis_ms), generator, gain)
-        grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=DTYPE, device=self.device)
+        grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=torch.float32, device=self.device)
         mask = PersonSample(person, space).window_masks(grid_ms)[0, 0]
         window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
         return PriorPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
@@ -116,55 +123,66 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
         space: the design space.
         seed: seed of all randomness.
         swarm: the particles.
+        engine: what computes with them.
+        usual: the same under the prior that ISIs are chosen with.
     """
+
+    usual: Engine[Latents]
 
     @cached_property
     def as_usual(self) -> ParticlePosterior:
         """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
-        latents, usual = self.swarm.latents, self.model.prior_where_asking
-        ratio = usual.log_place(latents.values, self.space) - self.model.prior.log_place(latents.values, self.space)
+        latents = self.swarm.latents
+        ratio = self.usual.log_places(latents) - self.engine.log_places(latents)
         return replace(self, swarm=self.swarm.times(torch.where(latents.present, ratio, 0.0)))
 
     @cached_property
     def sample(self) -> PersonSample:
         """The particles that represent all of them where every candidate ISI is scored."""
-        picks = systematic(self.swarm.log_weights, self.model.thinned)
-        return PersonSample(_each(self.person, lambda x: taken(x, picks)), self.space, self.trials)
+        return self._sample(self.swarm.picked(self.model.thinned), self.trials)
+
+    def _sample(self, latents: Latents, order: int = 0) -> PersonSample:
+        person, records = self.engine.meaning(latents)
+        return PersonSample(person, self.space, order, records)
 
     def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
         """Between which amplitudes the next MEP lies; see `PredictsMeps`."""
         isi_ms = profile_grid(self.space).to(self.device)
-        shares = 0.5 + 0.5 * torch.tensor([-level, level], dtype=DTYPE, device=isi_ms.device)
+        shares = 0.5 + 0.5 * torch.tensor([-level, level], dtype=torch.float32, device=isi_ms.device)
         low_mv, high_mv = self.sample.mep_quantiles_mv(isi_ms, shares)[person].T.double().cpu().numpy()
         return low_mv, high_mv
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        one = slice(person, person + 1)
-        picks = systematic(self.swarm.log_weights[one], self.model.particles)
-        latents = Latents(*(taken(x[one], picks) for x in self.swarm.latents))
-        sample = PersonSample(self.model.prior.person(latents), self.space)
-        grid = torch.tensor(self.space.grid_ms, dtype=DTYPE, device=latents.values.device)
-        thinned = PersonSample(_each(self.sample.person, lambda x: x[one]), self.space)
-        profiles_mv = thinned.expected_mep_mv(profile_grid(self.space).to(grid.device))
-        profiles = SampledProfiles(profiles_mv[0], thinned.baselines_mv()[0])
-        hypotheses = SampledHypotheses(self.model.prior.hypothesis(latents)[0], self.model.prior.hypotheses)
-        estimate = sampled_estimate(sample.window_masks(grid)[0], profiles, self.space, hypotheses)
-        return replace(
-            estimate,
-            largest_excluded=self._with_shift(estimate.largest_excluded, latents),
-            unusual=self.model.prior.unusual(latents, self.space),
-        )
+        one, prior = self.swarm.of_person(person), self.model.prior
+        latents = one.picked(self.model.particles)
+        grid_ms = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=self.device)
 
-    def _with_shift(self, excluded: Enhancement | None, latents: Latents) -> Enhancement | None:
-        """The same, with the shift of the input that recruitment curves exclude."""
-        shift_pct_rmt = self.model.prior.shift_pct_rmt(latents)[recruits(latents.noise)]
-        if excluded is None or len(shift_pct_rmt) < LEAST_SAMPLES:
-            return excluded
-        return excluded._replace(shift_pct_rmt=float(torch.quantile(shift_pct_rmt, EXCLUDED_AT)))
+        def profiles() -> SampledProfiles:
+            sample = self._sample(one.picked(self.model.thinned))
+            return SampledProfiles(
+                sample.expected_mep_mv(profile_grid(self.space).to(self.device))[0], sample.baselines_mv()[0]
+            )
+
+        estimate = sampled_estimate(
+            self._sample(latents).runs(grid_ms),
+            profiles,
+            self.space,
+            SampledHypotheses(prior.hypothesis(latents)[0], prior.hypotheses),
+            lambda: _excluded_shift_pct_rmt(prior, latents),
+        )
+        return estimate.noting(unusual=Later(lambda: prior.unusual(latents, self.space)))
+
+
+def _excluded_shift_pct_rmt(prior: Prior, latents: Latents) -> float | None:
+    """The shift of the input that recruitment curves exclude [% RMT]; None where few particles have one."""
+    shift_pct_rmt = prior.shift_pct_rmt(latents)[recruits(latents.noise)]
+    return float(torch.quantile(shift_pct_rmt, EXCLUDED_AT)) if len(shift_pct_rmt) >= LEAST_SAMPLES else None
 
 
 def _require_device(name: str) -> None:
+    if name == "cpu":  # is always there; settings are read where torch is not needed, too
+        return
     try:
         torch.Generator(device=name)
     except (RuntimeError, TypeError) as error:
@@ -174,9 +192,3 @@ def _require_device(name: str) -> None:
             expected="such as cpu, cuda or mps",
             remedy="Leave the device out to use the cpu.",
         ) from error
-
-
-def _each(person: Person, function: Callable[[Tensor], Tensor]) -> Person:
-    """The same of every field of a person."""
-    shape, response = map(function, person.shape), map(function, person.response)
-    return Person(Shape(*shape), Response(*response), function(person.present))

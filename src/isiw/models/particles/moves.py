@@ -10,8 +10,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.mixture import drawn
 from isiw.models.particles.prior import Person
@@ -59,6 +58,9 @@ class Target(Protocol[L]):
 
     def log_prior(self, latents: L) -> Tensor:
         """Log prior density of their latents but for a constant, shape (b, p)."""
+
+    def log_place(self, latents: L) -> Tensor:
+        """Log prior density of where and how wide their windows are but for a constant, shape (b, p)."""
 
     def shifted(self, latents: L, part: Tensor) -> Tensor:
         """Which latents a difference moves: those of a part that mean anything to the particle, shape (b, p, d).

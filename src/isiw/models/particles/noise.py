@@ -20,8 +20,7 @@ from enum import IntEnum
 from functools import cache
 from typing import NamedTuple
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
 __all__ = [
@@ -99,6 +98,7 @@ class Response(NamedTuple):
         rest_probability: probability of a response without a tap (all or none).
         drift: by how much the log of evoked MEPs will have changed after many trials.
         startup: how strongly the first trials startle; 1 is `STARTUP`.
+        slope: of the drive by intensity, in logits per % RMT (recruitment).
     """
 
     kind: Tensor
@@ -114,6 +114,7 @@ class Response(NamedTuple):
     rest_probability: Tensor
     drift: Tensor
     startup: Tensor
+    slope: Tensor
 
 
 def log_gain(response: Response, order: Tensor) -> Tensor:

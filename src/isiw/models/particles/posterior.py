@@ -5,31 +5,23 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Generic, Protocol, Self, TypeVar
-
-import torch
+from typing import Generic, Protocol, Self, TypeVar
 
 from isiw.design import DesignSpace
+from isiw.lazy import torch
+from isiw.models.particles.engine import Engine
 from isiw.models.particles.moves import L
 from isiw.models.particles.prior import Person
 from isiw.models.particles.swarm import Swarm
-from isiw.models.protocol import DTYPE, Observation, Tensor
+from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.history import observed
 
 __all__ = ["SwarmPosterior"]
 
 
-class _Prior(Protocol):
-    """What is asked of a prior over people."""
-
-    def person(self, latents: Any) -> Person: ...
-
-
 class _Model(Protocol):
     """What is asked of a model's settings."""
 
-    @property
-    def prior(self) -> _Prior: ...
     @property
     def detection_limit_mv(self) -> float: ...
     @property
@@ -57,17 +49,19 @@ class SwarmPosterior(ABC, Generic[M, L]):
         space: the design space.
         seed: seed of all randomness.
         swarm: the particles.
+        engine: what computes with them.
     """
 
     model: M
     space: DesignSpace
     seed: int
     swarm: Swarm[L]
+    engine: Engine[L]
 
-    @cached_property
+    @property
     def person(self) -> Person:
         """What the particles mean."""
-        return self.model.prior.person(self.swarm.latents)
+        return self.engine.meaning(self.swarm.latents)[0]
 
     @cached_property
     @abstractmethod
@@ -101,8 +95,8 @@ class SwarmPosterior(ABC, Generic[M, L]):
             observation: the trial.
         """
         known = self.model.detection_limit_mv, self.model.response_threshold_mv
-        trial = observed(observation, *known, order=self.trials).to(self.device, DTYPE)
-        return replace(self, swarm=self.swarm.told(trial, self.person))
+        trial = observed(observation, *known, order=self.trials).to(self.device, torch.float32)
+        return replace(self, swarm=self.swarm.told(trial, self.engine))
 
     def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> Self:
         """The same particles, weighted by an imagined trial; see `Conditions`."""
@@ -110,15 +104,15 @@ class SwarmPosterior(ABC, Generic[M, L]):
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
-        return self.sample.outcome_mass(isi_ms.to(self.device, DTYPE))
+        return self.sample.outcome_mass(isi_ms.to(self.device, torch.float32))
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows; see `SamplesWindows`."""
-        return self.sample.window_masks(isi_ms.to(self.device, DTYPE))
+        return self.sample.window_masks(isi_ms.to(self.device, torch.float32))
 
     def profiles_mv(self, isi_ms: Tensor) -> Tensor:
         """Sampled profiles; see `SamplesProfiles`."""
-        return self.sample.expected_mep_mv(isi_ms.to(self.device, DTYPE))
+        return self.sample.expected_mep_mv(isi_ms.to(self.device, torch.float32))
 
     def baselines_mv(self) -> Tensor:
         """Sampled baselines; see `SamplesProfiles`."""

@@ -12,10 +12,9 @@ from dataclasses import astuple, dataclass, field
 from functools import cached_property
 from typing import Final, NamedTuple
 
-import torch
-
 from isiw.checks import choice
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles.latents import BLOCKS, LATENTS, RECTIFIED, Latents, latents_of
 from isiw.models.particles.laws import (
     FOREARM,
@@ -35,7 +34,7 @@ from isiw.models.particles.noise import NoiseKind, Response, recruits
 from isiw.models.particles.places import mixture_of
 from isiw.models.particles.profile import ProfilePrior
 from isiw.models.particles.shapes import Shape
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale
 
 __all__ = ["Depression", "Person", "Prior"]
@@ -137,7 +136,7 @@ class Prior:
     def spreads(self) -> Tensor:
         """Usual SD of each latent, shape (d,)."""
         first = self.profile.start.spans[0]
-        parts = [torch.tensor([first.high_ms - first.low_ms], dtype=DTYPE) / math.sqrt(12.0)]
+        parts = [torch.tensor([first.high_ms - first.low_ms], dtype=torch.float32) / math.sqrt(12.0)]
         return torch.cat(parts + [self.mixtures[name].sds[0] for name in BLOCKS if name != "start"])
 
     def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> Latents:
@@ -150,11 +149,11 @@ class Prior:
             space: the design space that the window is in.
         """
         size = (people, particles)
-        uniform = torch.rand((4, *size), generator=generator, dtype=DTYPE, device=generator.device)
+        uniform = torch.rand((4, *size), generator=generator, dtype=torch.float32, device=generator.device)
         start_ms = self.profile.start.start_ms(uniform[3], space).unsqueeze(-1)
         values = torch.cat([start_ms, self._joint.sample(size, generator)], dim=-1)
         if self.profile.p_place:
-            chance = torch.rand((*size, 1), generator=generator, dtype=DTYPE, device=generator.device)
+            chance = torch.rand((*size, 1), generator=generator, dtype=torch.float32, device=generator.device)
             known, place = chance < self.profile.p_place, self._joint_place.sample(size, generator)
             values = torch.cat([torch.where(known, place, values[..., :2]), values[..., 2:]], dim=-1)
         shape, noise = drawn(astuple(self.profile.shapes), uniform[0]), drawn(astuple(self.noise), uniform[1])
@@ -294,6 +293,7 @@ class Prior:
             rest_probability=torch.sigmoid(z["switched_off"]),
             drift=z["drift"],
             startup=z["startup"],
+            slope=slope,
         )
 
 

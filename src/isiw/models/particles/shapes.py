@@ -9,8 +9,7 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
-import torch
-
+from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
 __all__ = ["Shape", "ShapeKind", "facilitation", "highest_facilitation"]

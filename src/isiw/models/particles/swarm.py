@@ -10,13 +10,11 @@ import math
 from dataclasses import dataclass, replace
 from typing import Generic
 
-import torch
-
 from isiw.checks import check_probabilities, check_wholes
+from isiw.lazy import torch
 from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
-from isiw.models.particles.likelihood import total_log_likelihood
-from isiw.models.particles.moves import L, Mover, Target
-from isiw.models.particles.prior import Person
+from isiw.models.particles.engine import Engine
+from isiw.models.particles.moves import L
 from isiw.models.protocol import Tensor
 from isiw.models.randomness import systematic
 from isiw.models.shared.history import History
@@ -106,14 +104,14 @@ class Swarm(Generic[L]):
         """
         return replace(self, log_weights=torch.log_softmax(self.log_weights + log_ratio, dim=-1))
 
-    def told(self, trial: History, person: Person) -> Swarm[L]:
+    def told(self, trial: History, engine: Engine[L]) -> Swarm[L]:
         """The same particles, weighted by one more trial as well.
 
         Args:
             trial: the trial of each person.
-            person: what the particles mean.
+            engine: what computes their likelihood.
         """
-        gain = total_log_likelihood(person, trial)
+        gain = engine.log_likelihood(self.latents, trial)
         log_weights = self.log_weights + gain
         return replace(
             self,
@@ -123,11 +121,11 @@ class Swarm(Generic[L]):
             history=self.history.appended(trial),
         )
 
-    def moved(self, target: Target[L], moves: Moving, generator: torch.Generator) -> Swarm[L]:
+    def moved(self, engine: Engine[L], moves: Moving, generator: torch.Generator) -> Swarm[L]:
         """The particles after the moves that follow a trial, resampled where too few carried the posterior.
 
         Args:
-            target: whose posterior they move under.
+            engine: what moves them.
             moves: how often they move, and when they are resampled.
             generator: source of randomness.
         """
@@ -135,9 +133,15 @@ class Swarm(Generic[L]):
         worn = ess < moves.min_ess
         fresh = self._resampled(worn, generator)
         sweeps = moves.sweeps_after(self.trials, resampled=bool(worn.any()))
-        moved = Mover(target, self.history, generator).sweeps(sweeps, fresh.latents, fresh.log_likelihood)
+        moved = engine.sweeps(sweeps, fresh.latents, fresh.log_likelihood, self.history, generator)
         health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))
         return replace(fresh, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
+
+    def of_person(self, person: int) -> Swarm[L]:
+        """The particles of one person."""
+        one = slice(person, person + 1)
+        latents = self.latents.remade(field[one] for field in self.latents)
+        return replace(self, latents=latents, log_weights=self.log_weights[one])
 
     def picked(self, size: int) -> L:
         """Equally weighted particles that represent the same posterior, fields of shape (b, s).

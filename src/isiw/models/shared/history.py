@@ -4,15 +4,34 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-import torch
 
 from isiw.errors import StrategyError
-from isiw.models.protocol import DTYPE, Observation, Tensor
+from isiw.lazy import torch
+from isiw.models.protocol import Observation, Tensor
 from isiw.types import FloatArray
 
-__all__ = ["AmplitudeHistory", "History", "PersonTrials", "observed"]
+__all__ = ["AmplitudeHistory", "Circumstances", "History", "PersonTrials", "observed"]
+
+
+class Circumstances(NamedTuple):
+    """What else is known to bear on the amplitude of a trial; neutral by default, and nothing sets it yet.
+
+    Args:
+        known_mv: a part of the amplitude that is not the pulse's, such as the tap's own response [mV].
+        known_sd_mv: its SD [mV].
+        log_offset: by how much evoked MEPs are larger than usual, natural log.
+        shift_pct_rmt: by how much the pulse is stronger than usual [% RMT].
+        enhancement: the share of its usual enhancement that the conditioning stimulus has.
+    """
+
+    known_mv: float = 0.0
+    known_sd_mv: float = 0.0
+    log_offset: float = 0.0
+    shift_pct_rmt: float = 0.0
+    enhancement: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +44,8 @@ class History:
         log_mep: lower end of the log MEP, shape (b, n).
         log_mep_high: upper end, shape (b, n).
         order: how many trials were told before each, shape (b, n).
+        circumstances: the fields of `Circumstances`, shape (b, n, 5); None where all are neutral. The compiled kernels
+            know them, torch does not.
     """
 
     isi_ms: Tensor
@@ -32,6 +53,7 @@ class History:
     log_mep: Tensor
     log_mep_high: Tensor
     order: Tensor
+    circumstances: Tensor | None = None
 
     @classmethod
     def empty(cls, people: int, device: torch.device) -> History:
@@ -41,11 +63,11 @@ class History:
             people: how many, b.
             device: torch device.
         """
-        return cls(*(torch.empty((people, 0), dtype=DTYPE, device=device) for _ in range(5)))
+        return cls(*(torch.empty((people, 0), dtype=torch.float32, device=device) for _ in range(5)))
 
     @property
     def columns(self) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
-        """All of it, in order."""
+        """Everything but the circumstances, in order."""
         return self.isi_ms, self.isi_sd_ms, self.log_mep, self.log_mep_high, self.order
 
     def to(self, device: torch.device | str, dtype: torch.dtype) -> History:
@@ -59,7 +81,17 @@ class History:
 
     def appended(self, trial: History) -> History:
         """This history and one more trial."""
-        return History(*(torch.cat(pair, dim=-1) for pair in zip(self.columns, trial.columns, strict=True)))
+        both = History(*(torch.cat(pair, dim=-1) for pair in zip(self.columns, trial.columns, strict=True)))
+        if self.circumstances is None and trial.circumstances is None:
+            return both
+        return replace(both, circumstances=torch.cat((self.around, trial.around), dim=1))
+
+    @property
+    def around(self) -> Tensor:
+        """The circumstances of all trials, shape (b, n, 5)."""
+        if self.circumstances is not None:
+            return self.circumstances
+        return self.isi_ms.new_tensor(Circumstances()).expand(*self.isi_ms.shape, -1)
 
 
 def observed(observation: Observation, detection_limit_mv: float, response_threshold_mv: float, order: int) -> History:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-import torch
-
 from isiw.errors import InvalidValueError
+from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
 __all__ = ["Scale", "check_scales"]

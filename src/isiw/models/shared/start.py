@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final, NamedTuple
 
-import torch
-
 from isiw.checks import ascending, check_numbers, check_probabilities, mean_and_sd, require_sum_of_one
 from isiw.design import DesignSpace
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.lazy import torch
+from isiw.models.protocol import Tensor
 
 __all__ = ["TAP_SPANS", "Span", "StartPrior"]
 
@@ -114,6 +113,15 @@ class StartPrior:
         law = _law(space, self, quantile.dtype, quantile.device)
         return law.start_ms.at(quantile)
 
+    def knots(self, space: DesignSpace) -> tuple[Tensor, Tensor, Tensor]:
+        """Evenly spaced starts in a space [ms], the density there, and the probability of an earlier one; shape (k,).
+
+        Args:
+            space: the design space.
+        """
+        law = _law(space, self, torch.float32, torch.device("cpu"))
+        return law.density.x, law.density.y, law.start_ms.x
+
     def log_density(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
         """Log density at some starts, same shape; -inf where no start can be.
 
@@ -194,7 +202,7 @@ class _Law(NamedTuple):
 def _law(space: DesignSpace, prior: StartPrior, dtype: torch.dtype, device: torch.device) -> _Law:
     low_ms, high_ms = space.low_ms - BEFORE_MS, space.high_ms
     knots = min(MAX_KNOTS, math.ceil((high_ms - low_ms) / KNOT_MS) + 1)
-    knots_ms = torch.linspace(low_ms, high_ms, knots, dtype=DTYPE).double()
+    knots_ms = torch.linspace(low_ms, high_ms, knots, dtype=torch.float32).double()
     expected = torch.stack([span.share * span.density(knots_ms) for span in prior.in_space(space)]).sum(0)
     even = torch.full_like(knots_ms, 1.0 / (high_ms - low_ms))
     mixed = (1.0 - prior.p_anywhere) * expected + prior.p_anywhere * even

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-import torch
-
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.lazy import torch
+from isiw.models.protocol import Tensor
 
 __all__ = ["ISI_NODES", "LEVELS", "OUTCOMES", "interpolated", "table_levels"]
 
@@ -22,7 +21,7 @@ OUTCOMES = 24
 
 def table_levels(device: torch.device) -> Tensor:
     """Facilitations at which tables are worked out, denser where responses begin, shape (l,)."""
-    return torch.linspace(0.0, 1.0, LEVELS, dtype=DTYPE, device=device).square()
+    return torch.linspace(0.0, 1.0, LEVELS, dtype=torch.float32, device=device).square()
 
 
 def interpolated(table: Tensor, level: Tensor) -> Tensor:

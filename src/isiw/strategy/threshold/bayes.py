@@ -8,10 +8,9 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from scipy.special import logsumexp
-from scipy.stats import norm
 
 from isiw.checks import check_numbers, check_wholes
+from isiw.lazy import scipy
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief, log_likelihood
@@ -61,9 +60,9 @@ class BayesThreshold:
             pulses: what was told so far.
         """
         told = sum((_told(self.curves, pulse) for pulse in pulses), start=np.zeros((1, 1)))
-        prior = norm.logpdf(THRESHOLDS_PCT_MSO, self.prior_mean_pct_mso, self.prior_sd_pct_mso)
-        log = prior + logsumexp(told, axis=1)
-        return np.asarray(np.exp(log - logsumexp(log)))
+        prior = scipy.stats.norm.logpdf(THRESHOLDS_PCT_MSO, self.prior_mean_pct_mso, self.prior_sd_pct_mso)
+        log = prior + scipy.special.logsumexp(told, axis=1)
+        return np.asarray(np.exp(log - scipy.special.logsumexp(log)))
 
     def ask(self, pulses: Sequence[Pulse], space: IntensityRange) -> float:
         """The intensity that is nearest to the posterior's median."""

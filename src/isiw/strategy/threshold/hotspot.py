@@ -12,10 +12,10 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.special import softmax
 
 from isiw.checks import check_amplitude, check_numbers, check_wholes
 from isiw.errors import InvalidValueError
+from isiw.lazy import scipy
 from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief, log_likelihood
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
@@ -159,7 +159,7 @@ class BayesHotSpot:
         """
         log = sum((_told(self, pulse) for pulse in pulses), start=np.zeros((1, 1, 1)))
         shape = (len(_places(self.half_width_mm, self.step_mm)), len(SPREADS_MM) * len(INTENSITIES_PCT))
-        return np.asarray(softmax(np.broadcast_to(log, (*shape, log.shape[-1]))).sum(axis=-1))
+        return np.asarray(scipy.special.softmax(np.broadcast_to(log, (*shape, log.shape[-1]))).sum(axis=-1))
 
     def ask(self, pulses: Sequence[CoilPulse]) -> tuple[float, float]:
         """The next place of the coil [mm].

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Final
 
 import numpy as np
-from scipy.special import log_ndtr
-from scipy.stats import chi2
 
 from isiw.checks import check_numbers, check_wholes
+from isiw.lazy import scipy
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 from isiw.types import FloatArray
 
 __all__ = ["MaximumLikelihood"]
 
-_DROP: Final = 0.5 * float(chi2.ppf(0.9, 1))  # of the log-likelihood at the ends of a 90 % interval
+_DROP: Final = 0.5 * NormalDist().inv_cdf(0.95) ** 2  # of the log-likelihood at the ends of a 90 % interval
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class MaximumLikelihood:
         intensity = np.array([pulse.intensity_pct_mso for pulse in pulses])[:, None]
         side = np.where([pulse.responded for pulse in pulses], 1.0, -1.0)[:, None]
         z = (intensity - thresholds) / (self.relative_spread * thresholds)
-        return thresholds, np.asarray(log_ndtr(side * z).sum(axis=0))
+        return thresholds, np.asarray(scipy.special.log_ndtr(side * z).sum(axis=0))
 
 
 def _best(thresholds: FloatArray, log_likelihood: FloatArray) -> float:

@@ -12,10 +12,9 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from scipy.special import log_expit, ndtr
-from scipy.stats import norm
 
 from isiw.checks import ascending, check_numbers
+from isiw.lazy import scipy
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
@@ -83,7 +82,7 @@ def log_likelihood(belief: RecruitmentBelief, mep_mv: float | None, *, responded
 
 def _log_evoked(belief: RecruitmentBelief) -> FloatArray:
     """Logarithm of the MEP without noise, by input, slope and amplitude."""
-    log_share = log_expit(np.array(belief.slopes_per_pct) * _INPUTS_PCT[:, None])
+    log_share = scipy.special.log_expit(np.array(belief.slopes_per_pct) * _INPUTS_PCT[:, None])
     return np.asarray(log_share[..., None] + np.log(belief.amplitudes_mv))
 
 
@@ -95,14 +94,14 @@ def _above_floor(belief: RecruitmentBelief, amplitude_mv: float) -> FloatArray:
 def _exceeding(belief: RecruitmentBelief, amplitude_mv: float) -> FloatArray:
     """Probability of a larger MEP without input noise, by input, slope and amplitude."""
     z = (_log_evoked(belief)[..., None] - np.log(_above_floor(belief, amplitude_mv))) / belief.sigma_y
-    return np.asarray(ndtr(z) @ _FLOOR_WEIGHTS)
+    return np.asarray(scipy.special.ndtr(z) @ _FLOOR_WEIGHTS)
 
 
 def _density(belief: RecruitmentBelief, amplitude_mv: float) -> FloatArray:
     """Density of an MEP by its logarithm without input noise, by input, slope and amplitude."""
     evoked_mv = _above_floor(belief, amplitude_mv)
     z = (_log_evoked(belief)[..., None] - np.log(evoked_mv)) / belief.sigma_y
-    return np.asarray(norm.pdf(z) / belief.sigma_y @ (_FLOOR_WEIGHTS * amplitude_mv / evoked_mv))
+    return np.asarray(scipy.stats.norm.pdf(z) / belief.sigma_y @ (_FLOOR_WEIGHTS * amplitude_mv / evoked_mv))
 
 
 def _with_input_noise(belief: RecruitmentBelief, by_input: FloatArray) -> FloatArray:

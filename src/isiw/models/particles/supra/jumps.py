@@ -6,13 +6,19 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
-import torch
+import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.lazy import torch
+from isiw.models.particles.kernels.building import prior_tables
+from isiw.models.particles.kernels.target import Tables
+from isiw.models.particles.latents import LATENTS as DEFAULT_LATENTS
 from isiw.models.particles.mixture import drawn
+from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Person
+from isiw.models.particles.shapes import ShapeKind
 from isiw.models.particles.supra.prior import BLOCKS, LATENTS, SupraLatents, SupraPrior
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 
 __all__ = ["SupraTarget"]
 
@@ -37,6 +43,10 @@ REDRAWN: Final = {
 }
 """The latents that each jump draws anew."""
 
+_OF_A_DEPRESSION: Final = ("depressed_start_ms", "depressed_log_width_ms", "depressed_log_shift")
+_AS_THE_DEFAULT: Final = tuple("log_shift" if n == "log_boost" else n for n in (*DEFAULT_LATENTS, *_OF_A_DEPRESSION))
+"""What the kernels know latents by, in their order."""
+
 
 @dataclass(frozen=True)
 class SupraTarget:
@@ -59,9 +69,48 @@ class SupraTarget:
         """What particles mean."""
         return self.prior.person(latents)
 
+    def tables(self) -> Tables:
+        """What kernels know of the prior and of what moves may do."""
+        cpu, prior = torch.device("cpu"), self.prior
+        of_enhanced, of_depressed = (_latents(*BLOCKS[name], device=cpu) for name in ("enhanced", "depressed"))
+        there = ((False, False), (True, False), (False, True), (True, True))
+        used = torch.stack([(~of_enhanced | up) & (~of_depressed | down) for up, down in there])
+        moves = {
+            "apart": True,
+            "states": np.array([0, 0, 1, 2]),
+            "shifted": _shifted(cpu) & used.unsqueeze(1),
+            "jumps": tuple(JUMPS.values()),
+            "redrawn": _redrawn(cpu),
+            "renewed": np.array([[False, False, jump == "enhanced", jump == "depressed"] for jump in JUMPS]),
+            "of_profile": np.zeros(len(JUMPS), dtype=bool),
+            "kinds": (
+                (1.0,),
+                (1.0,),
+                *((1.0 - p, p) for p in (prior.enhanced.probability, prior.depressed.probability)),
+            ),
+        }
+        at = [LATENTS.index(name) if name in LATENTS else -1 for name in _AS_THE_DEFAULT]
+        return prior_tables(
+            self.space, prior.start, prior.mixtures, starts=2, places=None, at=at, spreads=self.spreads, moves=moves
+        )
+
+    def kinds(self, latents: SupraLatents) -> Tensor:
+        """The kinds of particles, integers of shape (b, p, k)."""
+        enhanced, depressed = latents.enhanced.long(), latents.depressed.long()
+        shape, noise = (torch.full_like(enhanced, kind) for kind in (ShapeKind.GAUSSIAN, NoiseKind.RECRUITMENT))
+        return torch.stack((shape, noise, enhanced, depressed), dim=-1)
+
+    def latents(self, values: Tensor, kinds: Tensor) -> SupraLatents:
+        """Particles from their latents (b, p, d) and kinds (b, p, k)."""
+        return SupraLatents(values, kinds[..., 2].bool(), kinds[..., 3].bool())
+
     def log_prior(self, latents: SupraLatents) -> Tensor:
         """Log prior density of their latents but for a constant, -inf where the segments overlap, shape (b, p)."""
         return self.prior.log_density(latents.values, self.space)
+
+    def log_place(self, latents: SupraLatents) -> Tensor:
+        """Log prior density of the latents, as places have none of their own here, shape (b, p)."""
+        return self.log_prior(latents)
 
     def shifted(self, latents: SupraLatents, part: Tensor) -> Tensor:
         """Which latents a difference moves, shape (b, p, d)."""
@@ -72,7 +121,7 @@ class SupraTarget:
     def jumped(self, latents: SupraLatents, generator: torch.Generator) -> SupraLatents:
         """Particles (n,) with some latents, and whether their segment is there, drawn anew."""
         fresh = self.prior.draw(1, len(latents.enhanced), generator, self.space)
-        uniform = torch.rand(latents.enhanced.shape, generator=generator, dtype=DTYPE, device=generator.device)
+        uniform = torch.rand(latents.enhanced.shape, generator=generator, dtype=torch.float32, device=generator.device)
         jump = drawn(tuple(JUMPS.values()), uniform)
         enhanced, depressed, *_ = (jump == number for number in range(len(JUMPS)))
         return SupraLatents(

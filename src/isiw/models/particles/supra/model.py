@@ -8,19 +8,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import get_args
 
-import torch
-
-from isiw.checks import MOST_OF_A_KIND, check_numbers, check_wholes
+from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.lazy import torch
+from isiw.models.particles.engine import EngineName, engine_for
 from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraLatents, SupraPrior
 from isiw.models.particles.swarm import Moving, Swarm
-from isiw.models.protocol import DTYPE, Observation, Tensor
+from isiw.models.protocol import Observation, Tensor
 from isiw.models.randomness import step_generator
-from isiw.models.windows import SampledProfiles, best_window, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, best_window, profile_grid, sampled_estimate
 from isiw.window import WindowEstimate
 
 __all__ = ["SupraModel", "SupraPosterior"]
@@ -37,6 +38,7 @@ class SupraModel:
         moves: how often particles move, and when they are resampled.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a told response is known to be above [mV].
+        engine: `"compiled"` loops, or `"torch"`, which stands in where there are none.
 
     Raises:
         InvalidValueError: fewer than two particles or more than a memory holds, or an invalid number.
@@ -48,11 +50,13 @@ class SupraModel:
     moves: Moving = field(default_factory=Moving)
     detection_limit_mv: float = 0.005
     response_threshold_mv: float = 0.02
+    engine: EngineName = "compiled"
 
     def __post_init__(self) -> None:
         check_wholes(self, "particles", least=2, most=MOST_OF_A_KIND)  # half of them move at a time
         check_wholes(self, "thinned", least=1, most=MOST_OF_A_KIND)
         check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
+        check_choice(self, "engine", get_args(EngineName))
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> SupraPosterior:
         """The posterior before the first trial.
@@ -63,14 +67,14 @@ class SupraModel:
             people: how many people.
         """
         latents = self.prior.sample(people, self.particles, step_generator("cpu", seed, 0), space)
-        return SupraPosterior(self, space, seed, Swarm.of(latents))
+        engine = engine_for(self.engine, SupraTarget(self.prior, space))
+        return SupraPosterior(self, space, seed, Swarm.of(latents), engine)
 
     def update(self, posterior: SupraPosterior, observation: Observation) -> SupraPosterior:
         """The posterior after one more trial."""
         after = posterior.told(observation)
         generator = step_generator("cpu", posterior.seed, after.trials)
-        target = SupraTarget(self.prior, posterior.space)
-        return replace(after, swarm=after.swarm.moved(target, self.moves, generator))
+        return replace(after, swarm=after.swarm.moved(posterior.engine, self.moves, generator))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +86,7 @@ class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
         space: the design space.
         seed: seed of all randomness.
         swarm: the particles.
+        engine: what computes with them.
     """
 
     @cached_property
@@ -94,7 +99,8 @@ class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
         return self._sample(self.model.particles, 0)
 
     def _sample(self, size: int, order: int) -> SupraSample:
-        return SupraSample(self.model.prior.person(self.swarm.picked(size)), self.space, order)
+        person, records = self.engine.meaning(self.swarm.picked(size))
+        return SupraSample(person, self.space, order, records)
 
     def depressed_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled depressed segments; see `SamplesDepression`."""
@@ -102,12 +108,16 @@ class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person, and the segment in which the tap depresses the MEP."""
-        grid = torch.tensor(self.space.grid_ms, dtype=DTYPE)
-        profiles_mv, baselines_mv = self.sample.expected_mep_mv(profile_grid(self.space)), self.baselines_mv()
-        profiles = SampledProfiles(profiles_mv[person], baselines_mv[person])
-        estimate = sampled_estimate(self._all.window_masks(grid)[person], profiles, self.space)
-        depressed = self._all.depressed_masks(grid)[person]
-        somewhere = depressed.any(-1)
-        probability = float(somewhere.double().mean())
-        segment = best_window(depressed[somewhere], self.space.grid_ms)[0] if probability >= 0.5 else None
-        return replace(estimate, depressed=segment, depressed_probability=probability)
+        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32)
+
+        def profiles() -> SampledProfiles:
+            mep_mv = self.sample.expected_mep_mv(profile_grid(self.space))
+            return SampledProfiles(mep_mv[person], self.baselines_mv()[person])
+
+        enhanced, depressed = (
+            Runs.of_masks(masks(grid)[person]) for masks in (self._all.window_masks, self._all.depressed_masks)
+        )
+        estimate = sampled_estimate(enhanced, profiles, self.space)
+        probability = len(depressed.found) / depressed.samples
+        segment = best_window(depressed, self.space.grid_ms)[0] if probability >= 0.5 else None
+        return estimate.noting(depressed=segment, depressed_probability=probability)

@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import torch
-
 from isiw.design import DesignSpace
-from isiw.models.particles.likelihood import levels
-from isiw.models.particles.noise import evoked_mean
-from isiw.models.particles.predictions import outcome_table
+from isiw.lazy import torch
 from isiw.models.particles.prior import Person
-from isiw.models.protocol import DTYPE, Tensor
-from isiw.models.shared.tables import LEVELS, interpolated
+from isiw.models.particles.tables import FacilitationTables
+from isiw.models.protocol import Tensor
 from isiw.models.windows import least_excess_mv
+from isiw.types import FloatArray
 from isiw.window import LEAST_DEPRESSED_MV
 
 __all__ = ["SupraSample"]
@@ -31,50 +28,33 @@ class SupraSample:
         person: the particles, with a depression, fields of shape (b, s).
         space: the design space, in whose range segments are looked for.
         order: how many trials came before the next one.
+        records: the same particles as kernels have them; None where torch computes.
     """
 
     person: Person
     space: DesignSpace
     order: int = 0
+    records: FloatArray | None = None
 
     @cached_property
-    def _depth(self) -> Tensor:
-        """Facilitation at the deepest depression is minus this, shape (b, s)."""
-        assert self.person.depression is not None  # noqa: S101 - a promise of ours, not a user's input
-        return self.person.depression.depth
-
-    @cached_property
-    def _levels(self) -> Tensor:
-        """Facilitation from the deepest depression to the largest enhancement, in equal steps, shape (b, s, l)."""
-        share = torch.linspace(0.0, 1.0, LEVELS, dtype=DTYPE, device=self._depth.device)
-        return share * (1.0 + self._depth.unsqueeze(-1)) - self._depth.unsqueeze(-1)
-
-    @cached_property
-    def _evoked(self) -> Tensor:
-        """Expected MEP above the floor at the tables' levels, in floors, shape (b, s, l)."""
-        return evoked_mean(self.person.response, self._levels)
-
-    def _at(self, table: Tensor, level: Tensor) -> Tensor:
-        """What lies between the rows of a table (b, s, l, y) at facilitations (b, s, t), shape (b, s, t, y)."""
-        depth = self._depth.unsqueeze(-1)
-        # `interpolated` has its rows at the squares of equal steps.
-        return interpolated(table, ((level + depth) / (1.0 + depth)).clamp(0.0, 1.0).square())
+    def _tables(self) -> FacilitationTables:
+        return FacilitationTables(self.person, self.records)
 
     def _mean_mv(self, level: Tensor) -> Tensor:
         """Expected MEP [mV] by facilitation (b, s, t), of the same shape."""
         response = self.person.response
-        floors = self._at(self._evoked.unsqueeze(-1), level).squeeze(-1)
+        floors = self._tables.at(self._tables.evoked.unsqueeze(-1), level).squeeze(-1)
         rest = torch.exp(0.5 * response.floor_log_sd.square()).unsqueeze(-1)
         return response.log_floor.exp().unsqueeze(-1) * (floors + rest)
 
     def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
         """Expected MEP [mV], shape (b, s, t)."""
-        return self._mean_mv(levels(self.person, isi_ms.unsqueeze(0)))
+        return self._mean_mv(self._tables.levels(isi_ms))
 
     @cached_property
     def _baseline_mv(self) -> Tensor:
         """Expected MEP without a tap [mV], shape (b, s, 1)."""
-        return self._mean_mv(torch.zeros_like(self._depth).unsqueeze(-1))
+        return self._mean_mv(torch.zeros_like(self.person.response.log_floor).unsqueeze(-1))
 
     def baselines_mv(self) -> Tensor:
         """Expected MEP without a tap [mV], shape (b, s)."""
@@ -84,7 +64,9 @@ class SupraSample:
     def _extremes_mv(self) -> tuple[Tensor, Tensor]:
         """Largest excess over the baseline and largest deficit in the range [mV], each of shape (b, s, 1)."""
         points = min(MOST_RANGE_POINTS, len(self.space.grid_ms))
-        range_ms = torch.linspace(self.space.low_ms, self.space.high_ms, points, dtype=DTYPE, device=self._depth.device)
+        range_ms = torch.linspace(
+            self.space.low_ms, self.space.high_ms, points, dtype=torch.float32, device=self._baseline_mv.device
+        )
         excess_mv = self.expected_mep_mv(range_ms) - self._baseline_mv
         return excess_mv.amax(-1, keepdim=True), -excess_mv.amin(-1, keepdim=True)
 
@@ -102,8 +84,8 @@ class SupraSample:
 
     @cached_property
     def _outcome_table(self) -> Tensor:
-        return outcome_table(self.person.response, self._levels, self._evoked, self.order)
+        return self._tables.outcomes(self.order)
 
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
-        return self._at(self._outcome_table, levels(self.person, isi_ms.unsqueeze(0)))
+        return self._tables.at(self._outcome_table, self._tables.levels(isi_ms))

@@ -13,17 +13,16 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final, NamedTuple
 
-import torch
-
 from isiw.checks import check_probabilities
 from isiw.design import DesignSpace
+from isiw.lazy import torch
 from isiw.models.particles.laws import Floor, SessionPrior, check_laws
 from isiw.models.particles.mixture import JointMixture, Mixture
 from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.prior import Depression, Person
 from isiw.models.particles.profile import Width
 from isiw.models.particles.shapes import Shape, ShapeKind
-from isiw.models.protocol import DTYPE, Tensor
+from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.models.shared.start import Span, StartPrior
 
@@ -168,7 +167,7 @@ class SupraPrior:
         check_laws(self, "curves", "floors")
 
     @cached_property
-    def _mixtures(self) -> tuple[Mixture, ...]:
+    def mixtures(self) -> tuple[Mixture, ...]:
         """What is believed of each latent but the starts, in the order of `LATENTS`."""
         startup = self.session.startup
         session = [(0.0, self.session.drift_sd), (startup.median, startup.sd)]
@@ -181,14 +180,14 @@ class SupraPrior:
 
     @cached_property
     def _joint(self) -> JointMixture:
-        return JointMixture(list(self._mixtures))
+        return JointMixture(list(self.mixtures))
 
     @cached_property
     def spreads(self) -> Tensor:
         """Usual SD of each latent, shape (d,)."""
         first = self.start.spans[0]
-        starts = torch.full((2,), (first.high_ms - first.low_ms) / math.sqrt(12.0), dtype=DTYPE)
-        return torch.cat([starts, *(mixture.sds[0] for mixture in self._mixtures)])
+        starts = torch.full((2,), (first.high_ms - first.low_ms) / math.sqrt(12.0), dtype=torch.float32)
+        return torch.cat([starts, *(mixture.sds[0] for mixture in self.mixtures)])
 
     def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> SupraLatents:
         """Particles of the prior.
@@ -215,7 +214,7 @@ class SupraPrior:
             space: the design space that the segments are in.
         """
         size = (people, particles)
-        uniform = torch.rand((4, *size), generator=generator, dtype=DTYPE, device=generator.device)
+        uniform = torch.rand((4, *size), generator=generator, dtype=torch.float32, device=generator.device)
         starts_ms = self.start.start_ms(uniform[:2], space).movedim(0, -1)
         values = torch.cat([starts_ms, self._joint.sample(size, generator)], dim=-1)
         return SupraLatents(values, uniform[2] < self.enhanced.probability, uniform[3] < self.depressed.probability)
@@ -279,4 +278,5 @@ def _response(z: dict[str, Tensor]) -> Response:
         rest_probability=nothing,
         drift=z["drift"],
         startup=z["startup"],
+        slope=slope,
     )

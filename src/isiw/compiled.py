@@ -1,0 +1,249 @@
+"""Compiled loops: the decorator of kernels, and the elementary functions that they are made of.
+
+Kernels are plain functions over arrays, compiled by Numba when they are first called and kept on disk. Where Numba
+cannot be imported, `AVAILABLE` is False and torch computes in their place. The elementary functions are polynomials in
+single precision, because loops over them become vector instructions, and loops over those of a library do not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import sys
+import threading
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import numpy as np
+
+__all__ = [
+    "AVAILABLE",
+    "KERNELS",
+    "LANES",
+    "exp",
+    "exp2",
+    "first_of",
+    "inlined",
+    "kernel",
+    "log",
+    "loop",
+    "ndtr",
+    "per",
+    "per_root",
+    "total",
+    "version",
+]
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+KERNELS: Final = 1
+"""Version of the kernels: it grows if the same draws come to other numbers."""
+
+LANES: Final = 16
+"""Trials or ISIs that a kernel computes side by side; arrays are padded to a multiple of it."""
+
+SLOW_S: Final = 1.5
+"""Kernels that are on disk are loaded faster than this."""
+
+_SAFE: Final = {"contract", "arcp", "afn", "nsz"}
+"""What the compiler may do to numbers. It may not reorder sums: p a + (1 - p) b would lose a small a."""
+
+AVAILABLE: Final = importlib.util.find_spec("numba") is not None and os.environ.get("ISIW_ENGINE") != "torch"
+"""Whether there are compiled kernels here; the environment variable ISIW_ENGINE=torch does without them."""
+
+
+def version() -> str:
+    """The version of the compiled kernels, and of what compiles them; `"torch"` where there are none."""
+    if not AVAILABLE:
+        return "torch"
+    import numba  # noqa: PLC0415 - it takes a second, and only those who compute need it
+
+    return f"compiled {KERNELS}, numba {numba.__version__}"
+
+
+def kernel(function: F) -> F:
+    """Have a function compiled when it is first called; without Numba it is left as it is.
+
+    Args:
+        function: a plain function over arrays and numbers.
+    """
+    return _compiled(function, _SAFE)
+
+
+def loop(function: F) -> F:
+    """As `kernel`, for functions that make no arrays: looking at a part of one costs nothing there.
+
+    Args:
+        function: a plain function over arrays and numbers, which assigns no slices.
+    """
+    return _compiled(function, _SAFE, _nrt=False)
+
+
+def inlined(function: F) -> F:
+    """As `loop`, for functions that become a part of those that call them: with many arrays a call is dear.
+
+    Args:
+        function: as for `loop`.
+    """
+    return _compiled(function, _SAFE, _nrt=False, forceinline=True)
+
+
+@cache
+def _sources() -> str:
+    """What the kernels depend on, in short: Numba itself notices changes of a function's own file only."""
+    folder = Path(__file__).parent
+    files = sorted([Path(__file__), *folder.glob("models/particles/**/*.py"), *folder.glob("acquisition/kernels.py")])
+    return hashlib.blake2b(b"".join(file.read_bytes() for file in files), digest_size=6).hexdigest()
+
+
+def _compiled(function: F, fastmath: set[str], **more: bool) -> F:
+    if not AVAILABLE:
+        return function
+    import numba  # noqa: PLC0415 - see above
+
+    function.__qualname__ = f"{function.__name__}_{_sources()}"  # which the file on disk is named after
+
+    # Errors are numpy's: a check of each divisor is no vector instruction.
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, **more}
+    try:
+        compiled: F = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # there is no folder to keep it in
+        compiled = numba.njit(**options)(function)
+    return compiled
+
+
+@contextmanager
+def first_of(family: str) -> Generator[None, None, None]:
+    """Write a line to standard error if the first call of some kernels takes so long that they are being compiled.
+
+    Args:
+        family: what is called; it is watched once.
+    """
+    if family in _CALLED or not AVAILABLE:
+        yield
+        return
+    _CALLED.add(family)
+    said = threading.Timer(SLOW_S, sys.stderr.write, (f"isiw compiles its {family}, once on this machine …\n",))
+    said.daemon = True
+    said.start()
+    try:
+        yield
+    finally:
+        said.cancel()
+
+
+_CALLED: Final[set[str]] = set()
+
+if AVAILABLE:
+    from llvmlite import ir
+    from numba import types
+    from numba.extending import intrinsic
+
+    def _reinterpreted(given: Any, made: Any, llvm: Any) -> Callable[..., Any]:
+        def typed(_context: Any, value: Any) -> Any:
+            def built(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+                return builder.bitcast(arguments[0], llvm)
+
+            return (made(given), built) if value == given else None
+
+        return intrinsic(typed)
+
+    _float_of = _reinterpreted(types.int32, types.float32, ir.FloatType())
+    _bits_of = _reinterpreted(types.float32, types.int32, ir.IntType(32))
+else:
+
+    def _float_of(bits: np.int32) -> np.float32:
+        return np.int32(bits).view(np.float32)
+
+    def _bits_of(number: np.float32) -> np.int32:
+        return np.float32(number).view(np.int32)
+
+
+_ONE, _HALF, _MOST = np.float32(1.0), np.float32(0.5), np.float32(126.0)
+_TWO, _THREE_HALVES = np.float32(2.0), np.float32(1.5)
+_LOG2E, _LN2 = np.float32(1.4426950408889634), np.float32(0.6931471805599453)
+_E1, _E2, _E3 = np.float32(0.6931472067), np.float32(0.2402264923), np.float32(0.0555032721)
+_E4, _E5, _E6 = np.float32(0.0096184373), np.float32(0.0013400429), np.float32(0.0001546976)
+_SQRT_HALF = np.float32(0.70710678)
+_L0, _L1, _L2 = np.float32(7.0376836292e-2), np.float32(-1.1514610310e-1), np.float32(1.1676998740e-1)
+_L3, _L4, _L5 = np.float32(-1.2420140846e-1), np.float32(1.4249322787e-1), np.float32(-1.6668057665e-1)
+_L6, _L7, _L8 = np.float32(2.0000714765e-1), np.float32(-2.4999993993e-1), np.float32(3.3333331174e-1)
+_TINY = np.float32(1.1754944e-38)
+_N0, _N1, _N2 = np.float32(-1.26551223), np.float32(1.00002368), np.float32(0.37409196)
+_N3, _N4, _N5 = np.float32(0.09678418), np.float32(-0.18628806), np.float32(0.27886807)
+_N6, _N7, _N8, _N9 = np.float32(-1.13520398), np.float32(1.48851587), np.float32(-0.82215223), np.float32(0.17087277)
+_ROOT_HALF, _FAR = np.float32(0.70710678), np.float32(9.0)
+
+
+@inlined
+def exp2(x: Any) -> Any:
+    """Power of 2, in single precision; beyond ±126 as at ±126."""
+    inside = min(max(x, -_MOST), _MOST)
+    whole = np.floor(inside + _HALF)
+    f = inside - whole
+    power = _ONE + f * (_E1 + f * (_E2 + f * (_E3 + f * (_E4 + f * (_E5 + f * _E6)))))
+    return power * _float_of(np.int32((np.int32(whole) + 127) << 23))
+
+
+@inlined
+def exp(x: Any) -> Any:
+    """Power of e, in single precision."""
+    return exp2(x * _LOG2E)
+
+
+@inlined
+def log(x: Any) -> Any:
+    """Natural logarithm of a positive number, in single precision."""
+    bits = _bits_of(max(x, _TINY))
+    exponent = np.float32(np.int32((bits >> 23) - 126))
+    mantissa = _float_of(np.int32((bits & 0x007FFFFF) | 0x3F000000))
+    low = mantissa < _SQRT_HALF
+    exponent = exponent - _ONE if low else exponent
+    m = (mantissa + mantissa if low else mantissa) - _ONE
+    tail = _L5 + m * (_L4 + m * (_L3 + m * (_L2 + m * (_L1 + m * _L0))))
+    square = m * m
+    return m - _HALF * square + square * m * (_L8 + m * (_L7 + m * (_L6 + m * tail))) + exponent * _LN2
+
+
+@inlined
+def per(x: Any) -> Any:
+    """1 / x of a positive number, in single precision: by Newton's method, as dividers are slow."""
+    y = _float_of(np.int32(0x7EF311C7 - _bits_of(x)))
+    y = y * (_TWO - x * y)
+    y = y * (_TWO - x * y)
+    return y * (_TWO - x * y)
+
+
+@inlined
+def per_root(x: Any) -> Any:
+    """1 / √x of a positive number, likewise."""
+    half = _HALF * x
+    y = _float_of(np.int32(0x5F3759DF - (_bits_of(x) >> 1)))
+    y = y * (_THREE_HALVES - half * y * y)
+    y = y * (_THREE_HALVES - half * y * y)
+    return y * (_THREE_HALVES - half * y * y)
+
+
+@inlined
+def ndtr(x: Any) -> Any:
+    """Probability that a standard normal variable is below x, in single precision (relative error 2e-7)."""
+    z = min(abs(x), _FAR) * _ROOT_HALF
+    t = _ONE / (_ONE + _HALF * z)
+    tail = _N4 + t * (_N5 + t * (_N6 + t * (_N7 + t * (_N8 + t * _N9))))
+    beyond = _HALF * t * exp(_N0 - z * z + t * (_N1 + t * (_N2 + t * (_N3 + t * tail))))
+    return beyond if x < 0 else _ONE - beyond
+
+
+def _total(values: Any, count: int) -> Any:
+    """Sum of the first values, in any order."""
+    total = np.float32(0.0)
+    for i in range(count):
+        total += values[i]
+    return total
+
+
+total = _compiled(_total, _SAFE | {"reassoc"}, _nrt=False)

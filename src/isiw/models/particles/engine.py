@@ -1,0 +1,173 @@
+"""Who computes with particles: torch, or compiled loops on one processor; both have the same law.
+
+The same seed leads to other draws with each, so that a log states which it was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Generic, Literal, Protocol, TypeAlias
+
+from isiw.compiled import AVAILABLE, first_of
+from isiw.lazy import torch
+from isiw.models.particles.kernels import likelihood as compiled
+from isiw.models.particles.kernels.moves import OWN_DRAWS, log_places, records, sweep
+from isiw.models.particles.kernels.records import columns_of, person_of
+from isiw.models.particles.kernels.target import Tables
+from isiw.models.particles.likelihood import total_log_likelihood
+from isiw.models.particles.moves import L, Moved, Mover, Target
+from isiw.models.particles.prior import Person
+from isiw.models.protocol import Tensor
+from isiw.models.shared.history import History
+from isiw.types import FloatArray, IntArray
+
+__all__ = ["Compiled", "Engine", "EngineName", "TabledTarget", "TorchEngine", "engine_for"]
+
+EngineName: TypeAlias = Literal["compiled", "torch"]
+
+
+class Engine(Protocol[L]):
+    """What particles are weighed and moved by."""
+
+    def meaning(self, latents: L) -> tuple[Person, FloatArray | None]:
+        """What particles mean, and the same as kernels have it; None where torch computes.
+
+        Args:
+            latents: the particles, fields of shape (b, p).
+        """
+
+    def log_likelihood(self, latents: L, history: History) -> Tensor:
+        """Log likelihood of a history under each particle, shape (b, p).
+
+        Args:
+            latents: the particles, fields of shape (b, p).
+            history: trials of b people.
+        """
+
+    def log_places(self, latents: L) -> Tensor:
+        """Log prior density of start and width of each particle but for a constant, shape (b, p)."""
+
+    def sweeps(
+        self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
+    ) -> Moved[L]:
+        """Move every particle some times under the posterior of a history.
+
+        Args:
+            number: how often.
+            latents: particles, fields of shape (b, p); whatever weights they have, they keep.
+            log_likelihood: of the history under each of them, shape (b, p).
+            history: trials of b people.
+            generator: source of randomness.
+        """
+
+
+class TabledTarget(Target[L], Protocol):
+    """A target that kernels know, too: its prior as tables, and its particles as plain arrays."""
+
+    def tables(self) -> Tables:
+        """What kernels know of the prior and of what moves may do."""
+
+    def kinds(self, latents: L) -> Tensor:
+        """The kinds of particles, integers of shape (b, p, k)."""
+
+    def latents(self, values: Tensor, kinds: Tensor) -> L:
+        """Particles as the target has them.
+
+        Args:
+            values: their latents, shape (b, p, d).
+            kinds: their kinds, integers of shape (b, p, k).
+        """
+
+
+def engine_for(name: EngineName, target: TabledTarget[L], device: str = "cpu") -> Engine[L]:
+    """The engine that is wanted, where it can be had; else torch.
+
+    Args:
+        name: which is wanted.
+        target: whose posterior particles move under.
+        device: torch device; kernels compute on the CPU alone.
+    """
+    if name == "torch" or not AVAILABLE or device != "cpu":
+        return TorchEngine(target)
+    return Compiled(target, target.tables())
+
+
+@dataclass(frozen=True)
+class TorchEngine(Generic[L]):
+    """Torch, on any device: what the kernels are tested against.
+
+    Args:
+        target: whose posterior particles move under.
+    """
+
+    target: Target[L]
+
+    def meaning(self, latents: L) -> tuple[Person, None]:
+        """What particles mean; see `Engine`."""
+        return self.target.person(latents), None
+
+    def log_likelihood(self, latents: L, history: History) -> Tensor:
+        """Log likelihood of a history under each particle; see `Engine`."""
+        return total_log_likelihood(self.target.person(latents), history)
+
+    def log_places(self, latents: L) -> Tensor:
+        """Log prior density of start and width of each particle but for a constant; see `Engine`."""
+        return self.target.log_place(latents)
+
+    def sweeps(
+        self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
+    ) -> Moved[L]:
+        """Move every particle some times; see `Engine`."""
+        return Mover(self.target, history, generator).sweeps(number, latents, log_likelihood)
+
+
+@dataclass(frozen=True)
+class Compiled(Generic[L]):
+    """Compiled loops on one processor.
+
+    Args:
+        target: whose posterior particles move under.
+        tables: what the kernels know of it.
+    """
+
+    target: TabledTarget[L]
+    tables: Tables = field(repr=False)
+
+    def meaning(self, latents: L) -> tuple[Person, FloatArray]:
+        """What particles mean; see `Engine`."""
+        with first_of("view of particles"):
+            particles = records(self.tables, *self._arrays(latents))
+        return person_of(particles), particles
+
+    def log_likelihood(self, latents: L, history: History) -> Tensor:
+        """Log likelihood of a history under each particle; see `Engine`."""
+        with first_of("view of particles"):
+            particles = records(self.tables, *self._arrays(latents))
+            return torch.from_numpy(compiled.likelihoods(particles, columns_of(history)))
+
+    def log_places(self, latents: L) -> Tensor:
+        """Log prior density of start and width of each particle but for a constant; see `Engine`."""
+        with first_of("prior"):
+            return torch.from_numpy(log_places(self.tables, latents.values.contiguous().numpy()))
+
+    def sweeps(
+        self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
+    ) -> Moved[L]:
+        """Move every particle some times; see `Engine`."""
+        people, size = log_likelihood.shape
+        values, kinds = (array.copy() for array in self._arrays(latents))
+        found, trials = log_likelihood.numpy().copy(), columns_of(history)
+        counts = torch.zeros((people, 4), dtype=torch.float32)
+        width = OWN_DRAWS + len(self.tables.first) + 4
+        with first_of("moves"):
+            for _ in range(number):
+                uniform = torch.rand((people, size, width), generator=generator, dtype=torch.float32)
+                normal = torch.randn(values.shape, generator=generator, dtype=torch.float32)
+                draws = uniform.numpy(), normal.numpy()
+                counts += torch.from_numpy(sweep(self.tables, trials, values, kinds, found, *draws))
+        shifts, shifted, jumps, jumped = counts.T
+        moved = self.target.latents(torch.from_numpy(values), torch.from_numpy(kinds))
+        return Moved(moved, torch.from_numpy(found), shifted / shifts, jumped / jumps)
+
+    def _arrays(self, latents: L) -> tuple[FloatArray, IntArray]:
+        return latents.values.contiguous().numpy(), self.target.kinds(latents).contiguous().numpy()

@@ -1,0 +1,97 @@
+"""From a model's prior to the tables that kernels know it by."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from isiw.design import DesignSpace
+from isiw.lazy import torch
+from isiw.models.particles.kernels.target import MEANINGS, Tables
+from isiw.models.particles.mixture import Mixture
+from isiw.models.particles.moves import PART_PROBABILITY
+from isiw.models.protocol import Tensor
+from isiw.models.shared.start import StartPrior
+
+__all__ = ["prior_tables"]
+
+_NOT_REACHED: Final = 2.0
+"""No uniform draw is above it."""
+
+
+def prior_tables(
+    space: DesignSpace,
+    start: StartPrior,
+    mixtures: Sequence[Mixture],
+    *,
+    starts: int,
+    places: tuple[float, Mixture] | None,
+    at: Sequence[int],
+    spreads: Tensor,
+    moves: dict[str, Any],
+) -> Tables:
+    """The tables of a prior.
+
+    Args:
+        space: the design space.
+        start: where windows start.
+        mixtures: of the latents that follow, block by block; the first is the width.
+        starts: how many starts there are.
+        places: the share of all places, and their mixture; None where none are expected.
+        at: where the latents of the default are among the model's, from the first on; -1 for those that it lacks.
+        spreads: usual SD of each latent.
+        moves: the tables that say what moves may do: `apart`, `states`, `shifted`, `jumps` (shares), `redrawn`,
+            `renewed`, `of_profile` and `kinds` (shares of the values of each kind).
+    """
+    latents, most = len(spreads), max(len(mixture.shares) for mixture in mixtures)
+    sizes = [mixture.means.shape[-1] for mixture in mixtures]
+    first = [*range(starts), *(starts + np.cumsum([0, *sizes[:-1]]))]
+    size, components = [1] * starts + sizes, [0] * starts + [len(mixture.shares) for mixture in mixtures]
+    log_shares, below = (np.zeros((len(first), most), dtype=np.float32) for _ in range(2))
+    means, sds = np.zeros((most, latents), dtype=np.float32), np.ones((most, latents), dtype=np.float32)
+    for block, mixture in enumerate(mixtures, start=starts):
+        count, span = components[block], slice(first[block], first[block] + size[block])
+        log_shares[block, :count] = (mixture.shares.log() - mixture.sds.log().sum(-1)).numpy()
+        below[block, :count] = mixture.shares.cumsum(-1).numpy()
+        means[:count, span], sds[:count, span] = mixture.means.numpy(), mixture.sds.numpy()
+    if places is not None:
+        # Start and width are one block: anywhere, or in one of the places; only here do the constants matter.
+        log_shares[1] += math.log1p(-places[0]) - 0.5 * math.log(2.0 * math.pi)
+        first, size, components = [0, *first[2:]], [2, *size[2:]], [-components[1], *components[2:]]
+        log_shares, below = log_shares[1:], below[1:]
+    knots = [values.numpy() for values in start.knots(space)]
+    where = np.full(MEANINGS, latents)
+    where[: len(at)] = [latents if index < 0 else index for index in at]
+    most_kinds = max(map(len, moves["kinds"]))
+    law: dict[str, Any] = {"at": where, "spreads": spreads.numpy().copy(), "log_shares": log_shares, "below": below}
+    law |= {"means": means, "sds": sds}
+    law |= {"first": np.array(first), "size": np.array(size), "components": np.array(components)}
+    law |= dict(zip(("start_ms", "density", "quantiles"), knots, strict=True)) | _of_places(places)
+    made: dict[str, Any] = {
+        name: value.numpy() if isinstance(value, torch.Tensor) else value for name, value in moves.items()
+    }
+    made |= {"parts": _edges(PART_PROBABILITY, len(PART_PROBABILITY))}
+    made |= {"jumps": _edges(moves["jumps"], len(moves["jumps"]))}
+    made |= {"kinds": np.stack([_edges(shares, most_kinds) for shares in moves["kinds"]])}
+    return Tables(**law, **made)
+
+
+def _of_places(places: tuple[float, Mixture] | None) -> dict[str, Any]:
+    if places is None:
+        nothing = np.zeros((0, 5), dtype=np.float32)
+        return {"places": nothing, "place_share": 0.0, "place_below": np.zeros(0, dtype=np.float32)}
+    share, law = places
+    scale = math.log(share) + law.shares.log() - law.sds.log().sum(-1) - math.log(2.0 * math.pi)
+    columns = [scale, law.means[:, 0], law.sds[:, 0], law.means[:, 1], law.sds[:, 1]]
+    table = torch.stack(columns, dim=-1).contiguous().numpy()
+    return {"places": table, "place_share": share, "place_below": law.shares.cumsum(-1).numpy()}
+
+
+def _edges(shares: Sequence[float], values: int) -> Any:
+    """Sums of the probabilities of earlier alternatives, from the second on, for so many of them."""
+    edges = np.full(values - 1, _NOT_REACHED, dtype=np.float32)
+    edges[: len(shares) - 1] = np.cumsum(shares)[:-1]
+    return edges

@@ -1,0 +1,400 @@
+"""The likelihood of a history under particles, trial by trial: the mixture of `noise.log_likelihood` in loops.
+
+The innermost loops run over trials, which are padded to whole lanes, so that they become vector instructions.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from isiw.compiled import exp, exp2, kernel, log, loop, ndtr, per, per_root, total
+from isiw.models.particles.kernels.records import (
+    BOOST,
+    DEPTH,
+    DRIFT,
+    FACTOR,
+    FLOOR_SD,
+    FORM,
+    HIGH,
+    ISI,
+    ISI_SD,
+    KNOWN,
+    KNOWN_SD,
+    LEAST,
+    LOG_FLOOR,
+    LOG_RATIO,
+    LOW,
+    LOW_START,
+    LOW_WIDTH,
+    MOST,
+    NOISE,
+    OFFSET,
+    ONSET,
+    OUTPUT_SD,
+    PIECE,
+    PRESENT,
+    REAL,
+    RELAXED,
+    REST,
+    SHAPE,
+    SHIFT,
+    SLOPE,
+    SPREAD,
+    START,
+    STARTLE,
+    STARTLED,
+    WIDTH,
+    trial_records,
+)
+from isiw.models.particles.noise import (
+    BETWEEN_NODES,
+    CORNER,
+    FAR_BELOW,
+    NODE_REACH,
+    NODES,
+    ON_NODES,
+    OUTLIER_LOG_RANGE,
+    OUTLIER_PROBABILITY,
+    STEEPEST_ROOT,
+    NoiseKind,
+)
+from isiw.models.particles.shapes import APART_SD, PEAK_SD, PEAKS_AT, TOGETHER, ShapeKind
+from isiw.models.shared.tables import ISI_NODES
+
+__all__ = ["ROOM", "curve_of", "facilitations", "history_likelihood", "is_curved", "likelihoods"]
+
+ROOM: Final = 14
+"""Rows of numbers that the likelihood of a history needs in between; the last three are of the nodes."""
+
+_f = np.float32
+_NIL, _HALF, _ONE, _TWO = _f(0.0), _f(0.5), _f(1.0), _f(2.0)
+NODES_AT: Final = np.linspace(-NODE_REACH * ON_NODES, NODE_REACH * ON_NODES, NODES).astype(np.float32)
+_DENSITY: Final = np.exp(-0.5 * (NODES_AT.astype(np.float64) / ON_NODES) ** 2)
+NODE_WEIGHTS: Final = (_DENSITY / _DENSITY.sum()).astype(np.float32)
+_SHIFTS: Final = np.array([shift for shift, _ in ISI_NODES], dtype=np.float32)
+_SHARES: Final = np.array([weight for _, weight in ISI_NODES], dtype=np.float32)
+_BETWEEN, _FAR, _CORNER, _STEEPEST = _f(BETWEEN_NODES), _f(FAR_BELOW), _f(CORNER), _f(STEEPEST_ROOT)
+_PLATEAU, _SKEWED, _TWO_PEAK = (_f(kind) for kind in (ShapeKind.PLATEAU, ShapeKind.SKEWED, ShapeKind.TWO_PEAK))
+_MISSING, _ALL_OR_NONE = _f(NoiseKind.MISSING), _f(NoiseKind.ALL_OR_NONE)
+_RECRUITMENT, _RECTIFIED = _f(NoiseKind.RECRUITMENT), _f(NoiseKind.RECTIFIED)
+_FIRST_PEAK, _SECOND_PEAK = _f(PEAKS_AT[0]), _f(PEAKS_AT[1])
+_PEAK_SD, _APART_SD, _TOGETHER = _f(PEAK_SD), _f(APART_SD), _f(TOGETHER)
+_SQUARED = _f(-2.0 / math.log(2.0))
+_FURTHEST = _f(34.0)  # squares of the distance from the peak, in flanks: behind it facilitation is below 1e-29
+_LEAST_SIZE, _LEAST_REACH, _LEAST_MASS = _f(1e-9), _f(1e-12), _f(1e-9)
+_BELL = _f(-0.5 / math.log(2.0))
+_END = _f(11.0)
+_ROOT = _f(1.0 / math.sqrt(2.0 * math.pi))
+_OUT_LOW, _OUT_HIGH = _f(OUTLIER_LOG_RANGE[0]), _f(OUTLIER_LOG_RANGE[1])
+_OUT_DENSITY = _f(1.0 / (OUTLIER_LOG_RANGE[1] - OUTLIER_LOG_RANGE[0]))
+_OUT, _IN = _f(OUTLIER_PROBABILITY), _f(1.0 - OUTLIER_PROBABILITY)
+_TINY, _EVER = _f(1e-6), _f(40.0)
+
+
+@loop
+def is_curved(particle: Any) -> Any:
+    """Whether a particle has a recruitment curve, with a threshold or without."""
+    return particle[NOISE] == _RECRUITMENT or particle[NOISE] == _RECTIFIED
+
+
+@loop
+def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
+    """Write the facilitation of a particle at some ISIs, in 0–1; negative where the tap depresses.
+
+    Args:
+        particle: its record.
+        isi_ms: the ISIs [ms], shape (n,).
+        level: where it is written, shape (n,).
+        count: of how many.
+    """
+    kind, form = particle[SHAPE], particle[FORM]
+    start, width = particle[START], particle[WIDTH]
+    if particle[PRESENT] == _NIL:
+        for i in range(count):
+            level[i] = _NIL
+    elif kind == _TWO_PEAK:
+        apart = abs(form) > _TOGETHER
+        per_sd = _ONE / (_APART_SD if apart else _PEAK_SD)
+        lower = (abs(form) - _TOGETHER) / (_ONE - _TOGETHER) if apart else abs(form) / _TOGETHER
+        lower = _ONE - _f(0.7) * lower
+        first, second = (lower, _ONE) if form < _NIL else (_ONE, lower)
+        for i in range(count):
+            share = (isi_ms[i] - start) / width
+            a, b = (share - _FIRST_PEAK) * per_sd, (share - _SECOND_PEAK) * per_sd
+            a, b = min(a * a, _f(150.0)), min(b * b, _f(150.0))
+            level[i] = first * exp2(_BELL * a) + second * exp2(_BELL * b)
+    else:
+        peak_at = _HALF + _f(0.33) * form if kind == _SKEWED else _HALF
+        rise, fall = -_ONE / (peak_at * width), _ONE / ((_ONE - peak_at) * width)
+        peak = start + peak_at * width
+        if kind == _PLATEAU:
+            power = exp(_f(0.75) * (form + _ONE))
+            for i in range(count):
+                offset = isi_ms[i] - peak
+                offset = max(offset * rise, offset * fall)
+                square = exp(power * log(min(max(offset * offset, _f(1e-12)), _f(1e6))))
+                level[i] = exp2(_SQUARED * min(square, _FURTHEST))
+        else:
+            for i in range(count):
+                offset = isi_ms[i] - peak
+                offset = max(offset * rise, offset * fall)
+                level[i] = exp2(_SQUARED * min(offset * offset, _FURTHEST))
+    if particle[DEPTH] > _NIL:
+        per_flank, depth = _TWO / particle[LOW_WIDTH], particle[DEPTH]
+        middle = particle[LOW_START] + _HALF * particle[LOW_WIDTH]
+        for i in range(count):
+            offset = (isi_ms[i] - middle) * per_flank
+            level[i] -= depth * exp2(_SQUARED * min(offset * offset, _FURTHEST))
+
+
+@loop
+def curve_of(particle: Any, spread: Any, between: Any, room: Any) -> None:
+    """Write the noise on a particle's input at each node, and the variance of what lies between; see `noise._curve`.
+
+    Args:
+        particle: its record.
+        spread: where the nodes are written, in logits, shape (q,).
+        between: where the variance is written, shape (q,).
+        room: for as many numbers.
+    """
+    width = particle[SPREAD]
+    if is_curved(particle):
+        for q in range(NODES):
+            spread[q] = width * NODES_AT[q]
+            between[q] = (_BETWEEN * width) * (_BETWEEN * width)
+        return
+    nodes = len(spread)  # not a constant to the compiler, which would unroll these loops instead of making vectors
+    for q in range(nodes):
+        root = _ONE - width * width / _f(9.0) + NODES_AT[q] * width / _f(3.0)
+        slope = _BETWEEN * width / max(root, _STEEPEST)
+        spread[q] = _f(3.0) * log(max(root, _f(0.02)))
+        between[q] = slope * slope
+    for q in range(nodes):
+        room[q] = NODE_WEIGHTS[q] * exp(spread[q] + _HALF * between[q])
+    shift = log(total(room, nodes)) + _FAR
+    for q in range(nodes):
+        spread[q] -= shift
+
+
+@loop
+def _gains(particle: Any, trials: Any, count: int, work: Any) -> None:
+    """Write the scale of each trial, and the known part of its amplitude; arguments as for `_inputs`."""
+    scale, known, varies = work[2], work[4], work[5]
+    startle, relaxed, offset = trials[STARTLE], trials[RELAXED], trials[OFFSET]
+    told, told_sd = trials[KNOWN], trials[KNOWN_SD]
+    log_scale = particle[LOG_RATIO] + (_NIL if is_curved(particle) else _FAR)
+    drift, startled, per_floor = particle[DRIFT], particle[STARTLED], exp(-particle[LOG_FLOOR])
+    # Few arrays a loop, or the compiler gives up on proving that they do not overlap.
+    for i in range(count):
+        scale[i] = exp(log_scale + drift * relaxed[i] + startled * startle[i] + offset[i])
+    for i in range(count):
+        known[i] = told[i] * per_floor
+    for i in range(count):
+        varies[i] = told_sd[i] * per_floor * (told_sd[i] * per_floor)
+
+
+@loop
+def _inputs(particle: Any, trials: Any, count: int, node: Any, work: Any) -> None:
+    """Write what the nodes of each trial have in common: drive, scale, and the probability of a response.
+
+    Args:
+        particle: its record.
+        trials: their records, shape (TRIAL, PIECE).
+        count: how many there are.
+        node: by how many SDs the ISIs are later than told.
+        work: where it is written: rows 0 facilitation, 1 drive, 2 scale, 3 probability, 4 the known part and 5 its
+            variance, in floors.
+    """
+    level, drive, responds = work[0], work[1], work[3]
+    isi, isi_sd, factor, shift = trials[ISI], trials[ISI_SD], trials[FACTOR], trials[SHIFT]
+    for i in range(count):
+        drive[i] = isi[i] + node * isi_sd[i]
+    facilitations(particle, drive, level, count)
+    for i in range(count):
+        level[i] *= factor[i]
+        responds[i] = _ONE
+    most, least, kind = particle[MOST], particle[LEAST], particle[NOISE]
+    if is_curved(particle):
+        rest, boost, slope = particle[REST], particle[BOOST], particle[SLOPE]
+        for i in range(count):
+            drive[i] = rest + boost * level[i] + slope * shift[i]
+    elif kind == _ALL_OR_NONE:
+        for i in range(count):
+            drive[i] = _NIL
+            responds[i] = least + (most - least) * level[i]
+    else:
+        for i in range(count):
+            drive[i] = log(max(level[i], _LEAST_SIZE))
+            responds[i] = most * math.sqrt(level[i]) if kind == _MISSING else _ONE
+
+
+@loop
+def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, likelihood: Any) -> None:
+    """Write the density of each trial's log MEP, shape (n,).
+
+    Args:
+        particle: its record.
+        trials: their records, shape (TRIAL, PIECE).
+        count: how many there are.
+        curve: nodes, and the variance between them, shape (2, q).
+        work: what `_inputs` has written; rows 6 and 7 are free.
+        likelihood: where it is written.
+    """
+    drive, scale, responds, known, varies = work[1], work[2], work[3], work[4], work[5]
+    relative, evoked = work[6], work[7]
+    low, floor = trials[LOW], particle[LOG_FLOOR]
+    floor_sd = particle[FLOOR_SD]
+    floor_variance = floor_sd * floor_sd
+    output = particle[OUTPUT_SD] * particle[OUTPUT_SD] if is_curved(particle) else _NIL
+    for i in range(count):
+        relative[i] = low[i] - floor
+        evoked[i] = _NIL
+    start = particle[ONSET]
+    for q in range(NODES):
+        at, between, weight = curve[0, q], curve[1, q], NODE_WEIGHTS[q]
+        if start > _NIL:
+            rescaled = _HALF / (_ONE - start)
+            for i in range(count):
+                sigmoid = per(_ONE + exp(-(drive[i] + at)))
+                steep = sigmoid * (_ONE - sigmoid)
+                variance = steep * steep * between
+                over = sigmoid - start
+                reach = max(over * over + _CORNER * variance, _LEAST_REACH)
+                share = (math.sqrt(reach) + over) * rescaled * scale[i]
+                total = _ONE + share + known[i]
+                varied = share * share * (variance / reach + output) + floor_variance + varies[i]
+                inverse_sd = total * per_root(varied)
+                z = min(max((log(total) - relative[i]) * inverse_sd, -_END), _END)
+                evoked[i] += weight * inverse_sd * exp2(_BELL * z * z)
+        else:
+            for i in range(count):
+                sigmoid = per(_ONE + exp(-(drive[i] + at)))
+                flat = _ONE - sigmoid
+                share = sigmoid * scale[i]
+                total = _ONE + share + known[i]
+                varied = share * share * (flat * flat * between + output) + floor_variance + varies[i]
+                inverse_sd = total * per_root(varied)
+                z = min(max((log(total) - relative[i]) * inverse_sd, -_END), _END)
+                evoked[i] += weight * inverse_sd * exp2(_BELL * z * z)
+    for i in range(count):
+        still = (_ONE + known[i]) / math.sqrt(floor_variance + varies[i])
+        z = min(max((log(_ONE + known[i]) - relative[i]) * still, -_END), _END)
+        silent = still * exp2(_BELL * z * z)
+        outlier = (_OUT_DENSITY if _OUT_LOW < relative[i] < _OUT_HIGH else _NIL) + _TINY
+        density = _ROOT * (responds[i] * evoked[i] + (_ONE - responds[i]) * silent)
+        likelihood[i] = _IN * density + _OUT * outlier
+
+
+@loop
+def _between(low: Any, high: Any) -> Any:
+    """Probability that a standard normal variable is between two ends; exact in either tail."""
+    right = low > _NIL
+    return ndtr(-low if right else high) - ndtr(-high if right else low)
+
+
+@loop
+def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likelihood: Any) -> None:
+    """Write the probability that each trial's log MEP is between its ends; arguments as for `_density`."""
+    drive, scale, responds, known, varies = work[1], work[2], work[3], work[4], work[5]
+    low, high, evoked = work[6], work[7], work[8]
+    told_low, told_high, floor = trials[LOW], trials[HIGH], particle[LOG_FLOOR]
+    floor_variance = particle[FLOOR_SD] * particle[FLOOR_SD]
+    output = particle[OUTPUT_SD] * particle[OUTPUT_SD] if is_curved(particle) else _NIL
+    start = particle[ONSET]
+    rectified, rescaled = start > _NIL, _HALF / (_ONE - start)
+    for i in range(count):  # a power of 40 stands in for infinity
+        low[i] = max(told_low[i], -_EVER) - floor
+    for i in range(count):
+        high[i] = min(told_high[i], _EVER) - floor
+        evoked[i] = _NIL
+    for q in range(NODES):
+        at, between, weight = curve[0, q], curve[1, q], NODE_WEIGHTS[q]
+        for i in range(count):
+            sigmoid = per(_ONE + exp(-(drive[i] + at)))
+            flat = _ONE - sigmoid
+            variance = sigmoid * flat * (sigmoid * flat) * between
+            over = sigmoid - start
+            reach = max(over * over + _CORNER * variance, _LEAST_REACH)
+            share = scale[i] * ((math.sqrt(reach) + over) * rescaled if rectified else sigmoid)
+            varied = share * share * ((variance / reach if rectified else flat * flat * between) + output)
+            total = _ONE + share + known[i]
+            inverse_sd, mean = total * per_root(varied + floor_variance + varies[i]), log(total)
+            evoked[i] += weight * _between((low[i] - mean) * inverse_sd, (high[i] - mean) * inverse_sd)
+    for i in range(count):
+        still, mean = (_ONE + known[i]) / math.sqrt(floor_variance + varies[i]), log(_ONE + known[i])
+        silent = _between((low[i] - mean) * still, (high[i] - mean) * still)
+        first = min(max((low[i] - _OUT_LOW) * _OUT_DENSITY, _NIL), _ONE)
+        outlier = min(max((high[i] - _OUT_LOW) * _OUT_DENSITY, _NIL), _ONE) - first
+        mixed = responds[i] * evoked[i] + (_ONE - responds[i]) * silent
+        likelihood[i] = max(_IN * mixed + _OUT * outlier, _LEAST_MASS)
+
+
+@loop
+def _total(particle: Any, trials: Any, count: int, censored: Any, curve: Any, work: Any) -> float:
+    """Log likelihood of a piece of the trials of one sort."""
+    real, isi_sd, likelihood, summed = trials[REAL], trials[ISI_SD], work[9], work[10]
+    uncertain = False
+    for i in range(count):
+        uncertain |= isi_sd[i] > _NIL
+        summed[i] = _NIL
+    for node in range(3 if uncertain else 1):
+        _inputs(particle, trials, count, _SHIFTS[node] if uncertain else _NIL, work)
+        _gains(particle, trials, count, work)
+        if censored:
+            _inside(particle, trials, count, curve, work, likelihood)
+        else:
+            _density(particle, trials, count, curve, work, likelihood)
+        share = _SHARES[node] if uncertain else _ONE
+        for i in range(count):
+            summed[i] += share * likelihood[i]
+    for i in range(count):
+        summed[i] = real[i] * log(summed[i])
+    return float(total(summed, count))
+
+
+@loop
+def history_likelihood(particle: Any, known: Any, sizes: Any, censored: Any, more_sizes: Any, room: Any) -> float:
+    """Log likelihood of one person's history under a particle.
+
+    Args:
+        particle: its record.
+        known: the trials whose amplitude is known, as `trial_records` has them.
+        sizes: how many are in each piece.
+        censored: those that are censored.
+        more_sizes: how many are in each piece.
+        room: for what is in between, shape (ROOM, PIECE).
+    """
+    curve, nodes = room[ROOM - 3 :], NODES
+    curve_of(particle, curve[0, :nodes], curve[1, :nodes], curve[2])
+    summed = 0.0
+    for piece in range(len(sizes)):
+        summed += _total(particle, known[piece], sizes[piece], False, curve, room)  # noqa: FBT003
+    for piece in range(len(more_sizes)):
+        summed += _total(particle, censored[piece], more_sizes[piece], True, curve, room)  # noqa: FBT003
+    return summed
+
+
+@loop
+def _all(particles: Any, known: Any, sizes: Any, censored: Any, more_sizes: Any, room: Any, found: Any) -> None:
+    """Write the log likelihood of one person's history under each particle; arguments as for `history_likelihood`."""
+    for number in range(particles.shape[0]):
+        found[number] = history_likelihood(particles[number], known, sizes, censored, more_sizes, room)
+
+
+@kernel
+def likelihoods(particles: Any, history: Any) -> Any:
+    """Log likelihood of each person's history under each particle, shape (b, p).
+
+    Args:
+        particles: records, shape (b, p, PARTICLE).
+        history: shape (b, n, columns).
+    """
+    found, room = np.zeros(particles.shape[:2], dtype=np.float32), np.empty((ROOM, PIECE), dtype=np.float32)
+    for person in range(particles.shape[0]):
+        known, sizes = trial_records(history[person], False)  # noqa: FBT003
+        censored, more_sizes = trial_records(history[person], True)  # noqa: FBT003
+        _all(particles[person], known, sizes, censored, more_sizes, room, found[person])
+    return found

@@ -1,0 +1,228 @@
+"""Markov chain moves of particles in loops: proposal, prior of the blocks that change, likelihood, acceptance.
+
+They are those of `isiw.models.particles.moves`; the draws come from outside.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from isiw.compiled import inlined, kernel, loop
+from isiw.models.particles.kernels.likelihood import ROOM, history_likelihood
+from isiw.models.particles.kernels.records import PARTICLE, PIECE, trial_records
+from isiw.models.particles.kernels.target import KINDS, fresh_values, log_block, meant
+from isiw.models.particles.moves import BLUR, JUMP_PROBABILITY
+
+__all__ = ["OWN_DRAWS", "log_places", "records", "sweep"]
+
+OWN_DRAWS: Final = 7 + KINDS
+"""Uniform draws of a move besides those that fresh latents take: acceptance, jump or not, which, and so on."""
+
+_f = np.float32
+_BLUR, _LEAST = _f(BLUR), _f(1e-30)
+
+
+@inlined
+def _which(quantile: Any, edges: Any) -> int:
+    """Which of some alternatives is drawn, by the sums of the probabilities of earlier ones."""
+    drawn = 0
+    for number in range(len(edges)):
+        drawn += quantile > edges[number]
+    return drawn
+
+
+@inlined
+def _jump(tables: Any, uniform: Any, normal: Any, z: Any, kinds: Any, fresh: Any) -> int:
+    """Draw some latents and kinds of a particle anew from the prior; which jump it is."""
+    jump = _which(uniform[2], tables.jumps)
+    redrawn = tables.redrawn[jump]
+    for block in range(len(tables.first)):
+        first = tables.first[block]
+        wanted = False
+        for latent in range(first, first + tables.size[block]):
+            wanted |= redrawn[latent]
+        if wanted:
+            fresh_values(block, tables, uniform[OWN_DRAWS:], normal, fresh)
+            for latent in range(first, first + tables.size[block]):
+                z[latent] = fresh[latent] if redrawn[latent] else z[latent]
+    for kind in range(KINDS):
+        if tables.renewed[jump, kind]:
+            kinds[kind] = _which(uniform[7 + kind], tables.kinds[kind])
+    return jump
+
+
+@inlined
+def _shift(tables: Any, theirs: Any, uniform: Any, normal: Any, moves: Any, z: Any) -> None:
+    """Add a scaled difference of two of the others to the latents that move."""
+    others = theirs.shape[0]
+    one = theirs[min(int(uniform[5] * _f(others)), others - 1)]
+    other = theirs[min(int(uniform[6] * _f(others)), others - 1)]
+    scale = _f(1.0) if uniform[3] < _f(0.1) else _f(0.15) + _f(0.7) * uniform[4]
+    for latent in range(len(moves)):
+        if moves[latent]:
+            z[latent] += scale * (one[latent] - other[latent]) + _BLUR * tables.spreads[latent] * normal[latent]
+
+
+@inlined
+def _log_ratio(tables: Any, moves: Any, old: Any, new: Any, parts: Any) -> float:
+    """Log of the ratio of the prior densities, of the blocks that have moved alone."""
+    ratio = 0.0
+    for block in range(len(tables.first)):
+        first = tables.first[block]
+        moved = False
+        for latent in range(first, first + tables.size[block]):
+            moved |= moves[latent]
+        if moved:
+            ratio += log_block(new, block, tables, parts) - log_block(old, block, tables, parts)
+    return ratio
+
+
+@loop
+def _log_place(tables: Any, z: Any, parts: Any) -> float:
+    """Log density of the blocks that hold start and width."""
+    summed, block = 0.0, 0
+    while tables.first[block] < 2 and block < len(tables.first):
+        summed += log_block(z, block, tables, parts)
+        block += 1
+    return summed
+
+
+@inlined
+def _overlap(tables: Any, z: Any) -> bool:
+    """Whether enhancement and depression overlap where they may not."""
+    if not tables.apart:
+        return False
+    at = tables.at
+    start, end = z[at[0]], z[at[0]] + math.exp(z[at[1]])
+    low_start, low_end = z[at[27]], z[at[27]] + math.exp(z[at[28]])
+    return not (end <= low_start or low_end <= start)
+
+
+@inlined
+def _proposed(tables: Any, theirs: Any, kinds: Any, u: Any, n: Any, chosen: Any, scratch: Any) -> Any:
+    """Write what a particle may move to, and return the log ratio of prior densities and whether it stays as it is."""
+    old, new, fresh, parts = scratch[0], scratch[1], scratch[2], scratch[4]
+    state = 0
+    for kind in range(KINDS):
+        chosen[kind] = kinds[kind]
+        state += tables.states[kind] * kinds[kind]
+    if u[1] < JUMP_PROBABILITY:
+        jump = _jump(tables, u, n, new, chosen, fresh)
+        ratio, same = 0.0, tables.of_profile[jump] and not (kinds[2] or chosen[2])
+    else:
+        moves = tables.shifted[state, _which(u[2], tables.parts)]
+        ratio, same = 0.0, True
+        for latent in range(len(moves)):
+            same &= not moves[latent]
+        if not same:
+            _shift(tables, theirs, u, n, moves, new)
+            ratio = _log_ratio(tables, moves, old, new, parts)
+    return -math.inf if _overlap(tables, new) else ratio, same
+
+
+@loop
+def _move_half(
+    tables: Any, state: Any, mine: Any, theirs: Any, draws: Any, trials: Any, rooms: Any, counts: Any
+) -> None:
+    """Move half of the particles of one person once, in place.
+
+    Args:
+        tables: of the prior and the moves.
+        state: values, kinds and log likelihoods of all particles, and room for the kinds of one.
+        mine: the first of those that move, and the one behind the last.
+        theirs: latents of the others, by whose differences they move, shape (o, d).
+        draws: uniform and standard normal ones.
+        trials: as `history_likelihood` has them.
+        rooms: for the likelihood, shape (ROOM, PIECE); for latents, a record and parts of a density, shape (5, 64).
+        counts: shifts, accepted ones, jumps, accepted ones; shape (4,).
+    """
+    values, kinds, log_likelihood, chosen = state
+    (uniform, normal), (room, scratch) = draws, rooms
+    known, sizes, censored, more_sizes = trials
+    old, new, particle = scratch[0], scratch[1], scratch[3]
+    for i in range(mine[0], mine[1]):
+        for latent in range(values.shape[1]):
+            old[latent] = new[latent] = values[i, latent]
+        ratio, same = _proposed(tables, theirs, kinds[i], uniform[i], normal[i], chosen, scratch)
+        before = log_likelihood[i]
+        after = before
+        if ratio > -math.inf and not same:
+            meant(new, chosen, tables.at, particle)
+            after = np.float32(history_likelihood(particle, known, sizes, censored, more_sizes, room))
+        sort = 2 if uniform[i, 1] < JUMP_PROBABILITY else 0
+        counts[sort] += 1
+        if math.log(max(uniform[i, 0], _LEAST)) < after - before + ratio:
+            counts[sort + 1] += 1
+            log_likelihood[i] = after
+            for latent in range(values.shape[1]):
+                values[i, latent] = new[latent]
+            for kind in range(KINDS):
+                kinds[i, kind] = chosen[kind]
+
+
+@kernel
+def sweep(tables: Any, history: Any, values: Any, kinds: Any, log_likelihood: Any, uniform: Any, normal: Any) -> Any:
+    """Move every particle once, in place, one half by differences within the other.
+
+    Args:
+        tables: of the prior and the moves.
+        history: shape (b, n, columns).
+        values: latents of the particles, shape (b, p, d).
+        kinds: their kinds, shape (b, p, k).
+        log_likelihood: of the history under each, shape (b, p).
+        uniform: uniform draws, shape (b, p, u).
+        normal: standard normal draws, shape (b, p, d).
+
+    Returns:
+        How many shifts there were, how many were accepted, and the same of jumps, shape (b, 4).
+    """
+    people, size = values.shape[:2]
+    counts, chosen = np.zeros((people, 4), dtype=np.float32), np.zeros(KINDS, dtype=np.int64)
+    room, scratch = np.empty((ROOM, PIECE), dtype=np.float32), np.zeros((5, 64), dtype=np.float32)
+    half = size // 2
+    for person in range(people):
+        trials = (*trial_records(history[person], False), *trial_records(history[person], True))  # noqa: FBT003
+        state = values[person], kinds[person], log_likelihood[person], chosen
+        draws = uniform[person], normal[person]
+        for first, behind in ((0, half), (half, size)):
+            theirs = values[person, half:] if first == 0 else values[person, :half]
+            mine = first, behind
+            _move_half(tables, state, mine, theirs, draws, trials, (room, scratch), counts[person])
+    return counts
+
+
+@kernel
+def records(tables: Any, values: Any, kinds: Any) -> Any:
+    """Records of particles, shape (b, p, PARTICLE).
+
+    Args:
+        tables: of the prior.
+        values: their latents, shape (b, p, d).
+        kinds: their kinds, shape (b, p, k).
+    """
+    people, size, latents = values.shape
+    found, z = np.empty((people, size, PARTICLE), dtype=np.float32), np.zeros(latents + 1, dtype=np.float32)
+    for person in range(people):
+        for i in range(size):
+            z[:latents] = values[person, i]
+            meant(z, kinds[person, i], tables.at, found[person, i])
+    return found
+
+
+@kernel
+def log_places(tables: Any, values: Any) -> Any:
+    """Log prior density of start and width but for a constant, shape (b, p).
+
+    Args:
+        tables: of the prior.
+        values: the particles' latents, shape (b, p, d).
+    """
+    people, size = values.shape[:2]
+    found, parts = np.empty((people, size), dtype=np.float32), np.empty(64, dtype=np.float32)
+    for person in range(people):
+        for i in range(size):
+            found[person, i] = _log_place(tables, values[person, i], parts)
+    return found

@@ -1,0 +1,269 @@
+"""Predictive distributions and expected MEPs of particles in loops: what `predictions` says in torch."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from isiw.compiled import LANES, exp, exp2, inlined, kernel, log, loop, per, per_root, total
+from isiw.models.particles.kernels.likelihood import (
+    NODE_WEIGHTS,
+    NODES_AT,
+    curve_of,
+    facilitations,
+    is_curved,
+)
+from isiw.models.particles.kernels.records import (
+    BOOST,
+    DEPTH,
+    DRIFT,
+    FLOOR_SD,
+    LEAST,
+    LOG_FLOOR,
+    LOG_RATIO,
+    MOST,
+    NOISE,
+    ONSET,
+    OUTPUT_SD,
+    REST,
+    SPREAD,
+    STARTLED,
+    gain_of,
+)
+from isiw.models.particles.noise import (
+    CORNER,
+    FAR_BELOW,
+    NODES,
+    ON_NODES,
+    OUTLIER_LOG_RANGE,
+    OUTLIER_PROBABILITY,
+    NoiseKind,
+)
+
+__all__ = [
+    "evoked_means",
+    "facilitation_rows",
+    "outcome_tables",
+    "position_of",
+    "rows_between",
+    "table_rows",
+]
+
+_f = np.float32
+_NIL, _HALF, _ONE = _f(0.0), _f(0.5), _f(1.0)
+_PER_NODE, _FAR, _CORNER = _f(1.0 / ON_NODES), _f(FAR_BELOW), _f(CORNER)
+_MISSING, _ALL_OR_NONE = _f(NoiseKind.MISSING), _f(NoiseKind.ALL_OR_NONE)
+_LEAST_SIZE, _LEAST_REACH, _TINY = _f(1e-9), _f(1e-12), _f(1e-6)
+_BELL, _END, _ROOT = _f(-0.5 / math.log(2.0)), _f(11.0), _f(1.0 / math.sqrt(2.0 * math.pi))
+_OUT_LOW, _OUT_HIGH = _f(OUTLIER_LOG_RANGE[0]), _f(OUTLIER_LOG_RANGE[1])
+_OUT_DENSITY = _f(1.0 / (OUTLIER_LOG_RANGE[1] - OUTLIER_LOG_RANGE[0]))
+_OUT, _IN = _f(OUTLIER_PROBABILITY), _f(1.0 - OUTLIER_PROBABILITY)
+
+
+@kernel
+def table_rows(particles: Any, rows: int) -> Any:
+    """Facilitations of the tables' rows, shape (b, s, l): squares of equal steps, or equal steps from below 0."""
+    people, size = particles.shape[:2]
+    levels = np.empty((people, size, rows), dtype=np.float32)
+    for person in range(people):
+        for i in range(size):
+            depth = particles[person, i, DEPTH]
+            for row in range(rows):
+                share = _f(row) / _f(rows - 1)
+                levels[person, i, row] = share * (_ONE + depth) - depth if depth > _NIL else share * share
+    return levels
+
+
+@loop
+def _responds(particle: Any, level: Any) -> Any:
+    """Probability of a response at a facilitation."""
+    kind, most, least = particle[NOISE], particle[MOST], particle[LEAST]
+    if kind == _MISSING:
+        return most * math.sqrt(level)
+    return least + (most - least) * level if kind == _ALL_OR_NONE else _ONE
+
+
+@loop
+def _evoked(particle: Any, levels: Any, means: Any) -> None:
+    """Write the expected MEP above the floor at some facilitations, in floors; see `noise.evoked_mean`."""
+    count, ratio = len(levels), exp(particle[LOG_RATIO])
+    for row in range(count):
+        means[row] = _NIL
+    if is_curved(particle):
+        rest, boost, start = particle[REST], particle[BOOST], particle[ONSET]
+        for q in range(NODES):
+            at, weight = rest + particle[SPREAD] * NODES_AT[q] * _PER_NODE, NODE_WEIGHTS[q]
+            for row in range(count):
+                share = per(_ONE + exp(-(at + boost * levels[row])))
+                means[row] += weight * max(share - start, _NIL)
+        ratio *= exp(_HALF * particle[OUTPUT_SD] * particle[OUTPUT_SD]) / (_ONE - start)
+    else:
+        whole = particle[NOISE] == _ALL_OR_NONE
+        for row in range(count):
+            means[row] = _ONE if whole else levels[row]
+    for row in range(count):
+        means[row] *= ratio * _responds(particle, max(levels[row], _NIL))
+
+
+@kernel
+def evoked_means(particles: Any, levels: Any) -> Any:
+    """Expected MEP above the floor, in floors, shape (b, s, l).
+
+    Args:
+        particles: records, shape (b, s, PARTICLE).
+        levels: facilitations, shape (b, s, l).
+    """
+    means = np.empty(levels.shape, dtype=np.float32)
+    for person in range(particles.shape[0]):
+        for i in range(particles.shape[1]):
+            _evoked(particles[person, i], levels[person, i], means[person, i])
+    return means
+
+
+@loop
+def _components(particle: Any, drive: Any, scale: Any, at: Any, between: Any, mean: Any, inverse_sd: Any) -> None:
+    """Write mean and inverse SD of the log MEP over the floor at one node, by the drive; see `noise._components`."""
+    curved, start, floor_sd = is_curved(particle), particle[ONSET], particle[FLOOR_SD]
+    output = particle[OUTPUT_SD] * particle[OUTPUT_SD] if curved else _NIL
+    floor_variance, rescaled, rectified = floor_sd * floor_sd, _HALF / (_ONE - start), start > _NIL
+    for row in range(len(drive)):
+        share = per(_ONE + exp(-(drive[row] + at)))
+        flat = _ONE - share
+        variance = share * flat * (share * flat) * between
+        over = share - start
+        reach = max(over * over + _CORNER * variance, _LEAST_REACH)
+        size = scale * ((math.sqrt(reach) + over) * rescaled if rectified else share)
+        varied = (variance / reach if rectified else flat * flat * between) + output
+        inverse_sd[row] = (_ONE + size) * per_root(size * size * varied + floor_variance)
+        mean[row] = log(_ONE + size)
+
+
+@loop
+def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, cells: Any, table: Any) -> None:
+    """Write the probability of each outcome at some facilitations, shape (l, y).
+
+    Args:
+        particle: its record.
+        levels: the facilitations, shape (l,).
+        gain: of the next trial.
+        lines: log MEP of each outcome, width of its cell, and five more lines of whole lanes that are free.
+        cells: room for as many lines as there are facilitations.
+        table: where they are written.
+    """
+    relative, width, drive, mean, inverse_sd, spread, between = (
+        lines[0],
+        lines[1],
+        lines[2],
+        lines[3],
+        lines[4],
+        lines[5],
+        lines[6],
+    )
+    rows, count = len(levels), lines.shape[1]
+    curve_of(particle, spread[:NODES], between[:NODES], mean)
+    curved, per_sd, floor = is_curved(particle), _ONE / particle[FLOOR_SD], particle[LOG_FLOOR]
+    scale = exp(particle[LOG_RATIO] + gain + (_NIL if curved else _FAR))
+    rest, boost, whole = particle[REST], particle[BOOST], particle[NOISE] == _ALL_OR_NONE
+    for row in range(rows):
+        if curved:
+            drive[row] = rest + boost * levels[row]
+        else:
+            drive[row] = _NIL if whole else log(max(levels[row], _LEAST_SIZE))
+        for y in range(count):
+            cells[row, y] = _NIL
+    for q in range(NODES):
+        _components(particle, drive, scale, spread[q], between[q], mean, inverse_sd)
+        for row in range(rows):
+            cell, at, per, weight = cells[row], mean[row] + floor, inverse_sd[row], NODE_WEIGHTS[q] * inverse_sd[row]
+            for y in range(count):
+                z = min(max((relative[y] - at) * per, -_END), _END)
+                cell[y] += weight * exp2(_BELL * z * z)
+    for row in range(rows):
+        cell, responds = cells[row], _responds(particle, max(levels[row], _NIL))
+        for y in range(count):
+            over = relative[y] - floor
+            z = min(max(over * per_sd, -_END), _END)
+            outlier = (_OUT_DENSITY if _OUT_LOW < over < _OUT_HIGH else _NIL) + _TINY
+            density = _ROOT * (responds * cell[y] + (_ONE - responds) * (per_sd * exp2(_BELL * z * z)))
+            cell[y] = (_IN * density + _OUT * outlier) * width[y]
+        per_sum = _ONE / total(cell, count)
+        for y in range(table.shape[1]):
+            table[row, y] = cell[y] * per_sum
+
+
+@kernel
+def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width: Any) -> Any:
+    """Probability of each outcome of the next trial at some facilitations, shape (b, s, l, y).
+
+    Args:
+        particles: records, shape (b, s, PARTICLE).
+        levels: facilitations, shape (b, s, l).
+        order: how many trials came before.
+        log_mep: middles of the outcomes' cells, shape (b, y).
+        width: of the cells, up to a constant, shape (y,).
+    """
+    people, size, rows = levels.shape
+    outcomes = log_mep.shape[1]
+    padded = (max(outcomes, rows) + LANES - 1) // LANES * LANES
+    table, cells = (
+        np.empty((people, size, rows, outcomes), dtype=np.float32),
+        np.empty((rows, padded), dtype=np.float32),
+    )
+    lines = np.zeros((7, padded), dtype=np.float32)
+    lines[1, :outcomes] = width
+    startle, relaxed = gain_of(order)
+    for person in range(people):
+        lines[0, :outcomes] = log_mep[person]
+        for i in range(size):
+            particle = particles[person, i]
+            gain = particle[DRIFT] * relaxed + particle[STARTLED] * startle
+            _outcomes(particle, levels[person, i], gain, lines, cells, table[person, i])
+    return table
+
+
+@inlined
+def position_of(level: Any, depth: Any, rows: int) -> Any:
+    """Where a facilitation lies among the rows of a table."""
+    share = (level + depth) / (_ONE + depth) if depth > _NIL else math.sqrt(min(max(level, _NIL), _ONE))
+    return min(max(share, _NIL), _ONE) * _f(rows - 1)
+
+
+@loop
+def _between_rows(table: Any, level: Any, depth: Any, found: Any) -> None:
+    for t in range(len(level)):
+        position = position_of(level[t], depth, table.shape[0])
+        row = min(int(position), table.shape[0] - 2)
+        above, first, second, blend = position - _f(row), table[row], table[row + 1], found[t]
+        for y in range(table.shape[1]):
+            blend[y] = first[y] + above * (second[y] - first[y])
+
+
+@kernel
+def rows_between(particles: Any, table: Any, levels: Any) -> Any:
+    """What lies between the rows of a table, shape (b, s, t, y).
+
+    Args:
+        particles: records, shape (b, s, PARTICLE).
+        table: a row for each of `table_rows`, shape (b, s, l, y).
+        levels: facilitations, shape (b, s, t).
+    """
+    people, size, count = levels.shape
+    found = np.empty((people, size, count, table.shape[3]), dtype=np.float32)
+    for person in range(people):
+        for i in range(size):
+            depth = particles[person, i, DEPTH]
+            _between_rows(table[person, i], levels[person, i], depth, found[person, i])
+    return found
+
+
+@kernel
+def facilitation_rows(particles: Any, isi_ms: Any) -> Any:
+    """Facilitation of each particle at some ISIs [ms] (t,), shape (b, s, t)."""
+    people, size = particles.shape[:2]
+    found = np.empty((people, size, len(isi_ms)), dtype=np.float32)
+    for person in range(people):
+        for i in range(size):
+            facilitations(particles[person, i], isi_ms, found[person, i], len(isi_ms))
+    return found

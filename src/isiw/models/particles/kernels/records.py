@@ -1,0 +1,124 @@
+"""Plain arrays that the kernels work on: one record a particle, and one a trial.
+
+A particle's record holds what its latents mean (`Person`); a trial's holds what was told of it, and what else bears on
+its amplitude, neutral where nobody knows better.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from isiw.compiled import LANES, exp, kernel, loop
+from isiw.lazy import torch
+from isiw.models.particles.noise import PERSISTENCE, STARTUP, Response
+from isiw.models.particles.prior import Depression, Person
+from isiw.models.particles.shapes import Shape
+from isiw.models.protocol import Tensor
+from isiw.models.shared.history import History
+from isiw.types import FloatArray
+
+__all__ = ["columns_of", "gain_of", "people_of", "person_of", "trial_records"]
+
+# Of a particle.
+NOISE, SHAPE, PRESENT, START, WIDTH, FORM, LOG_FLOOR, FLOOR_SD, LOG_RATIO, SPREAD, OUTPUT_SD = range(11)
+BOOST, REST, ONSET, MOST, LEAST, DRIFT, STARTLED, SLOPE, LOW_START, LOW_WIDTH, DEPTH = range(11, 22)
+PARTICLE: Final = 22
+
+# Of a trial, as a history has it.
+ISI, ISI_SD, LOW, HIGH, ORDER, KNOWN, KNOWN_SD, OFFSET, SHIFT, FACTOR = range(10)
+# In place of the order: the two parts of the gain, and whether it is a trial at all.
+STARTLE, RELAXED, REAL = 4, 10, 11
+TRIAL: Final = 12
+PIECE: Final = 128
+
+_f = np.float32
+_FIRST, _SECOND = _f(STARTUP[0]), _f(STARTUP[1])
+_LOG_PERSISTENCE: Final = np.float32(np.log(PERSISTENCE))
+_ONE, _NIL = np.float32(1.0), np.float32(0.0)
+
+
+def person_of(records: FloatArray) -> Person:
+    """What particles mean, as views of their records (b, p, PARTICLE).
+
+    Args:
+        records: the particles; a depression is there where they have one.
+    """
+    column = torch.from_numpy(records).unbind(-1)
+    shape = Shape(column[SHAPE], column[START], column[WIDTH], column[FORM])
+    response = Response(column[NOISE], *column[LOG_FLOOR : SLOPE + 1])
+    low = Shape(torch.zeros_like(column[SHAPE]), column[LOW_START], column[LOW_WIDTH], torch.zeros_like(column[SHAPE]))
+    depression = Depression(low, column[DEPTH], column[DEPTH] > 0) if (records[..., DEPTH] > 0).any() else None
+    return Person(shape, response, column[PRESENT] > 0, depression)
+
+
+def people_of(person: Person) -> FloatArray:
+    """Particles as records, shape (b, p, PARTICLE).
+
+    Args:
+        person: what they mean, fields of shape (b, p).
+    """
+    shape, response = person.shape, person.response
+    low = person.depression
+    nothing = torch.zeros_like(response.log_floor)
+    below = (
+        (nothing, nothing + 1.0, nothing)
+        if low is None
+        else (low.shape.start_ms, low.shape.width_ms, low.depth * low.present)
+    )
+    profile = (shape.kind, person.present, shape.start_ms, shape.width_ms, shape.form)
+    fields = (response.kind, *profile, *response[1:], *below)
+    return _plain(torch.stack([field.to(nothing) for field in fields], dim=-1))
+
+
+def columns_of(history: History) -> FloatArray:
+    """A history as an array, shape (b, n, columns)."""
+    return _plain(torch.cat((torch.stack(history.columns, dim=-1), history.around), dim=-1))
+
+
+def _plain(values: Tensor) -> FloatArray:
+    array: FloatArray = values.detach().contiguous().numpy()
+    return array
+
+
+@loop
+def gain_of(order: Any) -> Any:
+    """How a trial after so many others startles, and how far amplitudes have wandered by then; see `noise.log_gain`."""
+    startle = _FIRST if order == 0 else (_SECOND if order == 1 else _NIL)
+    return startle, _ONE - exp(_LOG_PERSISTENCE * _f(order))
+
+
+@kernel
+def trial_records(columns: Any, censored: bool) -> Any:  # noqa: FBT001 - kernels know no keywords
+    """The trials of one person whose amplitude is known, or those that are censored.
+
+    Args:
+        columns: the history of the person, shape (n, columns).
+        censored: which of them.
+
+    Returns:
+        Pieces, each of which fits into the fastest memory, shape (pieces, TRIAL, PIECE), and how many trials are in
+        each, shape (pieces,): whole lanes, padded by trials that are none. TMS alone has an enhancement factor of 0.
+    """
+    count = 0
+    for n in range(columns.shape[0]):
+        count += (columns[n, LOW] != columns[n, HIGH]) == censored
+    pieces = (count + PIECE - 1) // PIECE
+    records = np.zeros((pieces, TRIAL, PIECE), dtype=np.float32)
+    counts = np.full(pieces, PIECE)
+    if pieces:
+        counts[-1] = (count - (pieces - 1) * PIECE + LANES - 1) // LANES * LANES
+    number = 0
+    for n in range(columns.shape[0]):
+        if (columns[n, LOW] != columns[n, HIGH]) != censored:
+            continue
+        record, i = records[number // PIECE], number % PIECE
+        for field in range(10):
+            record[field, i] = columns[n, field]
+        if np.isnan(columns[n, ISI]):
+            record[ISI, i] = record[FACTOR, i] = _NIL
+        record[STARTLE, i], record[RELAXED, i] = gain_of(columns[n, ORDER])
+        record[REAL, i] = _ONE
+        number += 1
+    return records, counts

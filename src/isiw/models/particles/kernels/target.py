@@ -1,0 +1,256 @@
+"""Tables of a prior over people, for kernels: the law of each block of latents, and what moves may do to a particle.
+
+The latents of every model are those of the default, in another order, and fewer or more: `at` says where each is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from isiw.compiled import exp, inlined, log, loop
+from isiw.models.particles.kernels.records import (
+    BOOST,
+    DEPTH,
+    DRIFT,
+    FLOOR_SD,
+    FORM,
+    LEAST,
+    LOG_FLOOR,
+    LOG_RATIO,
+    LOW_START,
+    LOW_WIDTH,
+    MOST,
+    NOISE,
+    ONSET,
+    OUTPUT_SD,
+    PRESENT,
+    REST,
+    SHAPE,
+    SLOPE,
+    SPREAD,
+    START,
+    STARTLED,
+    WIDTH,
+)
+from isiw.models.particles.noise import NoiseKind
+from isiw.models.particles.prior import MOST_ONSET
+from isiw.types import FloatArray, IntArray
+
+__all__ = ["KINDS", "MEANINGS", "Tables", "fresh_values", "log_block", "meant"]
+
+KINDS: Final = 4
+"""Of a particle: its profile's shape, its noise, whether there is an enhancement, and whether there is a depression."""
+
+MEANINGS: Final = 30
+"""Latents that mean anything to `meant`: those of the default in their order, then three of a depression."""
+
+_f = np.float32
+_NIL, _HALF, _ONE, _TWO = _f(0.0), _f(0.5), _f(1.0), _f(2.0)
+_ROOT_HALF, _LEAST_RUN, _LEAST_DENSITY, _NEVER = _f(math.sqrt(0.5)), _f(1e-12), _f(1e-30), _f(-1e30)
+_MOST_ONSET = _f(MOST_ONSET)
+_ALL_OR_NONE, _RECTIFIED, _RECRUITMENT = NoiseKind.ALL_OR_NONE, NoiseKind.RECTIFIED, NoiseKind.RECRUITMENT
+
+
+class Tables(NamedTuple):
+    """What kernels know of a model's prior and of its moves.
+
+    Args:
+        at: where the latent of each of `MEANINGS` is; d where the model has none, shape (m,).
+        spreads: usual SD of each latent, shape (d,).
+        first: the first latent of each block, shape (k,).
+        size: how many latents it has, shape (k,).
+        components: of how many components its mixture is, shape (k,); 0 for a start, -1 for start and width that may be
+            those of a place.
+        log_shares: of the components, less the logs of their SDs, shape (k, c).
+        below: sums of the shares of earlier components, shape (k, c).
+        means: of the latents in each component, shape (c, d).
+        sds: their SDs, shape (c, d).
+        start_ms: knots of the density of a start [ms], evenly spaced, shape (s,).
+        density: at the knots, shape (s,).
+        quantiles: probability of an earlier start, at the knots, shape (s,).
+        places: log of the share, less the logs of the SDs, then mean and SD of the start and of the log width in each
+            place that earlier sessions lead to expect, shape (l, 5).
+        place_share: probability of all places.
+        place_below: given that, sums of the shares of earlier places, shape (l,).
+        apart: whether enhancement and depression may not overlap.
+        states: weights of the kinds (k,) in the number of a particle's state.
+        shifted: which latents a difference moves, by state and part, shape (states, parts, d).
+        parts: sums of the probabilities of earlier parts, shape (parts - 1,).
+        jumps: sums of the probabilities of earlier jumps, shape (jumps - 1,).
+        redrawn: which latents each jump draws anew, shape (jumps, d).
+        renewed: which kinds each jump draws anew, shape (jumps, k).
+        of_profile: whether a jump concerns nothing but a profile, which without facilitation means nothing, (jumps,).
+        kinds: sums of the probabilities of earlier values of each kind, shape (k, v - 1).
+    """
+
+    at: IntArray
+    spreads: FloatArray
+    first: IntArray
+    size: IntArray
+    components: IntArray
+    log_shares: FloatArray
+    below: FloatArray
+    means: FloatArray
+    sds: FloatArray
+    start_ms: FloatArray
+    density: FloatArray
+    quantiles: FloatArray
+    places: FloatArray
+    place_share: float
+    place_below: FloatArray
+    apart: bool
+    states: IntArray
+    shifted: Any
+    parts: FloatArray
+    jumps: FloatArray
+    redrawn: Any
+    renewed: Any
+    of_profile: Any
+    kinds: FloatArray
+
+
+@loop
+def meant(z: Any, kinds: Any, at: Any, particle: Any) -> None:
+    """Write what latents mean, as `Prior.person` says.
+
+    Args:
+        z: the latents and a 0 behind them, which stands for those that a model does not have, shape (d + 1,).
+        kinds: the particle's kinds, shape (k,).
+        at: where each latent is; see `Tables`.
+        particle: its record, which is written.
+    """
+    shape, noise, present, depressed = kinds[0], kinds[1], kinds[2], kinds[3]
+    particle[SHAPE], particle[NOISE], particle[PRESENT] = _f(shape), _f(noise), _f(present)
+    particle[START], particle[WIDTH] = z[at[0]], exp(z[at[1]])
+    particle[FORM] = _f(math.erf(z[at[2]] * _ROOT_HALF)) if shape else _NIL
+    particle[LOG_FLOOR], particle[FLOOR_SD] = z[at[3]], exp(z[at[4]])
+    particle[DRIFT], particle[STARTLED] = z[at[5]], z[at[6]]
+    switches, rectified = noise == _ALL_OR_NONE, noise == _RECTIFIED
+    particle[MOST], particle[LEAST] = _ONE, _NIL
+    particle[ONSET], particle[BOOST], particle[REST], particle[SLOPE] = _NIL, _NIL, _NIL, _NIL
+    if rectified or noise == _RECRUITMENT:
+        first = 20 if rectified else 14
+        slope = exp(z[at[first + 1]])
+        particle[LOG_RATIO], particle[SPREAD] = z[at[first]], exp(z[at[first + 2]])
+        particle[OUTPUT_SD], particle[SLOPE] = exp(z[at[first + 3]]), slope
+        particle[BOOST], particle[REST] = slope * exp(z[at[first + 4]]), slope * z[at[first + 5]]
+        if rectified:
+            onset = min(exp(z[at[26]]), _MOST_ONSET)
+            particle[ONSET] = onset
+            particle[REST] += log(onset) - log(_ONE - onset)
+    else:
+        particle[LOG_RATIO] = z[at[12 if switches else 7]]
+        particle[SPREAD], particle[OUTPUT_SD] = exp(z[at[13 if switches else 8]]), _ONE
+        particle[MOST] = _ONE / (_ONE + exp(-z[at[10 if switches else 9]]))
+        particle[LEAST] = _ONE / (_ONE + exp(-z[at[11]]))
+    particle[LOW_START], particle[LOW_WIDTH], particle[DEPTH] = _NIL, _ONE, _NIL
+    if depressed:
+        particle[LOW_START], particle[LOW_WIDTH] = z[at[27]], exp(z[at[28]])
+        particle[DEPTH] = exp(z[at[29]] - z[at[18]])
+
+
+@inlined
+def _start_density(x: Any, start_ms: Any, density: Any) -> Any:
+    """Density of a start, 0 where none can be; straight between the knots."""
+    last = len(start_ms) - 1
+    if not start_ms[0] <= x <= start_ms[last]:
+        return _NIL
+    place = (x - start_ms[0]) * (_f(last) / (start_ms[last] - start_ms[0]))
+    left = min(int(place), last - 1)
+    share = place - _f(left)
+    return max(density[left] + share * (density[left + 1] - density[left]), _LEAST_DENSITY)
+
+
+@inlined
+def _start_at(quantile: Any, start_ms: Any, quantiles: Any) -> Any:
+    """The start at a quantile of the prior [ms]."""
+    low, high = 0, len(quantiles) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if quantiles[middle] < quantile:
+            low = middle
+        else:
+            high = middle
+    share = (quantile - quantiles[low]) / max(quantiles[high] - quantiles[low], _LEAST_RUN)
+    return start_ms[low] + min(max(share, _NIL), _ONE) * (start_ms[high] - start_ms[low])
+
+
+@inlined
+def _log_sum(parts: Any, count: int) -> Any:
+    """Log of the sum of the exponentials of the first parts."""
+    most = parts[0]
+    for k in range(1, count):
+        most = max(most, parts[k])
+    summed = _NIL
+    for k in range(count):
+        summed += exp(parts[k] - most)
+    return most + log(summed)
+
+
+@inlined
+def log_block(z: Any, block: int, tables: Any, parts: Any) -> float:
+    """Log density of the latents of a block but for a constant; -inf where there can be none.
+
+    Args:
+        z: all latents, shape (d + 1,).
+        block: its number.
+        tables: the prior's.
+        parts: room for the components, shape (c + places,).
+    """
+    first, size, components = tables.first[block], tables.size[block], tables.components[block]
+    if components <= 0:
+        density = _start_density(z[first], tables.start_ms, tables.density)
+        anywhere = _NEVER if density == _NIL else log(density)
+        if components == 0:
+            return float(anywhere) if density > _NIL else -math.inf
+        first, size, places = first + 1, 1, len(tables.places)
+    else:
+        anywhere, places = _NIL, 0
+    count = max(components, -components)
+    for k in range(count):
+        squares = _NIL
+        for latent in range(first, first + size):
+            distance = (z[latent] - tables.means[k, latent]) / tables.sds[k, latent]
+            squares += distance * distance
+        parts[k] = tables.log_shares[block, k] - _HALF * squares + anywhere
+    for place in range(places):
+        law = tables.places[place]
+        a, b = (z[0] - law[1]) / law[2], (z[1] - law[3]) / law[4]
+        parts[count + place] = law[0] - _HALF * (a * a + b * b)
+    found = _log_sum(parts, count + places)
+    return float(found) if found > _NEVER * _HALF else -math.inf
+
+
+@inlined
+def fresh_values(block: int, tables: Any, uniform: Any, normal: Any, z: Any) -> None:
+    """Draw the latents of a block from the prior.
+
+    Args:
+        block: its number.
+        tables: the prior's.
+        uniform: uniform draws: one a block, then two of the places, and two of a second start.
+        normal: standard normal draws, one a latent.
+        z: where the latents are written, shape (d + 1,).
+    """
+    first, size, components = tables.first[block], tables.size[block], tables.components[block]
+    blocks = len(tables.first)
+    if components <= 0:
+        z[first] = _start_at(uniform[blocks + 2 + first % 2], tables.start_ms, tables.quantiles)
+        if components == 0:
+            return
+        first, size = first + 1, 1
+        if uniform[blocks] < tables.place_share:
+            place = 0
+            while place < len(tables.places) - 1 and uniform[blocks + 1] > tables.place_below[place]:
+                place += 1
+            law = tables.places[place]
+            z[0], z[1] = law[1] + law[2] * normal[0], law[3] + law[4] * normal[1]
+            return
+    component, count = 0, max(components, -components)
+    while component < count - 1 and uniform[block] > tables.below[block, component]:
+        component += 1
+    for latent in range(first, first + size):
+        z[latent] = tables.means[component, latent] + tables.sds[component, latent] * normal[latent]

@@ -1,0 +1,118 @@
+"""Tables by facilitation, from which a sample's predictions are interpolated: by torch, or by compiled loops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from isiw.compiled import first_of
+from isiw.lazy import torch
+from isiw.models.particles.kernels import predictions as compiled
+from isiw.models.particles.likelihood import in_pieces, levels
+from isiw.models.particles.noise import NODES, Response, evoked_mean, log_gain, outcome_density
+from isiw.models.particles.prior import Person
+from isiw.models.protocol import Tensor
+from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
+from isiw.types import FloatArray
+
+__all__ = ["FacilitationTables", "cell_ends", "log_ends"]
+
+
+@dataclass(frozen=True, eq=False)
+class FacilitationTables:
+    """What equally weighted particles respond with, by facilitation.
+
+    Args:
+        person: the particles, fields of shape (b, s).
+        records: the same particles as kernels have them; None where torch computes.
+    """
+
+    person: Person
+    records: FloatArray | None = None
+
+    @cached_property
+    def _depth(self) -> Tensor | None:
+        """Facilitation at the deepest depression is minus this, shape (b, s, 1); None where nobody looks for one."""
+        low = self.person.depression
+        return None if low is None else low.depth.unsqueeze(-1)
+
+    @cached_property
+    def rows(self) -> Tensor:
+        """Facilitations of the rows, from the deepest depression to the largest enhancement, shape (b, 1 or s, l)."""
+        if self.records is not None:
+            return torch.from_numpy(compiled.table_rows(self.records, LEVELS))
+        people, device = len(self.person.present), self.person.present.device
+        if self._depth is None:
+            return table_levels(device).expand(people, 1, -1)
+        return torch.linspace(0.0, 1.0, LEVELS, dtype=torch.float32, device=device) * (1.0 + self._depth) - self._depth
+
+    @cached_property
+    def evoked(self) -> Tensor:
+        """Expected MEP above the floor in each row, in floors, shape (b, s, l)."""
+        if self.records is not None:
+            return torch.from_numpy(compiled.evoked_means(self.records, self.rows.numpy()))
+        return evoked_mean(self.person.response, self.rows)
+
+    def at(self, table: Tensor, level: Tensor) -> Tensor:
+        """What lies between the rows of a table.
+
+        Args:
+            table: shape (b, s, l, y).
+            level: facilitations, shape (b, s, t).
+
+        Returns:
+            Shape (b, s, t, y).
+        """
+        if self.records is not None:
+            return torch.from_numpy(compiled.rows_between(self.records, table.numpy(), level.numpy()))
+        if self._depth is None:
+            return interpolated(table, level)
+        # `interpolated` has its rows at the squares of equal steps.
+        return interpolated(table, ((level + self._depth) / (1.0 + self._depth)).clamp(0.0, 1.0).square())
+
+    def levels(self, isi_ms: Tensor) -> Tensor:
+        """Facilitation of each particle at some ISIs [ms] (t,), shape (b, s, t)."""
+        if self.records is not None:
+            return torch.from_numpy(compiled.facilitation_rows(self.records, isi_ms.contiguous().numpy()))
+        return levels(self.person, isi_ms.unsqueeze(0))
+
+    def outcomes(self, order: int) -> Tensor:
+        """Probability of each outcome of the next trial in each row, shape (b, s, l, y).
+
+        Args:
+            order: how many trials came before.
+        """
+        response = self.person.response
+        low, high = log_ends(response, self.evoked)
+        ends = cell_ends(low.device)
+        middle, width = 0.5 * (ends[1:] + ends[:-1]), ends.diff()
+        log_mep = low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)
+        if self.records is not None:
+            with first_of("predictions"):
+                cells = log_mep.numpy(), width.numpy()
+                return torch.from_numpy(compiled.outcome_tables(self.records, self.rows.numpy(), order, *cells))
+        gain = log_gain(response, torch.full_like(response.drift, order).unsqueeze(-1)).squeeze(-1)
+        response = response._replace(log_ratio=response.log_ratio + gain)
+        others = (self.rows, log_mep.unsqueeze(-2))
+        mass = in_pieces(outcome_density, response, others, LEVELS * OUTCOMES * NODES) * width
+        return mass / mass.sum(-1, keepdim=True)
+
+
+def log_ends(response: Response, evoked: Tensor) -> tuple[Tensor, Tensor]:
+    """Between which log MEPs outcomes lie, each of shape (b,).
+
+    Args:
+        response: response parameters, fields of shape (b, s).
+        evoked: expected MEP above the floor by facilitation, in floors, shape (b, s, l).
+    """
+    top = response.log_floor + torch.log1p(evoked.amax(-1))
+    low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
+    return low, torch.quantile(top, 0.95, dim=-1) + 1.5
+
+
+def cell_ends(device: torch.device) -> Tensor:
+    """Ends of the cells of the log MEP, from 0 to 1; narrow where MEPs are as small as the floor, which varies little.
+
+    Shape (y + 1,).
+    """
+    return torch.linspace(0.0, 1.0, OUTCOMES + 1, dtype=torch.float32, device=device).pow(1.5)

@@ -1,0 +1,49 @@
+"""What the commands that learn nothing do without."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+LOG = Path(__file__).parents[1] / "data" / "logs" / "f2fd174-default.mcap"
+
+WITHOUT = """
+import importlib.abc, sys
+class Absent(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {absent}:
+            raise ImportError(name + " is not installed")
+sys.meta_path.insert(0, Absent())
+from isiw.cli import app
+app()
+"""
+
+LEARNING = {"torch", "gpytorch", "botorch", "pyro", "sklearn"}
+TABLES = {"pandas", "pyarrow", "matplotlib"}
+
+
+@pytest.mark.parametrize(
+    ("absent", "command"),
+    [
+        (LEARNING | TABLES | {"scipy"}, ["strategies"]),
+        (LEARNING | TABLES | {"scipy"}, ["strategies", "default"]),
+        (LEARNING | TABLES | {"scipy"}, ["strategies", "gp-ei"]),
+        (LEARNING | TABLES | {"scipy"}, ["strategies", "parametric-mi"]),
+        (LEARNING | TABLES | {"scipy"}, ["show", LOG]),
+        (LEARNING, ["plot", LOG, "-o", "picture.png"]),
+        (LEARNING, ["report", LOG, "-o", "page.html"]),
+        (LEARNING, ["export", LOG, "tables"]),
+        (LEARNING, ["export", LOG, "bids", "--to", "bids"]),
+    ],
+    ids=lambda value: " ".join(map(str, value[::2])) if isinstance(value, list) else "",
+)
+def test_a_command_that_learns_nothing_needs_no_library_that_learns(
+    tmp_path: Path, absent: set[str], command: list[str | Path]
+) -> None:
+    started = [sys.executable, "-c", WITHOUT.format(absent=absent), *command]
+    ended = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True, check=False)  # noqa: S603 - our own
+
+    assert ended.returncode == 0, ended.stderr
