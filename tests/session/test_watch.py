@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -129,7 +130,7 @@ def test_microvolts_pause_a_session_once(log: Path) -> None:
 
 def test_a_stimulator_that_stops_firing_pauses_the_session(log: Path) -> None:
     device = ScriptedDevice(lambda s: Measurement(0.1 + 0.02 * s.trial if s.trial < 8 else 0.0, s.isi_ms))
-    never = {"stop_width_ms": 0.001, "stop_expected_f1": 1.0, "stop_gain": 0.0, "stop_no_window": 1.0}
+    never: dict[str, Any] = {"stop_width_ms": 0.001, "stop_expected_f1": 1.0, "stop_gain": 0.0, "stop_no_window": 1.0}
     result = Session(device, make_strategy("random", particles=50, max_trials=60, **never), log=log).run()
     assert len(result.trials) < 40
     assert "Does the stimulator still fire" in result.decision.reason
