@@ -53,7 +53,7 @@ def test_without_quick_a_command_line_stays_as_it_is() -> None:
     assert expanded("people", ["--people", "2"]) == ["--people", "2"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("command", sorted(set(QUICK) - NOT_HERE))
 def test_a_quick_run_takes_two_minutes_at_most_and_changes_no_committed_file(command: str) -> None:
     name, *rest = command.split()
