@@ -123,9 +123,7 @@ def picture() -> Figure:
         rows = curves_of(cohort)
         for (method, name), marker in zip(PICTURED.items(), "oXPsD^v", strict=True):
             curve = rows[rows["strategy"] == method].sort_values("trial")
-            reach = 1.96 * curve["f1_se"]
-            band = curve.assign(f1_low=curve["f1"] - reach, f1_high=curve["f1"] + reach)
-            draw_curve(axes, band, name, colours[method], marker)
+            draw_curve(axes, curve, name, colours[method], marker)
         axes.plot(0, before_any_trial(cohort), "o", color=colours["default"], mfc="none", ms=6, clip_on=False,
                   label="the default before any trial")  # fmt: skip
         axes.axhline(guess(cohort), color=INK, lw=1, ls=(0, (4, 3)), label=GUESS)

@@ -78,10 +78,10 @@ def test_ctrl_c_closes_the_log_and_the_exit_code_says_so(tmp_path: Path) -> None
     (tmp_path / "long.toml").write_text("[strategy.settings]\nmax_trials = 190\nstop_width_ms = 0.001\n")
     command = [*COMMAND, "run", "long.toml", "--log", "s.mcap"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603
-        lines = [known(process.stdout).readline() for _ in range(7)]  # the log, two of a legend, headings, trials
+        lines = [known(process.stdout).readline() for _ in range(8)]  # space, log, legend, headings, trials
         process.send_signal(signal.SIGINT)
         output, errors = process.communicate(timeout=60)
-    assert lines[3].startswith("trial")
+    assert lines[4].startswith("trial")
     assert process.returncode == 130
     assert "isiw resume s.mcap" in output
     assert "Interrupted" in errors
@@ -100,7 +100,7 @@ def test_a_killed_run_is_resumed_to_where_it_would_have_come(tmp_path: Path, isi
     with subprocess.Popen(  # noqa: S603
         [*COMMAND, "run", "twelve.toml", "--log", "killed.mcap"], cwd=tmp_path, stdout=subprocess.PIPE, text=True
     ) as process:
-        reported = [known(process.stdout).readline() for _ in range(8)][4:]
+        reported = [known(process.stdout).readline() for _ in range(9)][5:]
         process.send_signal(signal.SIGKILL)
     assert len(read_session("killed.mcap").table) >= len(reported)
     assert isiw("resume", "killed.mcap").exit_code == 0

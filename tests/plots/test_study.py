@@ -48,6 +48,13 @@ def test_each_cohort_has_a_panel_with_a_curve_and_a_band_a_strategy() -> None:
         assert (heights.min(), heights.max()) == pytest.approx((0.3, 0.9))
 
 
+def test_without_the_ends_of_the_band_the_standard_error_gives_them_within_0_and_1() -> None:
+    rows = table("wide", strategies=("default",), f1_se=0.2).drop(columns=["f1_low", "f1_high"])
+    (band, *_) = study_figure(rows).axes[0].collections
+    heights = np.asarray(band.get_paths()[0].vertices)[:, 1]
+    assert (heights.min(), heights.max()) == pytest.approx((0.5 - 0.392, 1.0))
+
+
 def test_a_strategy_has_its_colour_whatever_it_is_compared_with() -> None:
     for strategies in (("default",), ("default", "nr", "gpr", "mine")):
         axes = study_figure(table("wide", strategies=strategies), "frontier").axes[0]

@@ -23,6 +23,7 @@ StudyPicture: TypeAlias = Literal["f1", "frontier", "coverage", "latency"]
 
 _MARKERS = "osD^vPX"
 _COLUMNS = 4
+_SE_OF_BAND = 1.96
 _MOST_IN_A_PANEL = 3
 """More strategies than these have panels of their own, or their bands hide each other."""
 _DASHED = (0, (4, 2))
@@ -123,17 +124,25 @@ def draw_curve(axes: Axes, curve: pd.DataFrame, name: str, colour: str, marker: 
 
     Args:
         axes: where to.
-        curve: the rows of one strategy and cohort, trials ascending: trial, f1, f1_low, f1_high, and if known
-            called_none and start_coverage.
+        curve: the rows of one strategy and cohort, trials ascending: trial, f1, f1_low and f1_high or f1_se, and if
+            known called_none and start_coverage.
         name: for the legend.
         colour: of the strategy.
         marker: of the marked trials.
     """
     curve = _from_first_estimate(curve)
-    axes.fill_between(curve["trial"], curve["f1_low"], curve["f1_high"], color=colour, alpha=0.15, lw=0)
+    axes.fill_between(curve["trial"], *_band(curve), color=colour, alpha=0.15, lw=0)
     axes.plot(curve["trial"], curve["f1"], color=colour, marker=marker, ms=4, lw=1.5, label=name)
     for at_start in curve.loc[curve["trial"] == 0, "f1"]:
         axes.axhline(at_start, color=colour, lw=0.8, ls=":")
+
+
+def _band(curve: pd.DataFrame) -> tuple[pd.Series, pd.Series]:
+    """The ends of the 95 % band, within 0 and 1: as they are given, or by the standard error of many people."""
+    if "f1_low" in curve:
+        return curve["f1_low"], curve["f1_high"]
+    reach = _SE_OF_BAND * curve["f1_se"].fillna(0.0)
+    return (curve["f1"] - reach).clip(lower=0.0), (curve["f1"] + reach).clip(upper=1.0)
 
 
 def _from_first_estimate(curve: pd.DataFrame) -> pd.DataFrame:
