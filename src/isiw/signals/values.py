@@ -1,4 +1,4 @@
-"""Whether the amplitude, the ISI and the times that are told of one trial can be true, and which slip they look like.
+"""Whether the amplitude, the ISI and the times of one trial can be true, and which slip they look like.
 
 The bounds leave room for every muscle: the EMG at rest has 2 to 30 µV peak-to-peak, the largest compound action
 potentials some 25 mV. What is only odd is a doubt (`isiw.signals.amplitudes`).
@@ -32,7 +32,7 @@ __all__ = [
 
 AT_REST_MV = 2e-3
 """EMG at rest has hardly ever less, since the noise of electrodes and amplifier alone has a few µV peak-to-peak; an MEP
-of up to 2 mV that is told in V has less."""
+of up to 2 mV in V has less."""
 
 CUT_OFF_MS: Final = 2.0
 """Pulse, event and ISI, each cut off to whole ms, disagree by less; a rig that is wrong about one of them, by more."""

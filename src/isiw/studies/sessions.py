@@ -138,7 +138,7 @@ class SimulatedSession:
         subject = self.subject()
         delay_ms = subject.stated_hit_delay_ms if self.space.reference == "valve" else None
         stimulus = None if subject.conditioning == "tap" else subject.conditioning
-        if self.own is not None:  # which is told what its settings say
+        if self.own is not None:  # which knows its settings alone
             return self
         known = known_settings(self.strategy, {"hit_delay_ms": delay_ms, "conditioning": stimulus})
         return replace(self, settings=tuple((known | dict(self.settings)).items()))

@@ -35,13 +35,13 @@ REDRAWN: Final = {
     "place": ("start", "width"),
     "response": RESPONSE_BLOCKS,
 }
-"""The blocks of latents that each jump draws anew."""
+"""The blocks of latents that each jump draws again."""
 
 KINDS: Final = ("shape", "noise", "present", "depressed")
 """The kinds of a particle as the kernels have them."""
 
 _RENEWED: Final = {"form": {"shape"}, "noise": {"noise"}, "window": {"shape", "present"}, "place": (), "response": ()}
-"""Which kinds each jump draws anew."""
+"""Which kinds each jump draws again."""
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ def _which(quantile: Any, edges: Any) -> int:
 
 @inlined
 def _jump(tables: Any, uniform: Any, normal: Any, z: Any, kinds: Any, fresh: Any) -> int:
-    """Draw some latents and kinds of a particle anew from the prior; which jump it is."""
+    """Draw some latents and kinds of a particle again from the prior; which jump it is."""
     jump = _which(uniform[2], tables.jumps)
     redrawn = tables.redrawn[jump]
     for block in range(len(tables.first)):

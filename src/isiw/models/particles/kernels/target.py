@@ -80,8 +80,8 @@ class Tables(NamedTuple):
         shifted: which latents a difference moves, by state and part, shape (states, parts, d).
         parts: sums of the probabilities of earlier parts, shape (parts - 1,).
         jumps: sums of the probabilities of earlier jumps, shape (jumps - 1,).
-        redrawn: which latents each jump draws anew, shape (jumps, d).
-        renewed: which kinds each jump draws anew, shape (jumps, k).
+        redrawn: which latents each jump draws again, shape (jumps, d).
+        renewed: which kinds each jump draws again, shape (jumps, k).
         of_profile: whether a jump concerns nothing but a profile, which without facilitation means nothing, (jumps,).
         kinds: sums of the probabilities of earlier values of each kind, shape (k, v - 1).
     """
