@@ -223,7 +223,7 @@ class Connection(H11Protocol):
         is_new = self not in others.known and others.rules.shows_token(Headers(scope=scope))
         if is_new and not others.lets_in(self, scope["path"]):
             app = _too_many(others.rules.most_known, as_200=wants_200(scope["query_string"].decode("latin-1")))
-        await app(scope, receive, _in_pieces(send))
+        await app(scope, receive, _in_pieces(send if self.cycle.keep_alive else _closing(send)))
 
 
 def _too_many(most: int, *, as_200: bool) -> ASGIApp:
@@ -232,6 +232,17 @@ def _too_many(most: int, *, as_200: bool) -> ASGIApp:
         remedy="Close those that are not needed, or send all requests over one. Nothing was done.",
     )  # fmt: skip
     return answered(refusal, as_200=as_200, headers={"Connection": "close"})
+
+
+def _closing(send: Send) -> Send:
+    """What sends an answer that says that the connection ends with it, so that nobody asks again on it."""
+
+    async def sent(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            message = {**message, "headers": [*message.get("headers", ()), (b"connection", b"close")]}
+        await send(message)
+
+    return sent
 
 
 def _in_pieces(send: Send) -> Send:
